@@ -43,7 +43,6 @@ from cns_drake.pictures.stage_pictures import (
 )
 from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.sensors.camera.config import CameraSection
@@ -563,7 +562,7 @@ def towns(path: Path, files: Sequence[str], options: str = "") -> None:
         with tempfile.TemporaryDirectory() as draft:
             folder = _imported(file, options, draft)
             drive = load_scenario(folder.drives()[-1])
-            scene = StageScene(world_file(drive))
+            scene = StageScene(drive.world_file)
             view = air_view(SimpleNamespace(trajectory=plan_drive(drive)))
             pictures.append(scene.photograph(view, *_TILE))
     _tile([pictures], path)

@@ -16,7 +16,6 @@ from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
 # Size of a camera's view [pixels].
@@ -120,7 +119,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
         scenario = scenarios[title]
-        world = (world_file(scenario), scenario.without)
+        world = (scenario.world_file, scenario.without)
         if world not in pictures:
             pictures[world] = StageScene(*world).photograph(
                 view, _SIDE, _SIDE, haze_length=np.inf

@@ -76,7 +76,7 @@ def drive_rows(
     rows = []
     for path in its.drives():
         scenario = scenario_files.read_scenario_file(path)
-        world = scenario_files.world_file(scenario)
+        world = scenario.world_file
         if not is_there(world):
             continue
         # A map whose drives follow waypoints has no roads.
@@ -138,7 +138,7 @@ def _measure(
     structures, triangles = size or _size(scenario)
     return DriveRow(
         sequence=scenario.name,
-        map=scenario_files.map_folder(scenario).path.resolve().name,
+        map=scenario.folder.path.resolve().name,
         stage=str(scenario.stage),
         title=scenario.title,
         checksum=checksum,
@@ -156,9 +156,7 @@ def _size(scenario: Scenario) -> tuple[int, int]:
     from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world
 
-    world = load_world(
-        scenario_files.world_file(scenario), without=scenario.without
-    )
+    world = load_world(scenario.world_file, without=scenario.without)
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return len({geometry.structure for geometry in geometries}), sum(
         len(geometry.surface.triangles)

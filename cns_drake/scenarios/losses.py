@@ -89,7 +89,7 @@ def lost_structures(
     if losses.towards is not None:
         stage = str(drive.stage)
         removable = _difference(drive, stage, losses.towards, source)
-    table = scenario_files.map_folder(drive).structures
+    table = drive.folder.structures
     order = _decay_order(table, seed, removable)
     missing = _draw_losses(table, scattered, int(drawn_by), source)
     return tuple(
@@ -127,7 +127,7 @@ def _difference(
     for one in (stage, other):
         scenario = base.replaced(stage=one)
         scenario_files.check_files(scenario, source)
-        world = load_world(scenario_files.world_file(scenario))
+        world = load_world(scenario.world_file)
         names.append(structures_in(world))
     difference = names[0] - names[1]
     if not difference:

@@ -1,5 +1,7 @@
 """Plans the drive of a scenario."""
 
+from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -15,12 +17,11 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
 from cns_drake.roads.driver_offsets import FINE_SPACING, depart, kerbs
 from cns_drake.roads.lane_path import POINT_SPACING
-from cns_drake.roads.network import load_road_network
+from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
@@ -42,82 +43,129 @@ _SIGHT = 5.0
 _STEEP = 0.7
 
 
-def plan_drive(
-    scenario: Scenario, positions: np.ndarray | None = None
-) -> Trajectory:
+@dataclass(frozen=True)
+class DrivePlan:
+    """The plan of a scenario's drive: its roads and its trajectory.
+
+    Both are read or planned when they are first used, and only once.
+
+    Attributes:
+        scenario: the scenario.
+    """
+
+    scenario: Scenario
+
+    @cached_property
+    def network(self) -> RoadNetwork | None:
+        """The road network of the map; None for a map without roads.
+
+        Raises:
+            InputError: the roads cannot be used.
+        """
+        scenario = self.scenario
+        roads = scenario.folder.roads
+        if scenario.route is None and (
+            scenario.map is None or not roads.is_file()
+        ):
+            return None
+        return load_road_network(roads)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The vehicle's motion, as fast as the limits allow.
+
+        Raises:
+            InputError: the roads, the waypoints or the vehicle's springs cannot
+                be used, the route does not fit the roads, or a bend is too
+                tight for the car.
+        """
+        return self._on_springs(self._rigid)
+
+    def trajectory_at(self, positions: np.ndarray) -> Trajectory:
+        """Returns the motion of a car that keeps its distance to others.
+
+        Args:
+            positions: (N,) distances along the path at evenly spaced times [m],
+                see `cns_drake.traffic.traffic_plan.TrafficPlan`.
+        """
+        return self._on_springs(self._rigid.with_positions(positions))
+
+    @cached_property
+    def _rigid(self) -> Trajectory:
+        """The motion of a car without springs."""
+        scenario = self.scenario
+        driver = scenario.driver
+        spacing = FINE_SPACING if driver.departs else POINT_SPACING
+        if scenario.waypoints is not None:
+            path = load_waypoint_path(
+                scenario.waypoints, spacing, u_turns=scenario.u_turns
+            )
+            source = scenario.waypoints
+            cure = "place waypoints farther apart, or leave some out"
+        else:
+            # There is a route or waypoints, and a route is along roads.
+            assert scenario.route is not None
+            assert self.network is not None
+            path = make_lane_path(
+                self.network,
+                scenario.route,
+                spacing,
+                scenario.source,
+                aside=scenario.aside,
+            )
+            source = f"{scenario.source}: route"
+            cure = "give the junction a greater kerb_radius"
+        if driver.departs:
+            path = depart(
+                path,
+                POINT_SPACING,
+                _things_beside(scenario, path.points)
+                if scenario.waypoints is not None or self.network is None
+                else kerbs(self.network),
+                source,
+                wander=driver.wander,
+                wander_length=driver.wander_length,
+                lane_changes=driver.lane_changes,
+                rng=driver.rng(scenario.name),
+            )
+        trajectory = Trajectory(path, scenario.speeds)
+        radius, (x, y, _) = trajectory.path.tightest_bend()
+        if radius < TIGHTEST_RADIUS:
+            raise InputError(
+                f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}"
+                f" is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
+            )
+        return trajectory
+
+    def _on_springs(self, trajectory: Trajectory) -> Trajectory:
+        ride = self.scenario.ride
+        profile = ride.profile()
+        if profile is None:
+            return trajectory
+        springs = suspension.Suspension(
+            suspension.load_car_masses(vehicle_file()),
+            suspension.load_suspension_rates(suspension_file()),
+        )
+        return suspension.ride_on_springs(
+            trajectory, springs, profile, crossfall=ride.crossfall
+        )
+
+
+def plan_drive(scenario: Scenario) -> Trajectory:
     """Returns the trajectory of a scenario's vehicle along its route.
 
-    The route is a list of lanes or of waypoints.
-
-    Args:
-        positions: (N,) distances along the path at evenly spaced times [m], for
-            a car that keeps its distance to other vehicles, see
-            `cns_drake.traffic.traffic_plan.TrafficPlan`. By default the car
-            drives as fast as the limits allow.
+    The route is a list of lanes or of waypoints. The car drives as fast as the
+    limits allow.
 
     Raises:
-        InputError: the roads, the waypoints or the vehicle's springs cannot
-            be used, the route does not fit the roads, or a bend is too tight
-            for the car.
+        InputError: as `DrivePlan.trajectory`.
 
     Example:
         from cns_drake import load_scenario, plan_drive
 
         trajectory = plan_drive(load_scenario("downtown_01"))
     """
-    driver = scenario.driver
-    network = None
-    spacing = FINE_SPACING if driver.departs else POINT_SPACING
-    if scenario.waypoints is not None:
-        path = load_waypoint_path(
-            scenario.waypoints, spacing, u_turns=scenario.u_turns
-        )
-        source = scenario.waypoints
-        cure = "place waypoints farther apart, or leave some out"
-    else:
-        assert scenario.route is not None  # There is a route or waypoints.
-        network = load_road_network(map_folder(scenario).roads)
-        path = make_lane_path(
-            network,
-            scenario.route,
-            spacing,
-            scenario.source,
-            aside=scenario.aside,
-        )
-        source = f"{scenario.source}: route"
-        cure = "give the junction a greater kerb_radius"
-    if driver.departs:
-        path = depart(
-            path,
-            POINT_SPACING,
-            _things_beside(scenario, path.points)
-            if network is None
-            else kerbs(network),
-            source,
-            wander=driver.wander,
-            wander_length=driver.wander_length,
-            lane_changes=driver.lane_changes,
-            rng=driver.rng(scenario.name),
-        )
-    trajectory = Trajectory(path, scenario.speeds)
-    if positions is not None:
-        trajectory = trajectory.with_positions(positions)
-    radius, (x, y, _) = trajectory.path.tightest_bend()
-    if radius < TIGHTEST_RADIUS:
-        raise InputError(
-            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f} "
-            f"is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
-        )
-    profile = scenario.ride.profile()
-    if profile is None:
-        return trajectory
-    springs = suspension.Suspension(
-        suspension.load_car_masses(vehicle_file()),
-        suspension.load_suspension_rates(suspension_file()),
-    )
-    return suspension.ride_on_springs(
-        trajectory, springs, profile, crossfall=scenario.ride.crossfall
-    )
+    return DrivePlan(scenario).trajectory
 
 
 def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
@@ -127,7 +175,7 @@ def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
     kerbs and walls. An edge at which the ground only falls is not found. The
     points (N, 3) of the path [m] must be close together.
     """
-    world = load_world(world_file(scenario), without=scenario.without)
+    world = load_world(scenario.world_file, without=scenario.without)
     context = world.plant.CreateDefaultContext()
     inspector = world.scene_graph.model_inspector()
     bodies = {
@@ -185,7 +233,7 @@ def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     """
     if scenario.without:
         return scenario.replaced(without=()), "the whole city"
-    stages = list(map_folder(scenario).stages())
+    stages = list(scenario.folder.stages())
     others = [stage for stage in stages if stage != scenario.stage]
     if scenario.stage is None or not others:
         return None, ""

@@ -9,7 +9,6 @@ from cns_drake.base.files import check_regular, is_there, user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__, installed_versions
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 from cns_drake.scene.referenced_files import FileWatch, referenced_files
 from cns_drake.sensors.imu.config import KALIBR_FILE
@@ -57,22 +56,23 @@ def digest_inputs(
     Raises:
         InputError: a file cannot be read.
     """
-    inputs = {"world": world_file(scenario), "vehicle": vehicle_file()}
-    structures = map_folder(scenario).structures
+    inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
+    folder = scenario.folder
+    structures = folder.structures
     if is_there(structures):
         inputs["structures"] = structures
     if scenario.ride.profile() is not None:
         inputs["suspension"] = suspension_file()
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
-    roads = map_folder(scenario).roads
+    roads = folder.roads
     has_traffic = not scenario.traffic.is_off
     if scenario.waypoints is None or (
         roads.is_file() and (has_traffic or not scenario.transient.is_off)
     ):
         inputs["roads"] = roads
     elif has_traffic:
-        inputs["lanes"] = map_folder(scenario).lanes
+        inputs["lanes"] = folder.lanes
     if scenario.traffic.fcd is not None:
         inputs["fcd"] = Path(scenario.traffic.fcd)
     digests = {name: digest_file(one, watch) for name, one in inputs.items()}

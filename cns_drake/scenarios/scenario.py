@@ -20,9 +20,11 @@ from pydantic import (
 
 from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.base.errors import validated
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
+from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
@@ -480,6 +482,21 @@ class Scenario(Section):
     def files(self) -> tuple[Path, ...]:
         """The scenario's own file, and those that it builds on (`base`)."""
         return self._files
+
+    @property
+    def folder(self) -> MapFolder:
+        """The folder of the map or, without a map, of the world's file."""
+        if self.world is not None:
+            return MapFolder(Path(self.world).parent)
+        assert self.map is not None  # Either a map or a world is given.
+        return MapFolder(shipped_maps().get(self.map, Path(self.map)))
+
+    @property
+    def world_file(self) -> Path:
+        """The SDF file of the stage or of the world."""
+        if self.world is not None:
+            return Path(self.world)
+        return self.folder.stage(str(self.stage))
 
     @property
     def fastest_rate(self) -> int:

@@ -175,25 +175,6 @@ def find_files(values: dict, path: Path) -> None:
             values[section] = find(values[section], field)
 
 
-def map_folder(scenario: Scenario) -> MapFolder:
-    """Returns the folder of a scenario's map.
-
-    If the scenario has a `world` instead of a map, this is the folder of the
-    world's file.
-    """
-    if scenario.world is not None:
-        return MapFolder(Path(scenario.world).parent)
-    assert scenario.map is not None  # Either a map or a world is given.
-    return MapFolder(shipped_maps().get(scenario.map, Path(scenario.map)))
-
-
-def world_file(scenario: Scenario) -> Path:
-    """Returns the SDF file of a scenario's stage or world."""
-    if scenario.world is not None:
-        return Path(scenario.world)
-    return map_folder(scenario).stage(str(scenario.stage))
-
-
 def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that all files that a scenario names exist.
 
@@ -226,7 +207,7 @@ def check_files(scenario: Scenario, source: object = None) -> None:
                 f"{source}: traffic: a world has no roads; give a map with some"
             )
         return
-    folder = map_folder(scenario)
+    folder = scenario.folder
     if not os.path.isdir(folder.path):
         known = ", ".join(shipped_maps())
         raise InputError(
@@ -234,7 +215,7 @@ def check_files(scenario: Scenario, source: object = None) -> None:
             f"({known}) nor a folder"
             f"{did_you_mean(scenario.map, shipped_maps())}"
         )
-    if not os.path.isfile(world_file(scenario)):
+    if not os.path.isfile(scenario.world_file):
         stages = ", ".join(folder.stages()) or "none"
         raise InputError(
             f"{source}: stage: map '{scenario.map}' has no stage "

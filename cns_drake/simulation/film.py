@@ -29,11 +29,10 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_drawing import height_rgb
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.simulation import loaded_drive
+from cns_drake.simulation.loaded_drive import load_drive, load_ways
 from cns_drake.simulation.station import make_station
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
@@ -64,11 +63,11 @@ def with_some_traffic(scenario: Scenario) -> Scenario:
     A scenario that already has traffic, or whose streets have no room for so
     many, is returned unchanged.
     """
-    folder = map_folder(scenario)
+    folder = scenario.folder
     is_possible = folder.roads.is_file() or folder.lanes.is_file()
     if scenario.map is None or not is_possible or not scenario.traffic.is_off:
         return scenario
-    graph, walkways, _ = loaded_drive.load_ways(folder)
+    graph, walkways, _ = load_ways(folder)
     room = min(room_for_vehicles(graph), room_for_walkers(walkways))
     return scenario if room < _TRAFFIC else scenario.with_traffic(_TRAFFIC)
 
@@ -133,7 +132,7 @@ def make_film(
     stages = (
         [scenario.stage]
         if scenario.stage is None
-        else list(map_folder(scenario).stages())
+        else list(scenario.folder.stages())
     )
     of_view = max(1, round(seconds * RATE / len(stages) / len(views)))
     doing("planning the drive")
@@ -199,21 +198,12 @@ class FilmStage(Step):
         title = (
             scenario.name
             if scenario.stage is None
-            else f"{map_folder(scenario).name.capitalize()}, stage "
-            f"{scenario.stage}"
+            else f"{scenario.folder.name.capitalize()}, stage {scenario.stage}"
         )
-        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
-            scenario, plan_drive(scenario)
-        )
-        for text in world.notes:
+        drive = load_drive(scenario)
+        for text in drive.world.notes:
             reporter.note(text)
-        diagram = make_station(
-            scenario,
-            world=world,
-            trajectory=trajectory,
-            traffic=traffic,
-            cameras_see_vehicle=True,
-        )
+        diagram = make_station(drive, cameras_see_vehicle=True)
         context = diagram.CreateDefaultContext()
         for k, time in enumerate(self.times):
             context.SetTime(time)

@@ -1,4 +1,4 @@
-"""A scenario with all inputs of its simulation: path, stage, traffic."""
+"""A scenario with all that its simulation needs: path, stage, traffic."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,16 +16,18 @@ from cns_drake.base.files import user_errors
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
+from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
-from cns_drake.scenarios import scenario_files
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.provenance import digest_inputs, recording_fingerprint
+from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario, TrafficConfig
+from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.scene.referenced_files import FileWatch
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
+from cns_drake.simulation.recording_schedule import (
+    RecordingPlan,
+    plan_recording,
+)
 from cns_drake.traffic import lane_graph, traffic_plan
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
@@ -50,27 +52,32 @@ _HALF_WIDTH = 1.3
 
 @dataclass(frozen=True)
 class LoadedDrive:
-    """A scenario with all inputs of its simulation.
+    """A scenario with all that its simulation needs, loaded.
 
     Attributes:
         scenario: the scenario; its field `frames` is never None.
-        inputs: kind of file -> digest of its content, see
-            `cns_drake.scenarios.provenance.digest_inputs`.
-        fingerprint: fingerprint of the recording, for `fingerprint.txt`.
         trajectory: motion of the vehicle.
-        world: world of the stage, with the vehicle in it.
-        num_frames: number of frames to record.
+        world: world of the stage, with the vehicle and the objects of the
+            traffic. Its SceneGraph passes to the first Diagram.
         traffic: motion of all other vehicles and of walkers; None without
             traffic.
     """
 
     scenario: Scenario
-    inputs: dict[str, str]
-    fingerprint: str
     trajectory: Trajectory
     world: World
-    num_frames: int
     traffic: traffic_plan.TrafficPlan | None = None
+
+    @functools.cached_property
+    def recording(self) -> RecordingPlan:
+        """The topics of the recording, and the times of their messages."""
+        return plan_recording(self.scenario)
+
+    @property
+    def num_frames(self) -> int:
+        """Number of frames to record."""
+        assert self.scenario.frames is not None
+        return self.scenario.frames
 
     @property
     def X_BSs(self) -> dict[str, RigidTransform]:
@@ -80,98 +87,52 @@ class LoadedDrive:
 
 
 def load_drive(scenario: Scenario) -> LoadedDrive:
-    """Plans the drive of a scenario and loads its stage.
+    """Plans the drive of a scenario and its traffic, and loads its stage.
 
-    Raises:
-        InputError: the scenario cannot be run, or its files changed while
-            they were being read.
-    """
-    scenario_files.check_files(scenario)
-    doing("planning the drive")
-    watch = FileWatch()
-    inputs = digest_inputs(scenario, watch)
-    trajectory = plan_drive(scenario)
-    if not scenario.driver.follows:
-        count_frames(scenario, trajectory)  # An error comes at once.
-    world, traffic, trajectory = load_stage_and_traffic(scenario, trajectory)
-    num_frames = count_frames(scenario, trajectory)
-    scenario = scenario.replaced(frames=num_frames)
-    changed = watch.changed()
-    if changed is not None:
-        raise InputError(f"{changed}: changed while it was being read")
-    # `frames` is set even for the whole drive, so that giving its number
-    # explicitly makes no difference.
-    whole = num_frames == frames_within(
-        trajectory.duration, scenario.frame_period
-    )
-    lines = [
-        recording_fingerprint(scenario.replaced(**update), inputs)
-        for update in ({}, {"frames": None})[: 1 + whole]
-    ]
-    return LoadedDrive(
-        scenario,
-        inputs,
-        "\n".join(lines),
-        trajectory,
-        world,
-        num_frames,
-        traffic,
-    )
-
-
-def load_stage_and_traffic(
-    scenario: Scenario, trajectory: Trajectory
-) -> tuple[World, traffic_plan.TrafficPlan | None, Trajectory]:
-    """Returns the world of a scenario's stage, its traffic, and the trajectory.
-
-    The world contains the vehicle and all objects of the traffic. The traffic
-    is None for a scenario without traffic. If the vehicle keeps its distance to
-    the vehicle ahead (field `driver.follows`), the returned trajectory is
-    slower than the given one; otherwise it is the same.
-
-    Args:
-        scenario: the scenario.
-        trajectory: motion of its vehicle, planned without traffic.
+    If the vehicle keeps its distance to the vehicle ahead (field
+    `driver.follows`), the drive is slower than planned without traffic.
 
     Raises:
         InputError: the scenario cannot be run.
     """
-    world = load_stage(scenario, trajectory=trajectory)
-    if scenario.traffic.is_off:
-        return world, None, trajectory
-    doing("planning the traffic")
-    traffic = plan_scenario_traffic(scenario, trajectory, world)
-    if traffic.positions is not None:
-        # Springs depend on speeds; the path does not, and is slow to plan.
-        trajectory = (
-            trajectory.with_positions(traffic.positions)
-            if scenario.ride.profile() is None
-            else plan_drive(scenario, traffic.positions)
-        )
-    return with_traffic(world, traffic), traffic, trajectory
+    check_files(scenario)
+    doing("planning the drive")
+    plan = DrivePlan(scenario)
+    trajectory = plan.trajectory
+    if not scenario.driver.follows:
+        count_frames(scenario, trajectory)  # An error comes at once.
+    world = load_stage(plan)
+    traffic = None
+    if not scenario.traffic.is_off:
+        doing("planning the traffic")
+        traffic = plan_scenario_traffic(scenario, trajectory, world)
+        world = with_traffic(world, traffic)
+        if traffic.positions is not None:
+            trajectory = plan.trajectory_at(traffic.positions)
+    return LoadedDrive(
+        scenario.replaced(frames=count_frames(scenario, trajectory)),
+        trajectory,
+        world,
+        traffic,
+    )
 
 
-def load_stage(
-    scenario: Scenario,
-    *,
-    with_vehicle: bool = True,
-    trajectory: Trajectory | None = None,
-) -> World:
-    """Loads the world of a scenario's stage, with its temporary changes.
+def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
+    """Loads the world of a drive's stage, with its temporary changes.
 
     Args:
-        scenario: the scenario.
+        plan: the plan of the drive, near which the temporary changes (field
+            `transient`) are made.
         with_vehicle: whether the world contains the vehicle.
-        trajectory: motion of the vehicle, near which the temporary changes
-            (field `transient`) are made; by default it is planned if needed.
 
     Raises:
         InputError: the scenario's files cannot be used.
     """
+    scenario = plan.scenario
     doing("reading the stage")
     in_the_way = _in_the_way(scenario)
     world = load_world(
-        scenario_files.world_file(scenario),
+        scenario.world_file,
         vehicle=vehicle_file() if with_vehicle else None,
         without=(*scenario.without, *in_the_way),
     )
@@ -180,32 +141,24 @@ def load_stage(
         world = replace(world, notes=(*world.notes, note))
     if scenario.transient.is_off:
         return world
-    trajectory = trajectory or plan_drive(scenario)
+    trajectory = plan.trajectory
     doing("making the temporary changes")
     times = np.arange(0.0, trajectory.duration, 0.1)
     drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
-    return change_world(
-        world, scenario.transient, drive, _driven(scenario, drive)
-    )
+    driven = drive.buffer(_HALF_WIDTH)
+    if plan.network is not None:
+        driven = driven.union(plan.network.areas.lane_area)
+    return change_world(world, scenario.transient, drive, driven)
 
 
 def _in_the_way(scenario: Scenario) -> Sequence[str]:
     """Returns the names of structures that stand where traffic drives."""
     if scenario.traffic.is_off or scenario.map is None:
         return ()
-    folder = scenario_files.map_folder(scenario)
+    folder = scenario.folder
     if folder.roads.is_file() or not folder.lanes.is_file():
         return ()
     return read_lanes(folder.lanes).in_the_way
-
-
-def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
-    """Returns the area where vehicles drive, seen from above [m]."""
-    driven = drive.buffer(_HALF_WIDTH)
-    roads = scenario_files.map_folder(scenario).roads
-    if scenario.map is None or not roads.is_file():
-        return driven
-    return driven.union(load_road_network(roads).areas.lane_area)
 
 
 def plan_scenario_traffic(
@@ -231,8 +184,9 @@ def plan_scenario_traffic(
     """
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
-    scenario_files.check_files(scenario)
-    graph, walkways, _ = load_ways(scenario_files.map_folder(scenario))
+    if world is None:
+        check_files(scenario)
+    graph, walkways, _ = load_ways(scenario.folder)
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
@@ -262,9 +216,7 @@ def plan_scenario_traffic(
         )
     _check_room(wanted, where, graph, walkways)
     if wanted.walkers:
-        world = world or load_stage(
-            scenario, with_vehicle=False, trajectory=trajectory
-        )
+        world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
         things = _things(world)
         walkways = lane_graph.kept_clear(walkways, things)
         graph, walkways = lane_graph.with_unmarked_crossings(

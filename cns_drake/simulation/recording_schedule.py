@@ -1,9 +1,13 @@
 """Topics of a drive, and the times at which its sensors are recorded."""
 
+from dataclasses import dataclass
 import math
 
 from cns_drake.recording.recorded_topics import (
+    IMU_TOPIC,
     OBJECT_TOPICS,
+    ODOMETRY_TOPIC,
+    TF_TOPIC,
     camera_topic,
     labels_topic,
     points_topic,
@@ -17,54 +21,32 @@ from cns_drake.scenarios.scenario import Scenario
 _TOLERANCE = 1e-6
 
 
-def point_layouts(scenario: Scenario) -> dict[str, str]:
-    """Returns LiDAR name -> name of the layout of its recorded points."""
-    return {name: one.layout for name, one in scenario.lidars.items()}
+@dataclass(frozen=True)
+class RecordingPlan:
+    """The topics of a drive's recording, and the times of their messages.
 
-
-def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
-    """Returns the topics of a scenario's recording."""
-    return recording_topics(
-        scenario.lidars,
-        layouts=point_layouts(scenario),
-        with_objects=not scenario.traffic.is_off,
-        further=(*_further_topics(scenario).values(), *_camera_rates(scenario)),
-    )
-
-
-def _further_topics(scenario: Scenario) -> dict[str, Topic]:
-    """Returns the topic of each further sensor, by the sensor's name."""
-    sensors = scenario.further_sensors.items()
-    return {name: sensor.topic(name) for name, sensor in sensors}
-
-
-def _camera_rates(scenario: Scenario) -> dict[Topic, int]:
-    """Returns topic -> images per second, for the topics of a camera."""
-    return {
-        camera_topic(name, kind): camera.rate
-        for name, camera in scenario.cameras.items()
-        for kind, is_there in (
-            ("image", True),
-            ("depth", camera.depth),
-            ("label", camera.label),
-            ("camera_info", True),
-        )
-        if is_there
-    }
-
-
-def first_points_topic(scenario: Scenario) -> str:
-    """Returns the name of the topic with the scans of the first LiDAR.
-
-    Each message on this topic begins a frame.
+    Attributes:
+        topics: the topics. The first has the scans of the first LiDAR; each of
+            its messages begins a frame.
+        schedule: times of the messages, with a stream for each topic that is
+            not latched.
+        layouts: LiDAR name -> name of the layout of its recorded points.
     """
-    return scenario_topics(scenario)[0].name
+
+    topics: tuple[Topic, ...]
+    schedule: Schedule
+    layouts: dict[str, str]
+
+    @property
+    def frame_topic(self) -> str:
+        """Name of the topic on which each frame begins."""
+        return self.topics[0].name
 
 
-def drive_schedule(scenario: Scenario) -> Schedule:
-    """Returns the schedule of a scenario's topics.
+def plan_recording(scenario: Scenario) -> RecordingPlan:
+    """Returns the topics and the schedule of a scenario's recording.
 
-    If the scenario gives a number of frames, no scan begins after the last
+    The scenario's number of frames must be set. No scan begins after the last
     frame. Samples of the IMU, if it is not ideal, and odometry with a rate of
     its own continue until the last scan is complete. So do the poses on `/tf`
     if scans have motion distortion: such scans can thus be corrected up to
@@ -74,25 +56,47 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         InputError: Kalibr's file cannot be used.
     """
     fastest = scenario.fastest_rate
+    layouts = {name: one.layout for name, one in scenario.lidars.items()}
+    # Messages per second, for topics of further sensors and of cameras.
+    further = {
+        sensor.topic(name): sensor.rate or fastest
+        for name, sensor in scenario.further_sensors.items()
+    }
+    for name, camera in scenario.cameras.items():
+        for kind, is_there in (
+            ("image", True),
+            ("depth", camera.depth),
+            ("label", camera.label),
+            ("camera_info", True),
+        ):
+            if is_there:
+                further[camera_topic(name, kind)] = camera.rate
+    topics = recording_topics(
+        scenario.lidars,
+        layouts=layouts,
+        with_objects=not scenario.traffic.is_off,
+        further=further,
+    )
     odometry = scenario.odometry.rate or fastest
     rates = {
-        "/imu/data": scenario.imu.sample_rate(fastest),
-        "/odometry": odometry,
-        "/tf": odometry,
+        IMU_TOPIC.name: scenario.imu.sample_rate(fastest),
+        ODOMETRY_TOPIC.name: odometry,
+        TF_TOPIC.name: odometry,
     }
     if not scenario.traffic.is_off:
         rates |= {topic.name: fastest for topic in OBJECT_TOPICS}
-    for name, topic in _further_topics(scenario).items():
-        rates[topic.name] = scenario.further_sensors[name].rate or fastest
-    for topic, rate in _camera_rates(scenario).items():
-        rates[topic.name] = rate
+    rates |= {topic.name: rate for topic, rate in further.items()}
     for name, lidar in scenario.lidars.items():
         rates[points_topic(name).name] = lidar.rate
         if lidar.layout != "cns":
             rates[labels_topic(name).name] = lidar.rate
+    return RecordingPlan(topics, _schedule(scenario, rates), layouts)
+
+
+def _schedule(scenario: Scenario, rates: dict[str, int]) -> Schedule:
+    """Returns the schedule of topics, given their messages per second."""
     periods = {name: 1.0 / rate for name, rate in rates.items()}
-    if scenario.frames is None:
-        return make_schedule(periods)
+    assert scenario.frames is not None
     last_scan = (scenario.frames - 1) * scenario.frame_period
     complete = max(
         (math.floor(last_scan * one.rate + _TOLERANCE) + 1) / one.rate
@@ -100,11 +104,11 @@ def drive_schedule(scenario: Scenario) -> Schedule:
     )
     until = dict.fromkeys(periods, last_scan)
     if not scenario.imu.is_ideal:
-        until["/imu/data"] = complete
+        until[IMU_TOPIC.name] = complete
     if scenario.odometry.rate is not None:
-        until["/odometry"] = until["/tf"] = complete
+        until[ODOMETRY_TOPIC.name] = until[TF_TOPIC.name] = complete
     elif any(one.motion_distortion for one in scenario.lidars.values()):
-        until["/tf"] = complete
+        until[TF_TOPIC.name] = complete
     # The number of the first sample at or after the end.
     return make_schedule(
         periods,

@@ -24,14 +24,13 @@ from cns_drake.motion.trajectory import pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.messages import to_quat_xyzw
 from cns_drake.recording.schedule import frame_stamp_ns
-from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files, describe_scenario
+from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.patterns import BeamPattern
-from cns_drake.simulation import loaded_drive
+from cns_drake.simulation.loaded_drive import load_drive, structure_list
 from cns_drake.simulation.station import make_station
 
 
@@ -81,27 +80,19 @@ class SimulatedDrive(Drive):
         Raises:
             InputError: the scenario cannot be run.
         """
-        check_files(scenario)
-        doing("planning the drive")
-        trajectory = plan_drive(scenario)
-        world, traffic, trajectory = loaded_drive.load_stage_and_traffic(
-            scenario, trajectory
-        )
+        drive = load_drive(scenario)
+        world, trajectory = drive.world, drive.trajectory
         self.name = scenario.name
         self.world_frame = MAP_FRAME
         self.trajectory = trajectory
         self.period = scenario.frame_period
         self.X_BS = sensor_pose(next(iter(scenario.lidars.values())))
         self._scenario = scenario
-        self._num_frames = count_frames(scenario, trajectory)
-        self._instances = index_instances(
-            loaded_drive.structure_list(world), self.name
-        )
+        self._num_frames = drive.num_frames
+        self._instances = index_instances(structure_list(world), self.name)
         self.structures = structures_in(world)
         doing("building the diagram")
-        self._diagram = make_station(
-            scenario, world=world, trajectory=trajectory, traffic=traffic
-        )
+        self._diagram = make_station(drive)
         self._context = self._diagram.CreateDefaultContext()
         # The station would compute the vehicle's motion and its wheels; here
         # the motion is known beforehand.

@@ -9,6 +9,7 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.progress import doing
@@ -21,17 +22,23 @@ from cns_drake.recording.bag_writer import (
 )
 from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.recording.schedule import START_NS
+from cns_drake.recording.schedule import START_NS, frames_within
 from cns_drake.scenarios import provenance
-from cns_drake.scenarios.planning import shown_beside
+from cns_drake.scenarios.planning import DrivePlan, shown_beside
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
+from cns_drake.scenarios.scenario_files import check_files, describe_scenario
+from cns_drake.scene.referenced_files import FileWatch
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit
-from cns_drake.simulation import loaded_drive, recording_schedule
+from cns_drake.simulation.loaded_drive import (
+    LoadedDrive,
+    load_drive,
+    load_stage,
+    structure_list,
+)
 from cns_drake.simulation.station import make_station
 
 # Reports how many frames of how many are done.
@@ -126,15 +133,22 @@ def simulate(
             if file is not None:
                 check_writable(file)
         RecordingFolder(folder).check(overwrite)
+        check_files(scenario)
         if scenario.cameras:
             check_renderer()
-        drive = loaded_drive.load_drive(scenario)
+        doing("reading the files of the drive")
+        watch = FileWatch()
+        inputs = provenance.digest_inputs(scenario, watch)
+        drive = load_drive(scenario)
+        changed = watch.changed()
+        if changed is not None:
+            raise InputError(f"{changed}: changed while it was being read")
         for text in drive.world.notes:
             on_note(text)
         strike()
         page = None if page_file is None else _make_page(drive)
         resumed_frames = 0
-        with _make_bag(drive, folder, overwrite=overwrite) as bag:
+        with _make_bag(drive, inputs, folder, overwrite=overwrite) as bag:
             if page is None:
                 resumed_frames = _resume(bag, drive, on_frame, on_note)
 
@@ -146,10 +160,7 @@ def simulate(
             doing("building the diagram")
             writer = BackgroundWriter(bag.write)
             diagram = make_station(
-                drive.scenario,
-                world=drive.world,
-                trajectory=drive.trajectory,
-                traffic=drive.traffic,
+                drive,
                 bag=writer,
                 page=page,
                 num_threads=num_threads,
@@ -178,10 +189,17 @@ def simulate(
 
 
 def _make_bag(
-    drive: loaded_drive.LoadedDrive, folder: Path, *, overwrite: bool = False
+    drive: LoadedDrive,
+    inputs: dict[str, str],
+    folder: Path,
+    *,
+    overwrite: bool = False,
 ) -> BagWriter:
-    """Makes the recording of a drive, still without messages."""
-    scenario, inputs = drive.scenario, drive.inputs
+    """Makes the recording of a drive, still without messages.
+
+    `inputs` are the digests of its files, see `provenance.digest_inputs`.
+    """
+    scenario = drive.scenario
     described = describe_scenario(scenario)
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
     imu_files = {} if kalibr is None else {KALIBR_FILE: kalibr}
@@ -192,11 +210,11 @@ def _make_bag(
     }
     return BagWriter(
         folder,
-        recording_schedule.scenario_topics(scenario),
+        drive.recording.topics,
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
-            "structures.json": loaded_drive.structure_list(drive.world),
+            "structures.json": structure_list(drive.world),
             "calibration.json": make_calibration(
                 drive.X_BSs
                 | {
@@ -227,14 +245,29 @@ def _make_bag(
                 if key in described
             },
         },
-        fingerprint=drive.fingerprint,
+        fingerprint=_fingerprint(drive, inputs),
         overwrite=overwrite,
+    )
+
+
+def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
+    """Returns the fingerprints of a recording, for `fingerprint.txt`."""
+    whole = drive.num_frames == frames_within(
+        drive.trajectory.duration, drive.scenario.frame_period
+    )
+    # `frames` is set even for the whole drive, so that giving its number
+    # explicitly makes no difference.
+    return "\n".join(
+        provenance.recording_fingerprint(
+            drive.scenario.replaced(**update), inputs
+        )
+        for update in ({}, {"frames": None})[: 1 + whole]
     )
 
 
 def _resume(
     bag: BagWriter,
-    drive: loaded_drive.LoadedDrive,
+    drive: LoadedDrive,
     on_frame: ProgressCallback,
     on_note: NoteCallback,
 ) -> int:
@@ -244,11 +277,9 @@ def _resume(
     name, num_frames = drive.scenario.name, drive.num_frames
     on_note(f"{name}: found an interrupted run")
     doing("reading the interrupted run")
+    recording = drive.recording
     frames = take_over_frames(
-        bag,
-        recording_schedule.scenario_topics(drive.scenario),
-        recording_schedule.drive_schedule(drive.scenario),
-        recording_schedule.first_points_topic(drive.scenario),
+        bag, recording.topics, recording.schedule, recording.frame_topic
     )
     on_note(
         f"{name}: {frames} of {num_frames} frames are there; going on with "
@@ -260,18 +291,18 @@ def _resume(
     return frames
 
 
-def _make_page(drive: loaded_drive.LoadedDrive) -> MeshcatRecorder:
+def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     scenario = drive.scenario
     other, other_name = shown_beside(scenario)
     stage = scenario.stage
-    stages = () if stage is None else tuple(map_folder(scenario).stages())
+    stages = () if stage is None else tuple(scenario.folder.stages())
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
         period=scenario.frame_period,
         num_frames=drive.num_frames,
         shown=ShownStages(
-            None if other is None else loaded_drive.load_stage(other),
+            None if other is None else load_stage(DrivePlan(other)),
             other_name,
             stage,
             stages,
@@ -286,7 +317,7 @@ def _make_page(drive: loaded_drive.LoadedDrive) -> MeshcatRecorder:
 def _advance(
     diagram: Diagram,
     writer: BackgroundWriter,
-    drive: loaded_drive.LoadedDrive,
+    drive: LoadedDrive,
     first: int,
     on_frame: Callable[[int], None],
 ) -> float:
@@ -299,7 +330,7 @@ def _advance(
         return 0.0
     scenario = drive.scenario
     period = scenario.frame_period
-    schedule = recording_schedule.drive_schedule(scenario)
+    schedule = drive.recording.schedule
 
     def monitor(context: Context) -> None:
         done = math.floor(context.get_time() / period + 1e-6) + 1
@@ -309,9 +340,7 @@ def _advance(
     simulator.set_monitor(monitor)
     # Messages come at ticks. The simulation begins and ends between two ticks,
     # so that rounding cannot add or drop a message.
-    begin = (
-        first * schedule.steps[recording_schedule.first_points_topic(scenario)]
-    )
+    begin = first * schedule.steps[drive.recording.frame_topic]
     end = max(schedule.ends.values())
     start = max(begin - 0.5, 0.0) * schedule.period
     simulator.get_mutable_context().SetTime(start)

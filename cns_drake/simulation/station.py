@@ -14,14 +14,12 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
 from cns_drake.pictures.drive_page import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.schedule import START_NS
-from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
 from cns_drake.sensors.camera.camera import add_cameras
@@ -31,21 +29,17 @@ from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
-from cns_drake.simulation import loaded_drive, recording_schedule
+from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.traffic.traffic_motion import (
     TrafficMotion,
     add_traffic,
     connect_traffic,
 )
-from cns_drake.traffic.traffic_plan import TrafficPlan
 
 
 def make_station(
-    scenario: Scenario,
+    drive: Scenario | LoadedDrive,
     *,
-    world: World | None = None,
-    trajectory: Trajectory | None = None,
-    traffic: TrafficPlan | None = None,
     bag: BagWriter | BackgroundWriter | None = None,
     page: MeshcatRecorder | None = None,
     num_threads: int = 1,
@@ -71,13 +65,8 @@ def make_station(
     adds a port of its name.
 
     Args:
-        scenario: the scenario to build.
-        world: the stage with the vehicle, if already loaded; its SceneGraph
-            passes to the Diagram.
-        trajectory: the drive, if already planned.
-        traffic: the scenario's traffic, if already planned. The structure table
-            of `world` must then include the traffic (see
-            `cns_drake.simulation.loaded_drive.with_traffic`).
+        drive: the scenario to build; or the scenario as `load_drive` returns
+            it, whose SceneGraph passes to the Diagram.
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.
@@ -93,15 +82,10 @@ def make_station(
         context = diagram.CreateDefaultContext()
         scan = diagram.GetOutputPort("lidar_scan").Eval(context)
     """
-    trajectory = trajectory or plan_drive(scenario)
-    world = world or loaded_drive.load_stage(scenario, trajectory=trajectory)
-    if traffic is None and not scenario.traffic.is_off:
-        traffic = loaded_drive.plan_scenario_traffic(
-            scenario, trajectory, world
-        )
-        world = loaded_drive.with_traffic(world, traffic)
-        if traffic.positions is not None:
-            trajectory = plan_drive(scenario, traffic.positions)
+    if isinstance(drive, Scenario):
+        drive = load_drive(drive)
+    scenario, world, traffic = drive.scenario, drive.world, drive.traffic
+    trajectory = drive.trajectory
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)
 
@@ -233,8 +217,8 @@ def make_station(
             X_BSs={n: sensor_pose(one) for n, one in scenario.lidars.items()},
             X_BI=sensor_pose(scenario.imu),
             further=further,
-            schedule=recording_schedule.drive_schedule(scenario),
-            layouts=recording_schedule.point_layouts(scenario),
+            schedule=drive.recording.schedule,
+            layouts=drive.recording.layouts,
             num_rings={
                 n: make_pattern(one).num_rings
                 for n, one in scenario.lidars.items()

@@ -21,8 +21,6 @@ from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
-    map_folder,
-    world_file,
 )
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.scene.world import load_world
@@ -282,7 +280,7 @@ class PairMaker:
         return found
 
     def _check_roads(self, traffic: Any) -> None:
-        folder = map_folder(self.query)
+        folder = self.query.folder
         has_roads = folder.roads.is_file() or folder.lanes.is_file()
         if has_roads or not isinstance(traffic, Mapping):
             return
@@ -390,7 +388,7 @@ class PairMaker:
         if isinstance(left.get("route"), Mapping):
             where = f"{self.source}: {side}.route"
             drawn = validated(DrawnRoute, left.pop("route"), where)
-            roads = load_road_network(map_folder(drive).roads)
+            roads = load_road_network(drive.folder.roads)
             rng = np.random.default_rng(drawn.seed)
             route = draw_route(roads, drawn.length, rng)
             drive = drive.replaced(route=route, waypoints=None)
@@ -443,7 +441,7 @@ class PairMaker:
         """Returns the stage for a stage's name or for a word such as `last`."""
         own = str(drive.stage)
         last = self._last_stage
-        stages = list(map_folder(drive).stages())
+        stages = list(drive.folder.stages())
         if wanted in (OWN, LAST, FIRST):
             return {OWN: own, LAST: last, FIRST: next(iter(stages), own)}[
                 wanted
@@ -468,7 +466,7 @@ class PairMaker:
             return str(wanted)
         raise InputError(
             f"{self.source}: {side}.stage: {wanted!r}:"
-            f" {map_folder(drive).name} has {', '.join(stages)}; or give"
+            f" {drive.folder.name} has {', '.join(stages)}; or give"
             f" {OWN}, {LAST}, {FIRST} or '{EARLIER}1' to '{EARLIER}{_STEPS}'"
         )
 
@@ -485,7 +483,7 @@ class PairMaker:
             return
         follows = driver.get("follows")
         share = _FOLLOWED_ROOM if follows else _MOST_ROOM
-        graph = load_ways(map_folder(self.query)).graph
+        graph = load_ways(self.query.folder).graph
         most = int(share * room_for_vehicles(graph))
         for name in ("vehicles", "walkers"):
             if isinstance(given := traffic.get(name), int) and given > most:
@@ -502,7 +500,7 @@ class PairMaker:
             # Other sections seldom fail, and a plan takes time.
             if set(given) - {*_SEEDED, "seed"}:
                 count_frames(drive, plan_drive(drive))
-        world = world_file(drive), drive.without
+        world = drive.world_file, drive.without
         if "without" in given and world not in self._loaded:
             with errors_at(f"{where}.without"):
                 load_world(world[0], without=drive.without)

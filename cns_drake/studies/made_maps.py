@@ -31,7 +31,7 @@ from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_file
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies.experiment import Experiment, MadeMap
 from cns_drake.studies.redrawing import (
@@ -167,7 +167,7 @@ class MadeMaps:
         """
         if type(seed) is not int or not 0 <= seed < 2**31:
             raise InputError(f"redraw: {seed!r} is no number from 0 on")
-        source = map_folder(drive).path.resolve()
+        source = drive.folder.path.resolve()
         folder, stage = self.redrawn(drive, seed)
         path = Path(folder)
         self._steps[path] = RedrawCity(path, source, stage, seed)
@@ -191,7 +191,7 @@ class MadeMaps:
         city, which is generated from `seed`. Call `want_redrawn` first, with
         the same arguments.
         """
-        source = map_folder(drive).path.resolve()
+        source = drive.folder.path.resolve()
         return str(self.folder / f"{source.name}_c{seed}"), _STAGE
 
     def make(self, cluster: Cluster) -> None:
@@ -215,7 +215,7 @@ class MadeMaps:
     def _key(
         self, drive: Scenario, rates: Any, seed: int
     ) -> tuple[Path, tuple[tuple[str, float], ...], int]:
-        path = map_folder(drive).path.resolve()
+        path = drive.folder.path.resolve()
         return path, tuple(sorted(self._rates(rates).items())), seed
 
     def _rates(self, rates: Any) -> Mapping[str, float]:

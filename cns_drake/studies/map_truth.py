@@ -38,12 +38,12 @@ from cns_drake.base.files import draft_folder, user_errors, write_text
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import track
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     describe_scenario,
     load_scenario,
-    map_folder,
 )
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
@@ -142,11 +142,7 @@ class Survey:
         if self.scenario.traffic.is_off:
             # The LiDAR does not see its own vehicle.
             return self.simulated.look(0)[0]
-        world = load_stage(
-            self.scenario,
-            with_vehicle=False,
-            trajectory=self.simulated.trajectory,
-        )
+        world = load_stage(DrivePlan(self.scenario), with_vehicle=False)
         simulated = self.simulated
         X_WS = simulated.X_WBs[0] @ simulated.X_BS
         return still_scene(world, X_WS, simulated.pattern)
@@ -454,7 +450,7 @@ def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
             )
     if drive.inputs != digest_inputs(scenario):
         raise InputError(
-            f"{path}: its world ({map_folder(scenario).path}) has changed "
+            f"{path}: its world ({scenario.folder.path}) has changed "
             "since it was recorded; record the drive anew"
         )
 

@@ -22,7 +22,6 @@ from cns_drake.scenarios.provenance import (
     recording_fingerprint,
 )
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.simulation.simulation import simulate
 from evaluation.study.parts import Part
 
@@ -196,7 +195,7 @@ class Record(Step):
                 "drive": recording_fingerprint(
                     self.scenario, digest_inputs(self.scenario)
                 ),
-                "beside": beside and digest_file(world_file(beside)),
+                "beside": beside and digest_file(beside.world_file),
             }
         )
 

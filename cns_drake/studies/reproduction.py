@@ -184,7 +184,7 @@ def recording_info(
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
-        map_name=scenario_files.map_folder(scenario).name,
+        map_name=scenario.folder.name,
         stage=scenario.stage,
         way=driven_way(scenario_files.describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),

@@ -42,11 +42,11 @@ def print_growth(drive: str, frames: int) -> None:
     from cns_drake.recording.schedule import FRAME_PERIOD
     from cns_drake.roads.network import load_road_network
     from cns_drake.roads.route import draw_route
-    from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+    from cns_drake.scenarios.scenario_files import load_scenario
 
     scenario = load_scenario(drive)
     route = draw_route(
-        load_road_network(map_folder(scenario).roads),
+        load_road_network(scenario.folder.roads),
         SPEED * frames * FRAME_PERIOD,
         np.random.default_rng(0),
     )

@@ -92,12 +92,7 @@ def write_scans(name: str, out: Path, number: int, *, is_full: bool) -> None:
     scenario = judged(name, is_full=is_full)
     loaded = load_drive(scenario)
     trajectory = loaded.trajectory
-    diagram = make_station(
-        scenario,
-        world=loaded.world,
-        trajectory=trajectory,
-        traffic=loaded.traffic,
-    )
+    diagram = make_station(loaded)
     context = diagram.CreateDefaultContext()
     key, X_BS = next(iter(loaded.X_BSs.items()))
     for part in np.linspace(0.1, 0.9, number):

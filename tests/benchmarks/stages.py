@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario, world_file
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,
@@ -29,7 +29,7 @@ from cns_drake.scene.world import load_world
 
 def read_stage(drive: str) -> list[PerceptionGeometry]:
     """Returns the geometry of a drive's stage."""
-    world = load_world(world_file(load_scenario(drive)))
+    world = load_world(load_scenario(drive).world_file)
     return read_perception_geometry(world.scene_graph.model_inspector())
 
 

@@ -13,7 +13,6 @@ import typer
 from cns_drake import load_scenario
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.command_line import cli
-from cns_drake.scenarios.scenario_files import map_folder
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.drives import open_drive
 
@@ -118,7 +117,7 @@ def test_only_uses_of_lots_end_from_stage_to_stage():
 
 
 def test_the_tutorial_names_the_colours_that_its_page_shows():
-    folder = map_folder(load_scenario("riverside_01"))
+    folder = load_scenario("riverside_01").folder
     with folder.structures.open() as table:
         names = [row["name"] for row in csv.DictReader(table)]
     stages = load_stages(folder.path / "stages.yaml", names)

@@ -9,7 +9,6 @@ from cns_drake.roads.lane_path import LanePath, Speeds
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import shipped_drives
 
 SPACING = 2.0
@@ -113,7 +112,7 @@ def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
     """Returns a shipped drive with its lane path and trajectory."""
     values = yaml.safe_load(shipped_drives()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
-    network = load_road_network(map_folder(scenario).roads)
+    network = load_road_network(scenario.folder.roads)
     path = make_lane_path(
         network, scenario.route, SPACING, aside=scenario.aside
     )

@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.scenario_files import load_scenario, world_file
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
@@ -32,7 +32,7 @@ MAX_RANGE = 120.0
 
 @pytest.fixture(scope="module")
 def stage_file():
-    return world_file(load_scenario("metropolis_04"))
+    return load_scenario("metropolis_04").world_file
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import structure_name
 from cns_drake.simulation.loaded_drive import (
     EGO_BOX,
-    load_stage,
+    load_drive,
     plan_scenario_traffic,
 )
 from cns_drake.traffic.lane_file import read_lanes
@@ -392,7 +392,7 @@ def test_things_in_the_lanes_give_way_to_traffic(tmp_path):
     assert file.in_the_way
     scenario = load_scenario(folder / "sequence_01.yaml")
     plain, busy = (
-        _names(load_stage(one, with_vehicle=False))
+        _names(load_drive(one).world)
         for one in (scenario, scenario.with_traffic(5))
     )
     assert plain - busy == set(file.in_the_way)

@@ -18,10 +18,8 @@ from cns_drake.pictures.drive_page import (
     moving_frames,
 )
 from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scene.world import load_world
-from cns_drake.simulation.loaded_drive import load_stage
+from cns_drake.simulation.loaded_drive import load_drive
 
 PERIOD = 0.5
 NUM_FRAMES = 21
@@ -128,10 +126,11 @@ def test_without_another_stage_nothing_is_said_of_change(tmp_path):
 def test_page_of_a_shipped_drive_is_small():
     """With as many scans and points as a page shows, hard to compress."""
     scenario = load_scenario("downtown_01")  # It has the largest page.
-    world, trajectory = load_stage(scenario), plan_drive(scenario)
+    loaded = load_drive(scenario)
+    world, trajectory = loaded.world, loaded.trajectory
     X_WBs = [
         trajectory.pose(frame * FRAME_PERIOD)
-        for frame in range(count_frames(scenario, trajectory))
+        for frame in range(loaded.num_frames)
     ]
     rng = np.random.default_rng(0)
     scans = [
@@ -153,7 +152,7 @@ def test_page_of_a_shipped_drive_is_small():
         angular_velocities_I=list(motion[:, 4:]),
     )
     page = make_drive_page(
-        drive, world, ShownStages(load_world(map_folder(scenario).stage("04")))
+        drive, world, ShownStages(load_world(scenario.folder.stage("04")))
     )
     assert 15e6 < len(page.encode()) < 25e6
 

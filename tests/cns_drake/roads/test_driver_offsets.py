@@ -23,7 +23,6 @@ from cns_drake.scenarios.scenario import REAL_DRIVER, DriverConfig
 from cns_drake.scenarios.scenario_files import (
     load_scenario,
     make_scenario,
-    map_folder,
 )
 
 NOTHING = shapely.STRtree([])
@@ -152,7 +151,7 @@ def test_a_driver_follows_from_seed_or_name_alone(small_map):
 )
 def test_drivers_keep_clear_of_kerbs(name, seed):
     scenario = load_scenario(name)
-    network = load_road_network(map_folder(scenario).roads)
+    network = load_road_network(scenario.folder.roads)
     real = REAL_DRIVER.model_copy(update={"seed": seed})
     trajectory = plan_drive(scenario.model_copy(update={"driver": real}))
     p, along = positions(trajectory, 1.0)

@@ -16,8 +16,6 @@ from cns_drake.scenarios.losses import (
 )
 from cns_drake.scenarios.scenario_files import (
     load_scenario,
-    map_folder,
-    world_file,
 )
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
@@ -107,7 +105,7 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
     assert some[0] != some[1]
     # If all is missing, the structures are those of the target stage.
     scenario = load_scenario(base).replaced(stage="04")
-    world = load_world(world_file(scenario), without=tuple(last - first))
+    world = load_world(scenario.world_file, without=tuple(last - first))
     assert structures_in(world) == first
 
 
@@ -213,7 +211,7 @@ def test_a_folder_of_cities_and_scenarios_can_be_moved(tmp_path):
     moved.parent.mkdir()
     output.rename(moved)
     member = load_scenario(moved / path.relative_to(output))
-    assert map_folder(member).path == moved / "cities" / "town"
+    assert member.folder.path == moved / "cities" / "town"
     # A map that lies elsewhere stays where it is.
     (path,) = write_scenarios(
         [load_scenario("metropolis_02")], moved / "scenarios"

@@ -11,7 +11,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario, world_file
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 
 SPEEDS = {
@@ -90,7 +90,7 @@ def test_waypoints_lead_through_a_map_as_well(yard, small_map):
     values |= {"map": str(small_map), "stage": "01"}
     path.write_text(yaml.safe_dump(values))
     scenario = load_scenario(path)
-    assert world_file(scenario) == small_map / "stage_01.sdf"
+    assert scenario.world_file == small_map / "stage_01.sdf"
     start = plan_drive(scenario).pose(0.0).translation()
     np.testing.assert_allclose(start, [-10, 5, 0], atol=1e-9)
 

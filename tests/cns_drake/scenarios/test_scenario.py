@@ -14,8 +14,6 @@ from cns_drake.scenarios.scenario_files import (
     describe_scenario,
     load_scenario,
     make_scenario,
-    map_folder,
-    world_file,
 )
 from cns_drake.scenarios.shipped import recordable_drives
 from cns_drake.sensors.carriers import sensor_pose
@@ -33,7 +31,7 @@ def test_shipped_drives_load():
     for name in names:
         scenario = load_scenario(name)
         assert scenario.name == name
-        assert world_file(scenario).is_file()
+        assert scenario.world_file.is_file()
         assert scenario.title
 
 
@@ -67,7 +65,7 @@ def test_map_folder_is_relative_to_the_scenario_file(small_map):
     path.write_text(yaml.safe_dump(values))
     scenario = load_scenario(path)
     assert scenario.name == "own_drive"
-    assert map_folder(scenario).path == small_map
+    assert scenario.folder.path == small_map
 
 
 def test_mount_angles_are_roll_pitch_yaw_in_degrees():

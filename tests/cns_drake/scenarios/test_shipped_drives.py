@@ -15,7 +15,7 @@ from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.street_areas import RoadSurface
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.scenario_files import make_scenario, map_folder
+from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import shipped_drives
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -140,7 +140,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
     corners = jet.p[:, None, :2] + (
         body[None, :, :1] * ahead[:, None] + body[None, :, 1:] * left[:, None]
     )
-    area = load_road_network(map_folder(scenario).roads).areas.lane_area
+    area = load_road_network(scenario.folder.roads).areas.lane_area
     prepare(area)
     assert contains(area, polygons(corners)).all()
 
@@ -148,7 +148,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_vehicle_follows_the_road_up_and_down(drives, name):
     scenario, _, trajectory = drives[name]
-    surface = RoadSurface(load_road_network(map_folder(scenario).roads))
+    surface = RoadSurface(load_road_network(scenario.folder.roads))
     t = np.arange(0.0, trajectory.duration, 0.02)
     jet = trajectory.path.evaluate(trajectory.path_parameter(t)[0])
     off = jet.p[:, 2] - surface.heights(jet.p[:, :2])
@@ -245,7 +245,7 @@ def test_pairs_meet_as_often_as_the_papers(frames, pair):
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_see_nearly_the_same_streets(drives, frames, pair):
     # Structures that only one drive sees would count as change.
-    network = load_road_network(map_folder(drives[pair[0]][0]).roads)
+    network = load_road_network(drives[pair[0]][0].folder.roads)
     places = np.concatenate(
         [
             road.evaluate(np.arange(0.5, road.full_length))[:, :2]

@@ -15,7 +15,7 @@ from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.config import WeatherConfig, make_pattern
 from cns_drake.sensors.returns.link_budget import HOPELESS_SNR
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
-from cns_drake.simulation.loaded_drive import load_stage
+from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import make_station
 from evaluation.drives import open_drive
@@ -60,7 +60,7 @@ def to_world(scan, trajectory, X_BS, time):
 
 def distance_to_geometry(scenario, p_W):
     """Returns the distances of points from the small map's nearest box."""
-    world = load_stage(scenario)
+    world = load_drive(scenario).world
     inspector = world.scene_graph.model_inspector()
     nearest = np.full(len(p_W), np.inf)
     for geometry in inspector.GetAllGeometryIds():

@@ -10,10 +10,10 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.progress import doing
+from cns_drake.scenarios import planning
 from cns_drake.scenarios.scenario_files import (
     load_scenario,
     make_scenario,
-    world_file,
 )
 from cns_drake.simulation import loaded_drive, simulation
 from cns_drake.simulation.loaded_drive import load_stage
@@ -57,7 +57,7 @@ def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
         return run
 
     for module, name in (
-        (loaded_drive, "plan_drive"),
+        (planning, "Trajectory"),
         (loaded_drive, "load_world"),
         (simulation, "make_station"),
         (simulation, "_advance"),
@@ -66,10 +66,11 @@ def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
         monkeypatch.setattr(module, name, work)
     with listening() as heard:
         simulate(scenario, tmp_path)
-    file = world_file(scenario).name
+    file = scenario.world_file.name
     assert heard.activities == [
+        "reading the files of the drive",
         "planning the drive",
-        "plan_drive",
+        "Trajectory",
         "reading the stage",
         "load_world",
         f"parsing {file}",
@@ -147,10 +148,10 @@ def test_a_world_that_changes_under_its_reader_is_refused(
     folder = write_small_map(tmp_path / "map")
     scenario = make_scenario(scenario_values(folder) | {"frames": 2}, "test")
 
-    def load_and_change(scenario, **options):
-        world = load_stage(scenario, **options)
-        world_file(scenario).write_text(
-            world_file(scenario).read_text() + "<!-- changed -->"
+    def load_and_change(plan, **options):
+        world = load_stage(plan, **options)
+        plan.scenario.world_file.write_text(
+            plan.scenario.world_file.read_text() + "<!-- changed -->"
         )
         return world
 

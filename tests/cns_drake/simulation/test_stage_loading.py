@@ -15,7 +15,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.export.marked_drive import MarkedDrive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import describe_scenario, make_scenario
-from cns_drake.simulation.loaded_drive import load_stage
+from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from evaluation.change.tcr import temporal_change
@@ -88,9 +88,9 @@ def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
     causes = np.array(
         [
             entry.instance
-            for entry in load_stage(
+            for entry in load_drive(
                 scenario.with_transient(parked_cars=1.0)
-            ).structures
+            ).world.structures
             if entry.causes
         ]
     )

@@ -12,7 +12,7 @@ from cns_drake.pictures.drive_page import MeshcatRecorder
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.simulation.loaded_drive import load_stage
+from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -80,11 +80,11 @@ def test_vehicle_is_invisible_and_on_the_ground(small_map):
 
 
 def test_a_page_has_the_poses_of_the_scene_graph(scenario):
-    world = load_stage(scenario)
+    drive = load_drive(scenario)
     page = MeshcatRecorder(
-        world, X_BSs={"lidar": RigidTransform()}, period=FRAME_PERIOD
+        drive.world, X_BSs={"lidar": RigidTransform()}, period=FRAME_PERIOD
     )
-    simulator = Simulator(make_station(scenario, world=world, page=page))
+    simulator = Simulator(make_station(drive, page=page))
     simulator.AdvanceTo(8 * FRAME_PERIOD)
     query = simulator.get_system().GetOutputPort("geometry_query")
     query_object = query.Eval(simulator.get_context())

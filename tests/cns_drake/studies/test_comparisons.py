@@ -11,7 +11,7 @@ import shapely
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import load_scenario, map_folder
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import (
     EGO_BOX,
     load_ways,
@@ -253,7 +253,7 @@ def test_traffic_on_imported_lanes(town, tmp_path):
     """A map whose lanes are in lanes.json has the traffic of its roads.yaml."""
     folder = Path(shutil.copytree(town, tmp_path / "imported"))
     query_drive = load_scenario(folder / "sequence_04.yaml")
-    graph, walkways, _ = load_ways(map_folder(query_drive))
+    graph, walkways, _ = load_ways(query_drive.folder)
     before = Conditions(ladder("traffic"), query_drive)
     (folder / "lanes.json").write_text(lane_text(graph, walkways))
     (folder / "roads.yaml").unlink()
@@ -497,7 +497,7 @@ def test_queues_stand_in_all_lanes_but_where_the_car_is(query_drive):
     assert scenario.traffic.queues
     drive = plan_drive(scenario)
     plan = plan_scenario_traffic(scenario, drive)
-    lanes = load_ways(map_folder(scenario)).graph
+    lanes = load_ways(scenario.folder).graph
     lines = shapely.MultiLineString(
         [lanes.pieces[k].points[:, :2] for k in lanes.lanes]
     )

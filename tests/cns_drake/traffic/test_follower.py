@@ -8,7 +8,7 @@ import pytest
 from cns_drake.motion.speed_profile import KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.roads.lane_path import LanePath, Speeds
-from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import load_stage, plan_scenario_traffic
@@ -138,8 +138,9 @@ def followed(follows=True, vehicles=40, walkers=10):
             "driver": DriverConfig(follows=follows),
         }
     )
-    trajectory = plan_drive(scenario)
-    world = load_stage(scenario, with_vehicle=False) if walkers else None
+    drive = DrivePlan(scenario)
+    trajectory = drive.trajectory
+    world = load_stage(drive, with_vehicle=False) if walkers else None
     plan = plan_scenario_traffic(scenario, trajectory, world)
     return scenario, trajectory, world, plan
 
@@ -148,7 +149,7 @@ def followed(follows=True, vehicles=40, walkers=10):
 @pytest.mark.slow
 def test_a_drive_among_others():
     scenario, plain, world, plan = followed()
-    drive = plan_drive(scenario, plan.positions)
+    drive = DrivePlan(scenario).trajectory_at(plan.positions)
     times = np.arange(0.0, drive.duration, 0.05)
     speed = np.linalg.norm(drive.path_motion(times).v, axis=1)
     assert (speed < 0.5).mean() > 0.03
