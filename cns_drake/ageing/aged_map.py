@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 import shutil
-from xml.etree import ElementTree
 
 import numpy as np
 import shapely
@@ -22,10 +21,15 @@ from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.generation.generate import stage_sdf
-from cns_drake.city.geometry import Mesh, Structure
+from cns_drake.city.generation.generate import (
+    count_triangles,
+    stage_sdf,
+    stage_size,
+    triangles_in,
+)
+from cns_drake.city.geometry import Mesh, MeshShape, Structure
 from cns_drake.city.growth import stage_structures
-from cns_drake.imports.map_files import YEAR_COLUMN, stage_size, triangles_in
+from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
@@ -126,7 +130,7 @@ def age_map(
         _copy_inputs(folder, drives, draft)
         writing = _Writing(world, draft, seed)
         shutil.copyfile(world.path, draft / stage_name("01"))
-        writing.finish("01", world.path.read_text("utf-8"), {})
+        writing.finish("01", dict.fromkeys(world.visuals))
         events: list[Event] = []
         for stage, year in stages.items():
             if year < 0:
@@ -257,35 +261,43 @@ class _Writing:
         if year < 0:
             known = world.visuals
             self._past |= {o.name: o for o in new if o.name not in known}
+        self.finish(stage, standing)
+
+    def finish(
+        self, stage: str, standing: Mapping[str, Structure | None]
+    ) -> None:
+        """Writes the meshes of a stage, and counts its contents.
+
+        Meshes that an earlier stage also uses are not written again. The
+        arguments are those of `stage`.
+        """
+        new = [one for one in standing.values() if one is not None]
+        old = [name for name, one in standing.items() if one is None]
+        shapes = [one for name in old for one in self._world.shapes[name]]
         meshes: dict[str, Mesh] = {}
         for one in new:
             meshes |= one.model.meshes
-        self.finish(stage, text, meshes)
+        own = [part.shape for one in new for part in one.model.parts]
+        for shape in (*shapes, *own):
+            if isinstance(shape, MeshShape):
+                self._write_mesh(shape.mesh, meshes)
+        number, triangles = stage_size(new, self._triangles)
+        triangles += count_triangles(shapes, self._triangles)
+        self.sizes[stage] = number + len(old), triangles
 
-    def finish(self, stage: str, text: str, meshes: Mapping[str, Mesh]) -> None:
-        """Writes the meshes of a stage, and counts its contents.
-
-        Meshes that an earlier stage also uses are not written again.
-
-        Args:
-            stage: name of the stage.
-            text: SDF text of the stage.
-            meshes: name -> mesh, for meshes that the city of today lacks.
-        """
-        for uri in ElementTree.fromstring(text).iter("uri"):
-            place = str(uri.text)
-            if place not in self._triangles:
-                obj = self._obj(place, meshes)
-                (self._draft / place).write_bytes(obj)
-                self._triangles[place] = triangles_in(obj.decode("latin-1"))
-        self.sizes[stage] = stage_size(text, self._triangles)
-
-    def _obj(self, place: str, meshes: Mapping[str, Mesh]) -> bytes:
+    def _write_mesh(self, name: str, meshes: Mapping[str, Mesh]) -> None:
+        """Writes a mesh of the city of today, or else one of `meshes`."""
+        if name in self._triangles:
+            return
+        place = Path(map_folder.MESH_FOLDER) / f"{name}.obj"
         path = self._world.folder.path / place
         if path.is_file():
             with user_errors(path):
-                return path.read_bytes()
-        return meshes[Path(place).stem].to_obj().encode()
+                obj = path.read_bytes()
+        else:
+            obj = meshes[name].to_obj().encode()
+        (self._draft / place).write_bytes(obj)
+        self._triangles[name] = triangles_in(obj.decode("latin-1"))
 
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the structure table of all stages.

@@ -35,6 +35,7 @@ from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.placement.frontage import lines_along, lot_at
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
+from cns_drake.scene.materials import MATERIALS
 from cns_drake.transient import world_structures
 
 # Share of the demolished buildings that are replaced by others.
@@ -780,7 +781,8 @@ class City:
 
     def _paint_markings(self) -> None:
         for one in self._world.of_class("road"):
-            if "mark" in one.name and self._meets("markings", one.name):
+            is_paint = any(part.material == _PAINT for part in one.parts)
+            if is_paint and self._meets("markings", one.name):
                 tint = float(self._rng("tint", one.name).uniform(0.75, 1.0))
                 whole = self._world.structure(one.name)
                 parts = tuple(
@@ -793,9 +795,11 @@ class City:
 
 
 _STONE = (0.8, 0.8, 0.78)
+# The material of road markings.
+_PAINT = MATERIALS["markings"]
 
 
-def _furniture_kind(one: world_structures.Structure) -> str | None:
+def _furniture_kind(one: world_structures.LoadedStructure) -> str | None:
     """Returns the event that replaces a piece of street furniture, or None."""
     name = one.name.lower()
     if one.semantic_class == "traffic-sign":

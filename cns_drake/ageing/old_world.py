@@ -92,7 +92,7 @@ class OldWorld:
                 number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
-    def of_class(self, *classes: str) -> list[world_structures.Structure]:
+    def of_class(self, *classes: str) -> list[world_structures.LoadedStructure]:
         """Returns the structures of some classes, sorted by name."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
@@ -118,7 +118,12 @@ class OldWorld:
             pose = np.array(visual.findtext("pose", _NO_POSE).split(), float)
             X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
             rgb = visual.findtext("material/diffuse", "0.6 0.6 0.6 1").split()
-            shape = _shape(visual, self.path)
+            shape = _shape(visual)
+            if shape is None:
+                raise InputError(
+                    f"{self.path}: {visual.get('name')}: a shape that ageing "
+                    "cannot change"
+                )
             if isinstance(shape, structures.MeshShape):
                 file = self.folder.path / MESH_FOLDER / f"{shape.mesh}.obj"
                 try:
@@ -144,6 +149,14 @@ class OldWorld:
         )
         tags = tuple(row.get("tags", "").split())
         return structures.Structure(name, row["class"], model, xyz, yaw, tags)
+
+    @cached_property
+    def shapes(self) -> dict[str, list[structures.Shape]]:
+        """Name of a structure -> its shapes of the kinds that can change."""
+        return {
+            name: [s for one in some if (s := _shape(one)) is not None]
+            for name, some in self._elements.items()
+        }
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
@@ -173,7 +186,7 @@ class OldWorld:
         return self.area(_is_open).difference(self.streets)
 
     def area(
-        self, wanted: Callable[[world_structures.Structure], bool]
+        self, wanted: Callable[[world_structures.LoadedStructure], bool]
     ) -> BaseGeometry:
         """Returns the area that selected structures cover in W [m].
 
@@ -192,7 +205,7 @@ class OldWorld:
         return joined.buffer(0.05).buffer(-0.05)
 
     @staticmethod
-    def _is_street(one: world_structures.Structure) -> bool:
+    def _is_street(one: world_structures.LoadedStructure) -> bool:
         is_bay = one.semantic_class == "parking" and "bay" in one.name
         return one.semantic_class == "sidewalk" or is_bay
 
@@ -211,7 +224,7 @@ _PUBLIC = re.compile(
 )
 
 
-def _is_open(one: world_structures.Structure) -> bool:
+def _is_open(one: world_structures.LoadedStructure) -> bool:
     kinds = ("terrain", "other-ground", "parking")
     return one.semantic_class in kinds and not _PUBLIC.search(one.name.lower())
 
@@ -244,7 +257,9 @@ def _read_visuals(
     return lines, elements
 
 
-def _shape(visual: ElementTree.Element, path: Path) -> structures.Shape:
+def _shape(visual: ElementTree.Element) -> structures.Shape | None:
+    """Returns the shape of a visual; None for other kinds of shapes."""
+
     def numbers(tag: str, default: str = "") -> Sequence[float]:
         text = visual.findtext(f"geometry/{tag}", default)
         return [float(value) for value in text.split()]
@@ -261,6 +276,4 @@ def _shape(visual: ElementTree.Element, path: Path) -> structures.Shape:
         )
     if visual.find("geometry/sphere") is not None:
         return structures.SphereShape(*numbers("sphere/radius"))
-    raise InputError(
-        f"{path}: {visual.get('name')}: a shape that ageing cannot change"
-    )
+    return None

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-import re
 from typing import Any
 
 from matplotlib.artist import Artist
@@ -15,7 +14,12 @@ import numpy as np
 import yaml
 
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
-from cns_drake.city.generation.generate import stage_sdf, structure_table
+from cns_drake.city.generation.generate import (
+    stage_sdf,
+    stage_size,
+    structure_table,
+    triangles_in,
+)
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
@@ -31,7 +35,6 @@ from cns_drake.imports.options import (
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.semantics import CLASS_RGB
 
-_OF_BOX = 12  # triangles
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
 _CRUISE = 8.0  # [m/s]
@@ -81,12 +84,12 @@ def write_world(
     triangles: dict[str, int] = {}
     for structure in structures:
         for name, mesh in structure.model.meshes.items():
-            path = f"{MESH_FOLDER}/{name}.obj"
             # Trees of one kind share their meshes.
-            if path not in triangles:
+            if name not in triangles:
                 text = mesh.to_obj()
-                (draft / path).write_text(text, "utf-8")
-                triangles[path] = triangles_in(text)
+                path = draft / MESH_FOLDER / f"{name}.obj"
+                path.write_text(text, "utf-8")
+                triangles[name] = triangles_in(text)
     sizes = {}
     for stage, some in city.standing.items():
         standing = [*bottom, *(one.structure for one in some)]
@@ -96,31 +99,8 @@ def write_world(
             comment=f"Imported by cns-drake from {source.name}.",
         )
         (draft / stage_name(stage)).write_text(text, "utf-8")
-        sizes[stage] = stage_size(text, triangles)
+        sizes[stage] = stage_size(standing, triangles)
     return sizes
-
-
-def triangles_in(obj: str) -> int:
-    """Returns the number of triangles in the text of an OBJ file."""
-    faces = obj[obj.find("\nf ") :]
-    # A face with three corners has three spaces; each further corner adds one.
-    return faces.count(" ") - 2 * faces.count("f")
-
-
-def stage_size(sdf: str, triangles: Mapping[str, int]) -> tuple[int, int]:
-    """Returns the numbers of structures and of triangles in a stage.
-
-    Only structures with a surface count.
-
-    Args:
-        sdf: SDF text of the stage.
-        triangles: path of a mesh in the map's folder -> its number of
-            triangles.
-    """
-    structures = set(re.findall('visual name="([^"/]+)', sdf))
-    meshes = re.findall("<uri>([^<]+)</uri>", sdf)
-    boxes = _OF_BOX * sdf.count("<box>")
-    return len(structures), boxes + sum(map(triangles.__getitem__, meshes))
 
 
 def city_facts(

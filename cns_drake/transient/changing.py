@@ -28,9 +28,9 @@ from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
     GroundSurface,
+    LoadedPart,
+    LoadedStructure,
     Obstacles,
-    Structure,
-    StructurePart,
     draws,
     read_structures,
     triangle_corners,
@@ -75,7 +75,7 @@ class Bay:
             end of the bay [m].
     """
 
-    def __init__(self, car: Structure):
+    def __init__(self, car: LoadedStructure):
         """Makes a bay of the size of the car."""
         hull = shapely.MultiPoint(car.p_WPs[:, :2])
         corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
@@ -102,7 +102,9 @@ class Bay:
             product(corners, np.array([[c, s], [-s, c]])) + self.middle
         )
 
-    def grow(self, car: Structure, cars: Obstacles, others: Obstacles) -> None:
+    def grow(
+        self, car: LoadedStructure, cars: Obstacles, others: Obstacles
+    ) -> None:
         """Enlarges the bay up to other objects, and halfway to other cars.
 
         The bay grows by at most 0.5 m in front and behind, and by at most 0.25
@@ -204,7 +206,10 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
 
 
 def _moved_car(
-    bay: Bay, car: Structure, ground: GroundSurface, rng: np.random.Generator
+    bay: Bay,
+    car: LoadedStructure,
+    ground: GroundSurface,
+    rng: np.random.Generator,
 ) -> RigidTransform:
     """Returns the transform X_new of a car's points to its new place in W."""
     own = Bay(car)
@@ -225,7 +230,10 @@ def _moved_car(
 
 
 def _replace_car(
-    around: Surroundings, car: Structure, bay: Bay, rng: np.random.Generator
+    around: Surroundings,
+    car: LoadedStructure,
+    bay: Bay,
+    rng: np.random.Generator,
 ) -> None:
     """Puts another car in a bay; leaves the bay empty if it is too small."""
     editing = around.editing
@@ -327,7 +335,7 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
         _lay_banks(around, ground, depth)
 
 
-def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
+def _is_below_road(part: LoadedPart, ground: GroundSurface) -> bool:
     """Returns whether a piece of ground continues below a carriageway."""
     corners = turned_up(triangle_corners(part))
     corners = corners[unit_normals(corners)[:, 2] > 0.0]
@@ -340,7 +348,7 @@ def _is_below_road(part: StructurePart, ground: GroundSurface) -> bool:
 
 def _cover(
     editing: SceneEditing,
-    part: StructurePart,
+    part: LoadedPart,
     ground: GroundSurface,
     depth: float,
     is_ground: bool,

@@ -25,8 +25,8 @@ from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
+    LoadedStructure,
     Obstacles,
-    Structure,
     draws,
 )
 
@@ -107,7 +107,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
 
 
 def _front(
-    building: Structure, drive: BaseGeometry
+    building: LoadedStructure, drive: BaseGeometry
 ) -> tuple[RigidTransform, float]:
     """Returns the pose of the front that faces a drive, and its length [m].
 

@@ -25,9 +25,9 @@ from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.world_structures import (
     GroundSurface,
+    LoadedPart,
+    LoadedStructure,
     Obstacles,
-    Structure,
-    StructurePart,
     draws,
 )
 
@@ -97,7 +97,7 @@ class SceneEditing:
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
-    def remove(self, thing: Structure, cause: str) -> None:
+    def remove(self, thing: LoadedStructure, cause: str) -> None:
         """Removes a structure, and records why.
 
         Args:
@@ -110,7 +110,11 @@ class SceneEditing:
         self.blame(thing.name, cause)
 
     def move(
-        self, thing: Structure, X_new: RigidTransform, name: str, cause: str
+        self,
+        thing: LoadedStructure,
+        X_new: RigidTransform,
+        name: str,
+        cause: str,
     ) -> None:
         """Moves a structure and renames it.
 
@@ -135,9 +139,7 @@ class SceneEditing:
         self._materials[name] |= old.materials
         self.blame(name, cause)
 
-    def cover_part(
-        self, part: StructurePart, p_W: np.ndarray, look: Look
-    ) -> None:
+    def cover_part(self, part: LoadedPart, p_W: np.ndarray, look: Look) -> None:
         """Moves a part by p_W (3,) [m] in W and gives it a new look."""
         structure = part.geometry.structure
         name = f"{part.name}_covered"
@@ -185,7 +187,7 @@ class SceneEditing:
         if material is not None:
             self._materials[structure][part] = material
 
-    def keep_triangles(self, part: StructurePart, kept: np.ndarray) -> None:
+    def keep_triangles(self, part: LoadedPart, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
@@ -212,7 +214,7 @@ class SceneEditing:
 
     def add_triangles(
         self,
-        part: StructurePart,
+        part: LoadedPart,
         name: str,
         p_WVs: np.ndarray,
         triangles: np.ndarray,
@@ -307,12 +309,12 @@ class SceneEditing:
             materials={**entry.materials, **materials},
         )
 
-    def _shape(self, part: StructurePart) -> geometry.Shape:
+    def _shape(self, part: LoadedPart) -> geometry.Shape:
         inspector = self._world.scene_graph.model_inspector()
         return inspector.GetShape(part.geometry.geometry_id)
 
     def _properties(
-        self, part: StructurePart
+        self, part: LoadedPart
     ) -> tuple[geometry.GeometryProperties, ...]:
         inspector = self._world.scene_graph.model_inspector()
         number = part.geometry.geometry_id
@@ -336,7 +338,7 @@ class SceneEditing:
         for one in properties:
             scene_graph.AssignRole(self._source, number, one)
 
-    def _remove_part(self, part: StructurePart) -> None:
+    def _remove_part(self, part: LoadedPart) -> None:
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
@@ -355,7 +357,7 @@ class Surroundings:
     """
 
     editing: SceneEditing
-    things: Mapping[str, Structure]
+    things: Mapping[str, LoadedStructure]
     drive: BaseGeometry
     kept_free: BaseGeometry
     seed: int
@@ -365,7 +367,7 @@ class Surroundings:
         """The ground near the drive."""
         return GroundSurface(self.things, self.drive.buffer(_NEAR))
 
-    def of_classes(self, classes: Collection[str]) -> list[Structure]:
+    def of_classes(self, classes: Collection[str]) -> list[LoadedStructure]:
         """Returns the structures of some classes."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 

@@ -46,7 +46,7 @@ _BOX = np.array(
 
 
 @dataclass(frozen=True)
-class StructurePart:
+class LoadedPart:
     """One geometry of a structure that a LiDAR can see.
 
     Attributes:
@@ -88,8 +88,10 @@ class StructurePart:
 
 
 @dataclass(frozen=True)
-class Structure:
-    """A structure in a loaded world.
+class LoadedStructure:
+    """A structure as a LiDAR sees it in a loaded world, as geometries in W.
+
+    (A `cns_drake.city.geometry.Structure` is one that is to be written.)
 
     Attributes:
         name: name of the structure.
@@ -100,7 +102,7 @@ class Structure:
 
     name: str
     semantic_class: str
-    parts: tuple[StructurePart, ...]
+    parts: tuple[LoadedPart, ...]
 
     @cached_property
     def p_WPs(self) -> np.ndarray:
@@ -136,7 +138,7 @@ def _hull(p_WPs: np.ndarray) -> BaseGeometry:
 
 def read_structures(
     world: World, wanted: Callable[[str], bool] = lambda name: True
-) -> dict[str, Structure]:
+) -> dict[str, LoadedStructure]:
     """Returns name -> structure, for the static structures of a world.
 
     The names are sorted.
@@ -167,10 +169,10 @@ def read_structures(
     ):
         X_WG = X_WFs[geometry.frame_id] @ geometry.X_FG
         entry = world.structures[geometry.structure]
-        part = StructurePart(geometry, X_WG, entry.material(geometry.part))
+        part = LoadedPart(geometry, X_WG, entry.material(geometry.part))
         found[geometry.structure].append(part)
     return {
-        name: Structure(
+        name: LoadedStructure(
             name, world.structures[name].semantic_class, tuple(found[name])
         )
         for name in sorted(found)
@@ -261,7 +263,9 @@ class GroundSurface:
         near: area in which the ground is known, seen from above [m].
     """
 
-    def __init__(self, things: Mapping[str, Structure], near: BaseGeometry):
+    def __init__(
+        self, things: Mapping[str, LoadedStructure], near: BaseGeometry
+    ):
         """Collects the ground in an area.
 
         Args:
@@ -279,7 +283,7 @@ class GroundSurface:
         self._roads = triangles[True]
         self._sides = {k: UpperSides(found) for k, found in triangles.items()}
 
-    def _upward(self, part: StructurePart) -> np.ndarray:
+    def _upward(self, part: LoadedPart) -> np.ndarray:
         corners = turned_up(triangle_corners(part))
         middles = corners[:, :, :2].mean(axis=1)
         return corners[
@@ -364,7 +368,7 @@ def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
             yield Kerb(xy[run], outwards[run])
 
 
-def triangle_corners(part: StructurePart) -> np.ndarray:
+def triangle_corners(part: LoadedPart) -> np.ndarray:
     """Returns the corners (M, 3, 3) of a part's triangles in W [m].
 
     A part with a curved surface has no triangles.

@@ -25,6 +25,7 @@ from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
 from cns_drake.city.geometry.structures import (
+    BoxShape,
     MeshShape,
     Part,
     Shape,
@@ -39,6 +40,8 @@ from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
 # A structure that has moved farther than this counts as a new one [m].
 _SAME_PLACE = 0.3
 _COLUMNS = ("name", "class", "x", "y", "tags")
+# Triangles of a box.
+_OF_BOX = 12
 
 
 class Renaming(NamedTuple):
@@ -340,6 +343,45 @@ def _number(value: float, decimals: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
+def triangles_in(obj: str) -> int:
+    """Returns the number of triangles in the text of an OBJ file."""
+    faces = obj[obj.find("\nf ") :]
+    # A face with three corners has three spaces; each further corner adds one.
+    return faces.count(" ") - 2 * faces.count("f")
+
+
+def count_triangles(
+    shapes: Iterable[Shape], triangles: Mapping[str, int]
+) -> int:
+    """Returns the number of triangles of shapes as LiDARs see them.
+
+    Cylinders and spheres have none.
+
+    Args:
+        shapes: the shapes.
+        triangles: name of a mesh -> number of triangles in its file.
+    """
+    return sum(
+        triangles[shape.mesh]
+        if isinstance(shape, MeshShape)
+        else _OF_BOX * isinstance(shape, BoxShape)
+        for shape in shapes
+    )
+
+
+def stage_size(
+    structures: Iterable[Structure], triangles: Mapping[str, int]
+) -> tuple[int, int]:
+    """Returns the numbers of structures and of triangles in a stage.
+
+    Only structures with a surface count. `triangles` is as for
+    `count_triangles`.
+    """
+    parts = [one.model.parts for one in structures if one.model.parts]
+    shapes = (part.shape for some in parts for part in some)
+    return len(parts), count_triangles(shapes, triangles)
+
+
 def structure_table(
     structures: Iterable[Structure], versions: Iterable[Structure] = ()
 ) -> str:
@@ -399,7 +441,7 @@ def render_city(
     names = [structure.name for structure in city.structures]
     source = world / STAGES_NAME
     stages = load_stages(source, names, stages_text)
-    files = render_stages(
+    files, _ = render_stages(
         world.resolve().name, city, stages, stages.stages, source, progress
     )
     progress(f"{sum(map(len, files.values())) / 1e6:.1f} MB")
@@ -414,8 +456,8 @@ def render_stages(
     source: Path,
     progress: Callable[[str], None] = lambda line: None,
     origin: str | None = None,
-) -> dict[str, str]:
-    """Returns the text of the files of some stages, by relative path.
+) -> tuple[dict[str, str], dict[str, tuple[int, int]]]:
+    """Returns the files of some stages, and the sizes of these stages.
 
     Args:
         world: name of the map.
@@ -425,6 +467,10 @@ def render_stages(
         source: file of the stages, named in error messages.
         progress: called with a message of one line after each file.
         origin: comment for readers of the files about the origin of the city.
+
+    Returns:
+        Relative path -> text of the file; and name of a stage -> numbers of its
+        structures and of its triangles.
 
     Raises:
         InputError: if a structure cannot be lower, or cannot be under
@@ -444,12 +490,14 @@ def render_stages(
     )
     files: dict[str, str] = {}
     used: list[Structure] = []
+    stood = {}
     for stage in wanted:
         try:
             standing = growing.at(stage)
         except ValueError as error:
             raise InputError(f"{source}: stages.{stage}.{error}") from error
         used += standing
+        stood[stage] = standing
         files[stage_name(stage)] = stage_sdf(
             f"{world}_{stage}", standing, comment=comment
         )
@@ -461,9 +509,13 @@ def render_stages(
     meshes = meshes_of(used)
     shapes = [part.shape for one in used for part in one.model.parts]
     names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
+    triangles = {}
     for name in sorted(names):
-        files[f"{MESH_FOLDER}/{name}.obj"] = meshes[name].to_obj()
-    return files
+        text = meshes[name].to_obj()
+        files[f"{MESH_FOLDER}/{name}.obj"] = text
+        triangles[name] = triangles_in(text)
+    sizes = {name: stage_size(one, triangles) for name, one in stood.items()}
+    return files, sizes
 
 
 def generate_city(

@@ -20,7 +20,7 @@ from shapely import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
+from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
@@ -596,7 +596,7 @@ def write_town(
         InputError: the town has more structures than there are instance ids.
     """
     stages = town.stages.stages
-    files = render_stages(
+    files, sizes = render_stages(
         draft.name,
         town.city,
         town.stages,
@@ -640,15 +640,6 @@ def write_town(
         None,
         town.drives,
     )
-    triangles = {
-        name: map_files.triangles_in(text)
-        for name, text in files.items()
-        if name.endswith(".obj")
-    }
-    sizes = {
-        stage: map_files.stage_size(files[stage_name(stage)], triangles)
-        for stage in stages
-    }
     report = ImportReport(
         kinds=town.kinds,
         triangles=sum(one.model.num_triangles for one in town.city.structures),

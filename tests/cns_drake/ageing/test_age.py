@@ -242,6 +242,26 @@ def test_nothing_happens_at_rate_zero(world):
     assert {e.event for e in city.events} <= {"grown"}
 
 
+@pytest.mark.slow
+def test_what_is_painted_is_known_by_its_material(town, tmp_path):
+    """Crossings of imported maps are markings; not every "mark" is one."""
+    folder = copied(town, tmp_path / "town")
+    for path in (*folder.glob("stage_*.sdf"), folder / "structures.csv"):
+        text = path.read_text()
+        for old, new in (
+            ("markings", "crossing_n1"),
+            ("carriageway", "market_street"),
+        ):
+            text = text.replace(f'name="{old}/', f'name="{new}/')
+            text = text.replace(f",{old},road,", f",{new},road,")
+        path.write_text(text)
+    rates = {**dict.fromkeys(DEFAULT_RATES, 0.0), "markings": 1.0}
+    city = City(OldWorld(MapFolder(folder)), rates, 1, shapely.Polygon())
+    city.live()
+    painted = [e.structure for e in city.events if e.event == "markings"]
+    assert painted == ["crossing_n1"]
+
+
 @pytest.mark.parametrize(
     ("farthest", "least"), [(0.0, 0.0), (0.1, 0.1), (0.2, 0.2), (5.0, 0.2)]
 )
