@@ -34,7 +34,6 @@ import yaml
 
 from cns_drake import Scenario, load_scenario, make_station
 from cns_drake.ageing.aged_pictures import air_view
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.pictures.stage_pictures import (
     draw_drives,
@@ -44,6 +43,7 @@ from cns_drake.pictures.stage_pictures import (
 from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise

@@ -14,11 +14,9 @@ import yaml
 from cns_drake.ageing.history import TAKEN_DOWN, City, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
-from cns_drake.base import map_folder
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, is_there, user_errors
-from cns_drake.base.map_folder import MapFolder, stage_name
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.generate import (
@@ -38,7 +36,9 @@ from cns_drake.scenarios.scenario_files import (
     find_files,
     load_scenario,
 )
+from cns_drake.scene import map_folder
 from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene.map_folder import MapFolder, stage_name
 from cns_drake.scene.materials import OF_CLASSES, as_cell, as_word, from_cell
 from cns_drake.scene.semantics import CLASS_IDS
 

@@ -19,11 +19,11 @@ from cns_drake.base.csv_files import (
 )
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, is_there
-from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.base.xml_elements import read_elements
 from cns_drake.city.geometry import from_above, read_mesh, structures, triple
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.roads.network import load_road_network
+from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures

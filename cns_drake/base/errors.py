@@ -182,10 +182,7 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
         return f"; did you mean {name}?" if name else ""
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
     if fault["type"] == "string_type" and is_number and place:
-        # YAML takes 02 for the number 2.
-        is_stage = place[-1] == "stage" and isinstance(given, int)
-        text = f"{given:02d}" if is_stage else f"{given}"
-        return f'; quote it: {place[-1]}: "{text}"'
+        return f'; quote it: {place[-1]}: "{given}"'
     return ""
 
 

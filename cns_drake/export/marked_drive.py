@@ -10,8 +10,8 @@ import numpy as np
 from cns_drake.base.drives.drive import read_scenario
 from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.semantics import moving_id
 from cns_drake.scene.structure_table import load_structure_table
 from cns_drake.scene.world import load_world, structures_in

@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
 from cns_drake.base.progress import doing
 from cns_drake.imports import map_files
 from cns_drake.imports.cityjson import import_cityjson
@@ -29,6 +28,7 @@ from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
+from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
 
 # Gets the folder, and stage -> its numbers of structures and triangles.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]

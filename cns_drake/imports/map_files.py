@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 import numpy as np
 import yaml
 
-from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import (
     stage_sdf,
     stage_size,
@@ -33,6 +32,7 @@ from cns_drake.imports.options import (
     ImportReport,
 )
 from cns_drake.imports.staged_city import StagedCity
+from cns_drake.scene.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.scene.semantics import CLASS_RGB
 
 # Column of the structure table: the year in which a building was built.

@@ -14,11 +14,11 @@ import zlib
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import is_there, user_errors
-from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.progress import doing
 from cns_drake.recording.schedule import frames_within
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scene.map_folder import MapFolder, drive_name
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,11 @@ from pydantic import (
 
 from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.base.errors import validated
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
@@ -374,6 +374,14 @@ class Scenario(Section):
     def _check_base(cls, base: str | None) -> None:
         if base is not None:
             raise ValueError("only a scenario file has one")
+
+    @field_validator("stage", mode="before")
+    @classmethod
+    def _check_stage(cls, stage: Any) -> Any:
+        # Stages are numbered with two digits, and YAML takes 2 for a number.
+        if type(stage) is int:
+            raise ValueError(f'not a text; quote it: stage: "{stage:02d}"')
+        return stage
 
     @field_validator("stage", "world", "route", "waypoints", "u_turns")
     @classmethod

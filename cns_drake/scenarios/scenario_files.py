@@ -12,11 +12,11 @@ from cns_drake.base.errors import (
     validated,
     value_errors,
 )
-from cns_drake.base.map_folder import MapFolder, drive_name
 from cns_drake.base.terminal import note
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
+from cns_drake.scene.map_folder import MapFolder, drive_name
 from cns_drake.sensors.camera.config import FORMER_ANGLES
 from cns_drake.sensors.imu.config import KALIBR_FILE
 

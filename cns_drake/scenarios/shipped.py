@@ -12,7 +12,7 @@ import tempfile
 
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import cache_folder
-from cns_drake.base.map_folder import MapFolder, drive_name
+from cns_drake.scene.map_folder import MapFolder, drive_name
 
 
 @functools.cache

@@ -20,7 +20,6 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError, errors_at, value_errors
 from cns_drake.base.files import is_there, read_bytes
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import doing
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.gazebo_worlds import (
@@ -28,6 +27,7 @@ from cns_drake.scene.gazebo_worlds import (
     read_xml,
     simplify_world,
 )
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.mesh_contents import unread_parts
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import (

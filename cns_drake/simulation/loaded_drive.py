@@ -13,7 +13,6 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.elementary import arctan2
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD
@@ -22,6 +21,7 @@ from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario, TrafficConfig
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.simulation.recording_schedule import (

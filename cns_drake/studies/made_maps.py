@@ -25,7 +25,6 @@ from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scenarios.planning import count_frames, plan_drive
@@ -33,6 +32,7 @@ from cns_drake.scenarios.provenance import digest_file
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies.experiment import Experiment, MadeMap
 from cns_drake.studies.redrawing import (
     MakeMap,

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.pictures import stage_pictures
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scene.map_folder import MapFolder
 from evaluation.study.parts import MakePart, Part
 
 # Expected time to draw a stage [s].

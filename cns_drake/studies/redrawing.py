@@ -28,13 +28,13 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
+from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from evaluation.study.parts import Part
 
 # The first line of each input that is written here.

@@ -10,11 +10,11 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.listing import natural_key
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.progress import doing
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import recordable_map, recordable_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import control_drive
 from cns_drake.studies.forecast import forecast

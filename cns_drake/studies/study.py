@@ -11,7 +11,6 @@ from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import listed, natural_key
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -19,6 +18,7 @@ from cns_drake.scenarios.shipped import (
     recordable_maps,
     shipped_maps,
 )
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.simulation.simulated_drive import DriveSimulation
 from cns_drake.studies.comparisons import (
     Compared,

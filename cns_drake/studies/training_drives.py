@@ -18,7 +18,6 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.progress import track
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import generate_city
@@ -28,6 +27,7 @@ from cns_drake.roads.route import draw_route
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.comparisons import moved
 from cns_drake.studies.exact_overlap import VisibleSurfaces, sights

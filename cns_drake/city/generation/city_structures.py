@@ -10,7 +10,6 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry import (
     Mesh,
@@ -41,6 +40,7 @@ from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads import street_areas
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.scene.map_folder import MapFolder
 
 
 class City(NamedTuple):

@@ -15,12 +15,6 @@ import yaml
 from cns_drake.base.csv_files import csv_text, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, user_errors, write_text
-from cns_drake.base.map_folder import (
-    MESH_FOLDER,
-    STAGES_NAME,
-    STRUCTURES_NAME,
-    stage_name,
-)
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
@@ -34,6 +28,12 @@ from cns_drake.city.geometry.structures import (
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene.map_folder import (
+    MESH_FOLDER,
+    STAGES_NAME,
+    STRUCTURES_NAME,
+    stage_name,
+)
 from cns_drake.scene.materials import as_cell
 from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
 

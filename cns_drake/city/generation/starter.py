@@ -17,7 +17,6 @@ from shapely.ops import unary_union
 import yaml
 
 from cns_drake.base.files import complete_part, write_part
-from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
@@ -25,6 +24,7 @@ from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import draw_route
+from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 
 # The generated world extends this far beyond the roads [m].
 _MARGIN = 45.0

@@ -20,7 +20,6 @@ from shapely import GEOSException
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
@@ -49,6 +48,7 @@ from cns_drake.imports.opendrive.road_model import MarkLine, RoadMap, RoadMark
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportFaults, ImportReport
+from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # The edges of carriageways and of lanes differ by less than this, which is also
 # the distance of lines from a kerb [m].

@@ -24,10 +24,10 @@ from cns_drake.ageing.rates import (
     read_rates,
 )
 from cns_drake.base.errors import InputError
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.geometry.structures import Structure, assemble, block
 from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world
 from cns_drake.transient.world_structures import read_structures
 

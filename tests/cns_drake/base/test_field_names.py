@@ -28,7 +28,7 @@ class Plan(BaseModel):
         ({"places": [None, {"kerb_raduis": 2}]}, "did you mean kerb_radius?"),
         ({"home": {"stagge": "01"}}, "did you mean stage?"),
         ({"cornres": {}}, "did you mean corners?"),
-        ({"home": {"stage": 2}}, 'quote it: stage: "02"'),
+        ({"home": {"stage": 2}}, 'quote it: stage: "2"'),
         ({"home": {"stage": 0.1}}, 'quote it: stage: "0.1"'),
         ({"home": {"colour": 2}}, "Extra inputs are not permitted"),
     ],

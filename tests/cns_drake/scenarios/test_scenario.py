@@ -112,7 +112,7 @@ def test_returns_and_weather_are_replaced(small_map):
     ("change", "fault"),
     [
         ({"colour": "red"}, r"scenario.yaml: colour: .*not permitted"),
-        ({"stage": 4}, r"scenario.yaml: stage: .*valid string"),
+        ({"stage": 4}, r'scenario.yaml: stage: .*quote it: stage: "04"$'),
         ({"stage": "../x"}, r"scenario.yaml: stage: "),
         ({"frames": 0}, r"scenario.yaml: frames: .*greater"),
         ({"frames": "many"}, r"scenario.yaml: frames: .*integer"),

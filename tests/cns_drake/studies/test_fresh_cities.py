@@ -10,10 +10,10 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies import redrawing
 from cns_drake.studies.redrawing import (
     DrawFreshCity,

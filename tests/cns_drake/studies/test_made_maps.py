@@ -15,10 +15,10 @@ from cns_drake.base import files
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies import redrawing
 from cns_drake.studies.experiment import Experiment, MadeMap, load_experiment
 from cns_drake.studies.made_maps import AgeCity, MadeMaps, made_map_step
