@@ -145,7 +145,7 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
     doing("making the temporary changes")
     times = np.arange(0.0, trajectory.duration, 0.1)
     drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
-    driven = drive.buffer(_HALF_WIDTH)
+    driven: BaseGeometry = drive.buffer(_HALF_WIDTH)
     if plan.network is not None:
         driven = driven.union(plan.network.areas.lane_area)
     return change_world(world, scenario.transient, drive, driven)

@@ -1,5 +1,6 @@
 """Topics of a drive, and the times at which its sensors are recorded."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
@@ -35,7 +36,7 @@ class RecordingPlan:
 
     topics: tuple[Topic, ...]
     schedule: Schedule
-    layouts: dict[str, str]
+    layouts: Mapping[str, str]
 
     @property
     def frame_topic(self) -> str:

@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
 
 from cns_drake.base.drives.sensor_names import check_sensor_name
@@ -158,10 +158,23 @@ def add_mcap_recorder(
         ports["odometry"] = odometry.GetOutputPort("odometry")
     if imu is not None:
         ports |= imu.ports()
+    connect_by_name(builder, ports, recorder)
+    return bag
+
+
+def connect_by_name(
+    builder: DiagramBuilder, ports: Mapping[str, OutputPort], recorder: System
+) -> None:
+    """Connects output ports to those inputs of a recorder that have their name.
+
+    Args:
+        builder: builder of a diagram with the recorder.
+        ports: name -> port of what is measured.
+        recorder: the recorder; an input of another name stays unconnected.
+    """
     for key, port in ports.items():
         if recorder.HasInputPort(key):
             builder.Connect(port, recorder.GetInputPort(key))
-    return bag
 
 
 def _periods(

@@ -30,6 +30,7 @@ from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
 from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
+from cns_drake.simulation.sensor_recording import connect_by_name
 from cns_drake.traffic.traffic_motion import (
     TrafficMotion,
     add_traffic,
@@ -238,9 +239,7 @@ def make_station(
     for name, recorder in recorders.items():
         if recorder is not None:
             builder.AddNamedSystem(name, recorder)
-            for k in range(recorder.num_input_ports()):
-                port = recorder.get_input_port(k)
-                builder.Connect(measured[port.get_name()], port)
+            connect_by_name(builder, measured, recorder)
     for name, port in measured.items():
         builder.ExportOutput(port, name)
     diagram = builder.Build()
