@@ -16,13 +16,17 @@ _LONGEST_NUMBER = 100
 _WHOLE = "tag:yaml.org,2002:int"
 # Numbers to the base 8 in YAML 1.1, and names to most people.
 _OCTAL = re.compile(r"([-+]?)0+([0-7_]+)")
+# Python reads these as numbers, YAML 1.2 as texts.
+_UNDERSCORES = re.compile(r"[-+]?[0-9][0-9_]*_[0-9_.]*")
 _WORDS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
 # What PyYAML takes for numbers, without those to the bases 2, 8 and 60 and
 # those with underscores.
+_FLOAT = "tag:yaml.org,2002:float"
+_MERGE = "tag:yaml.org,2002:merge"
 _RESOLVERS = (
     (_WHOLE, r"[-+]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+)", "-+0123456789"),
     (
-        "tag:yaml.org,2002:float",
+        _FLOAT,
         r"[-+]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][-+][0-9]+)?"
         r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
         "-+.0123456789",
@@ -33,8 +37,17 @@ _RESOLVERS = (
         "tTfF",
     ),
     ("tag:yaml.org,2002:null", "~|null|Null|NULL|", ["~", "n", "N", ""]),
-    ("tag:yaml.org,2002:merge", "<<", "<"),
+    (_MERGE, "<<", "<"),
 )
+# Tag of numbers -> their form, also where the tag is written.
+_NUMBERS = {
+    tag: re.compile(form)
+    for tag, form, _ in _RESOLVERS
+    if tag in (_WHOLE, _FLOAT)
+}
+_NUMBERS[_FLOAT] = re.compile(f"{_NUMBERS[_FLOAT].pattern}|[-+]?[0-9]+")
+# Types of YAML 1.1 that no file here needs. A set has no order, for example.
+_UNREAD = re.compile(r"tag:yaml\.org,2002:(set|omap|pairs|binary|timestamp)")
 
 
 class _PlainScalars:
@@ -81,8 +94,10 @@ def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
     A document whose aliases expand to too many values is refused, since a few
     lines of aliases could fill the memory. A repeated key is an error; YAML
     libraries would silently use the last value. Without quotes, yes, no, on and
-    off, and whole numbers that begin with a zero, are errors, too, since
-    libraries read them in different ways.
+    off, and whole numbers that begin with a zero or contain underscores, are
+    errors, too, since libraries read them in different ways. So are numbers in
+    another form behind !!int and !!float, other types such as !!set, and a <<
+    that merges several mappings.
 
     Args:
         text: the document.
@@ -140,6 +155,7 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
         text = node.value
+        _check_tag(node)
         if not node.style:
             _check_plain(text, line)
         # Python cannot print what `0xff...` stands for.
@@ -154,6 +170,7 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
         if sizes[id(node)] == 0:
             raise ValueError(f"line {line}: contains itself")
         return sizes[id(node)]
+    _check_tag(node)
     sizes[id(node)] = 0
     children = node.value
     if isinstance(node, yaml.MappingNode):
@@ -168,11 +185,23 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     return size
 
 
+def _check_tag(node: yaml.Node) -> None:
+    """Refuses types that are not read, and numbers in another form."""
+    line = node.start_mark.line + 1
+    if found := _UNREAD.fullmatch(node.tag):
+        raise ValueError(f"line {line}: the type !!{found[1]} is not read")
+    form = _NUMBERS.get(node.tag)
+    if form and not form.fullmatch(str(node.value)):
+        raise ValueError(f"line {line}: {node.value!r} is not a number")
+
+
 def _check_plain(text: str, line: int) -> None:
     """Refuses a scalar without quotes that is read in several ways."""
     instead = _WORDS.get(text.lower())
     if match := _OCTAL.fullmatch(text):
         instead = f"{match[1]}{match[2].lstrip('0') or '0'}"
+    if _UNDERSCORES.fullmatch(text):
+        instead = text.replace("_", "")
     if instead is not None:
         raise ValueError(
             f'line {line}: {text}: quote it ("{text}"), or write {instead}'
@@ -181,7 +210,13 @@ def _check_plain(text: str, line: int) -> None:
 
 def _check_keys(node: yaml.MappingNode) -> None:
     seen = set()
-    for key, _ in node.value:
+    for key, value in node.value:
+        if key.tag == _MERGE and isinstance(value, yaml.SequenceNode):
+            # Libraries disagree on which of them comes first.
+            raise ValueError(
+                f"line {key.start_mark.line + 1}: << merges several mappings; "
+                "write one"
+            )
         if isinstance(key, yaml.ScalarNode):
             if (key.tag, key.value) in seen:
                 raise ValueError(

@@ -7,15 +7,11 @@ which is slow to import.
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-)
+from pydantic import ConfigDict, Field
+
+from cns_drake.base.input_models import InputModel
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -35,7 +31,7 @@ Triple = tuple[Place, Place, Place]
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 
 
-class Section(BaseModel):
+class Section(InputModel):
     """A section of a scenario file.
 
     Unknown fields and numbers that are not finite are errors. A section cannot
@@ -43,17 +39,6 @@ class Section(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _check_number(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuses YAML's `yes` for a number; pydantic would take it for 1."""
-        if isinstance(value, bool) and info.field_name is not None:
-            kind = cls.model_fields[info.field_name].annotation
-            kinds = {kind, *get_args(kind)}
-            if kinds & {int, float} and bool not in kinds:
-                raise ValueError(f"{value} is no number")
-        return value
 
     def replaced(self, **fields: Any) -> Self:
         """Returns a copy with some fields replaced, without checks."""

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from cns_drake.base.errors import InputError, validated, value_errors
 from cns_drake.base.files import read_bytes
+from cns_drake.base.input_models import InputModel
 from cns_drake.base.json_text import parse_json
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
@@ -28,7 +29,7 @@ _Points = Annotated[
 ]
 
 
-class _Model(BaseModel):
+class _Model(InputModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 

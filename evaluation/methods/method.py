@@ -16,10 +16,11 @@ from types import ModuleType
 from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
+from pydantic import ConfigDict, NonNegativeFloat, ValidationError
 
 from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.input_models import InputModel
 from cns_drake.base.poses import make_pose
 
 Descriptor = TypeVar("Descriptor")
@@ -29,7 +30,7 @@ Database = TypeVar("Database")
 PlaceScan = Literal["middle", "first"]
 
 
-class MethodConfig(BaseModel):
+class MethodConfig(InputModel):
     """The parameters that all methods share.
 
     If your method has further parameters, derive its class of parameters from

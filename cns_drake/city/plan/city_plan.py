@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     ConfigDict,
     Field,
     field_validator,
@@ -15,6 +14,7 @@ from pydantic import (
 )
 
 from cns_drake.base.errors import validated
+from cns_drake.base.input_models import InputModel
 from cns_drake.base.value_lists import repeated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
@@ -54,7 +54,7 @@ Weights = dict[str, Annotated[float, Field(gt=0)]]
 Ground = Literal["paved", "lawn", "gravel", "parking", "water"]
 
 
-class _Model(BaseModel):
+class _Model(InputModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 

@@ -5,16 +5,17 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from cns_drake.base.errors import InputError, validated
+from cns_drake.base.input_models import InputModel
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
 LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]
 
 
-class _Model(BaseModel):
+class _Model(InputModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
