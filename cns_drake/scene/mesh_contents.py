@@ -333,6 +333,13 @@ _OBJ_SURFACES = re.compile(
 # If a face refers to a missing vertex, Drake's reader reads outside its memory
 # and may end the process.
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+# Drake's reader takes what it cannot read in a vertex for 0.
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NO_VERTEX = re.compile(
+    rb"^[ \t]*v[ \t](?![ \t]*(?:" + _NUMBER + rb"(?:[ \t]+|(?=[\n#]|\Z))){3,8}"
+    rb"(?:[\n#]|\Z))",
+    re.MULTILINE,
+)
 _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
 # A ray caster needs neither texture coordinates nor normals, but Drake checks
 # them.
@@ -341,11 +348,12 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Checks that faces of an OBJ file only use vertices that exist.
+    """Checks the vertices of an OBJ file, and that faces only use these.
 
     Raises:
-        ValueError: a vertex does not exist; or there are surfaces other than
-            faces. The message names the line or the statement.
+        ValueError: a vertex does not exist, or is not made of numbers; or there
+            are surfaces other than faces. The message names the line or the
+            statement.
         InputError: the file cannot be read.
     """
     # Drake accepts both as line ends.
@@ -355,6 +363,9 @@ def check_obj(path: Path) -> None:
             f"has the statement '{found[1].decode()}' of OBJ, which is not"
             " read; export it with faces"
         )
+    if found := _NO_VERTEX.search(content):
+        number = content.count(b"\n", 0, found.start()) + 1
+        raise ValueError(f"line {number}: a vertex that is not three numbers")
     num_vertices = len(_VERTEX.findall(content))
     faces = b" \n".join(_FACE.findall(content))
     if b"/" in faces:

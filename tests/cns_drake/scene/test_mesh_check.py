@@ -336,3 +336,24 @@ def test_surfaces_of_obj_that_would_be_missing_are_refused(
     # Lines and points have no surface, and names are no statements.
     path.write_text(f"{VERTICES}o surf\ng call me\nf 1 2 3\nl 1 2\np 1\n")
     check_obj(path)
+
+
+@pytest.mark.parametrize(
+    "vertex",
+    ["1 2", "1,5 2 3", "nan 2 3", "1 2 inf", "1 2 x", "1 2 3d0", "1 2 \\\n3"],
+)
+def test_a_vertex_of_obj_that_is_no_numbers_is_refused(tmp_path, vertex):
+    """Drake's reader takes such a coordinate for 0."""
+    path = tmp_path / "thing.obj"
+    path.write_text(f"v 0 0 0\nv {vertex}\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(ValueError, match="line 2: a vertex that is not three"):
+        check_obj(path)
+
+
+@pytest.mark.parametrize(
+    "vertex", ["+1 .5 -2.e-3", "\t1 2 3 ", "1 2 3 1.0", "1 2 3 .1 .2 .3# red"]
+)
+def test_vertices_of_obj_in_other_forms_are_read(tmp_path, vertex):
+    path = tmp_path / "thing.obj"
+    path.write_text(f"v 0 0 0\n  v {vertex}\r\nv 0 1 0\nf 1 2 3\nv {vertex}")
+    check_obj(path)
