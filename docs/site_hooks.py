@@ -46,9 +46,11 @@ def on_config(config: MkDocsConfig, **_: Any) -> MkDocsConfig:
     """Lists the pages of the API reference in the menu."""
     assert config.nav is not None
     for package in PACKAGES:
-        own, *rooms = _reference(package)
+        own, *modules = _reference(package)
         entries: list[Any] = [f"api/{own}"]
-        entries += [{Path(room).stem: f"api/{room}"} for room in sorted(rooms)]
+        entries += [
+            {Path(path).stem: f"api/{path}"} for path in sorted(modules)
+        ]
         config.nav[_API_TAB]["Python"].append({package: entries})
     return config
 
@@ -109,10 +111,10 @@ def _in_site(path: str) -> str:
 
 
 def _reference(package: str) -> dict[str, str]:
-    """Returns the pages that explain the public names, one for each room.
+    """Returns the pages that explain the public names, one for each module.
 
     The key is the page's path below `api/`. The first page is the package's
-    own: it lists the names of all rooms.
+    own: it lists the names of all modules.
     """
     folder = ROOT / package
     text = (folder / "__init__.py").read_text(encoding="utf-8")
@@ -128,13 +130,13 @@ def _reference(package: str) -> dict[str, str]:
     rows = []
     for name in sorted(homes, key=str.lower):
         home = homes[name]
-        room = ".".join(home.split(".")[:2])
-        path = room.replace(".", "/") + ".md"
-        rows.append(f"| [{name}]({path}#{home}.{name}) | `{room}` |")
-        if room.startswith(package):
+        module = ".".join(home.split(".")[:2])
+        path = module.replace(".", "/") + ".md"
+        rows.append(f"| [{name}]({path}#{home}.{name}) | `{module}` |")
+        if module.startswith(package):
             # A name has one place in the site.
-            pages.setdefault(path, f"# {room}\n")
+            pages.setdefault(path, f"# {module}\n")
             pages[path] += f"\n::: {home}.{name}\n"
     lines = [f"# {package}", "", ast.get_docstring(ast.parse(text)) or "", ""]
-    lines += ["| name | room |", "|---|---|", *rows, ""]
+    lines += ["| name | module |", "|---|---|", *rows, ""]
     return {f"{package}.md": "\n".join(lines), **pages}

@@ -109,7 +109,7 @@ def test_every_public_name_is_explained(site):
     names = {*cns_drake.__all__, *evaluation.__all__} - {"__version__"}
     assert names <= explained
     assert examples > 2
-    # One page for each room, all of them in the menu.
+    # One page for each module, all of them in the menu.
     menu = (site / "api/cns_drake/sensors.html").read_text()
     assert len(pages) > 10
     for path in pages:
