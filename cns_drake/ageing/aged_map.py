@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
-from cns_drake.ageing.history import TAKEN_DOWN, City, Event
+from cns_drake.ageing.history import TAKEN_DOWN, AgeingCity, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
 from cns_drake.base.csv_files import write_csv
@@ -121,7 +121,9 @@ def age_map(
             "past needs"
         )
     doing("looking for lots")
-    city = City(world, rates, seed, shapely.union_all([*map(_swept, ways)]))
+    city = AgeingCity(
+        world, rates, seed, shapely.union_all([*map(_swept, ways)])
+    )
     # Today is the first stage.
     others = [year for year in wanted if year != 0]
     stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
@@ -422,7 +424,7 @@ def _write_drives(
         MapFolder(draft).drive(stage).write_text(text, "utf-8")
 
 
-def _changed(city: City) -> np.ndarray:
+def _changed(city: AgeingCity) -> np.ndarray:
     """Returns the places (N, 3) of new buildings and additions [m]."""
     places = [
         one.xyz

@@ -157,7 +157,7 @@ class _Tree:
         return replace(self.whole, name=self.name, model=model)
 
 
-class City:
+class AgeingCity:
     """A city at the end of a year.
 
     Attributes:

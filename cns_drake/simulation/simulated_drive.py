@@ -35,10 +35,10 @@ from cns_drake.simulation.station import make_station
 
 
 @dataclass(frozen=True)
-class DriveSimulation:
-    """A drive that is simulated when it is opened.
+class SimulationSource:
+    """The source of a drive that is simulated when it is opened.
 
-    Call the object to open the drive: `simulation()` returns a `SimulatedDrive`
+    Call the object to open the drive: `source()` returns a `SimulatedDrive`
     with the scans of the scenario's first LiDAR.
 
     Attributes:

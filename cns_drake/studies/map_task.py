@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies import map_truth
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.scores import Labels, score
 from evaluation.map_update.sessions import Label, read_pair, read_truth
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
-from evaluation.study.surveys import RecordedDrive
+from evaluation.study.surveys import RecordingSource
 from evaluation.study.tasks.task import Jobs, Pair, Task, positive
 
 _SCORES = (
@@ -81,8 +81,8 @@ class MapTask(Task):
 
 def measure_maps(
     reporter: Reporter,
-    database: DriveSimulation | RecordedDrive,
-    query: DriveSimulation | RecordedDrive,
+    database: SimulationSource | RecordingSource,
+    query: SimulationSource | RecordingSource,
     methods: tuple[str, ...],
     spacing: float,
 ) -> dict[str, dict[str, float | None]]:
@@ -99,7 +99,7 @@ def measure_maps(
     """
     a, b = (
         map_truth.simulate_survey(source.scenario)
-        if isinstance(source, DriveSimulation)
+        if isinstance(source, SimulationSource)
         else map_truth.open_survey(source.path)
         for source in (database, query)
     )

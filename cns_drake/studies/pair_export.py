@@ -27,7 +27,7 @@ from cns_drake.base.progress import track
 from cns_drake.base.value_lists import repeated
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
 from cns_drake.transient.world_structures import GROUND_CLASSES
 from evaluation.drives.sampling import gather, sample_frames
@@ -106,7 +106,7 @@ def write_overlap_table(
     """
     # Before minutes of work.
     make_folder(output)
-    places, queries = (DriveSimulation(one)() for one in (database, query))
+    places, queries = (SimulationSource(one)() for one in (database, query))
     found = exact_overlaps(places, queries, protocol)
     path = output / "overlaps.csv"
     frames = compared_frames(places, queries, protocol)
@@ -155,7 +155,7 @@ def export_pairs(
             MakePart(
                 parts[one.name],
                 export_run,
-                (DriveSimulation(one), output / "runs" / one.name, options),
+                (SimulationSource(one), output / "runs" / one.name, options),
             ),
             cost=_DRIVE_COST,
         )
@@ -168,7 +168,7 @@ def export_pairs(
             if cities[i] == cities[j]:
                 name = f"{names[i]} in {names[j]}"
                 part = Part(output / "parts" / f"{name}.data")
-                both = DriveSimulation(every[i]), DriveSimulation(every[j])
+                both = SimulationSource(every[i]), SimulationSource(every[j])
                 step = MakePart(part, compare_runs, (*both, options))
                 jobs.append(Job(f"overlap {name}", step, cost=_PAIR_COST))
                 pairs[names[i], names[j]] = part
@@ -188,7 +188,7 @@ def export_pairs(
 
 def export_run(
     reporter: Reporter,
-    simulation: DriveSimulation,
+    simulation: SimulationSource,
     folder: Path,
     options: ExportOptions,
 ) -> np.ndarray:
@@ -245,8 +245,8 @@ def _cloud(points: np.ndarray, max_range: float, seed: int) -> np.ndarray:
 
 def compare_runs(
     reporter: Reporter,
-    query: DriveSimulation,
-    database: DriveSimulation,
+    query: SimulationSource,
+    database: SimulationSource,
     options: ExportOptions,
 ) -> np.ndarray:
     """Returns the exact overlap of Q queries with D places, (Q, D).

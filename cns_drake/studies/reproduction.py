@@ -15,7 +15,7 @@ from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.comparisons import control_drive
 from cns_drake.studies.forecast import forecast
 from cns_drake.studies.map_pictures import plan_pictures
@@ -105,7 +105,7 @@ def reproduce_maps(
         is_waiting = not is_recorded(scenario, output)
         info = recording_info(scenario, output, is_waiting and with_recordings)
         if is_waiting and not with_recordings:
-            info = replace(info, made_by=DriveSimulation(scenario))
+            info = replace(info, made_by=SimulationSource(scenario))
         recordings.append(info)
     # The order is that of `cns-eval report`.
     recordings.sort(key=lambda recording: recording.name)

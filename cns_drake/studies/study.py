@@ -19,7 +19,7 @@ from cns_drake.scenarios.shipped import (
     shipped_maps,
 )
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
@@ -72,8 +72,8 @@ from evaluation.study.collection import (
 )
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.recorded import (
+    ExtractionJobs,
     RecordedCondition,
-    SurveyJobs,
     recorded_comparisons,
 )
 from evaluation.study.tasks.change import ChangeTask
@@ -421,7 +421,7 @@ class Study:
             jobs: Callable[..., Jobs] = Jobs
             if some.city is not None:
                 with_map = ChangeTask.name in self._tasks
-                jobs = partial(SurveyJobs, with_map=with_map)
+                jobs = partial(ExtractionJobs, with_map=with_map)
             engine.add(found, self._distractors(some, found), jobs)
         if not engine.jobs:
             raise InputError(
@@ -457,12 +457,12 @@ class Study:
     def _named(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
         if is_recorded(drive, self.output):
-            from evaluation.study.surveys import RecordedDrive
+            from evaluation.study.surveys import RecordingSource
 
             return NamedDrive(
-                drive.name, RecordedDrive(self.output / drive.name)
+                drive.name, RecordingSource(self.output / drive.name)
             )
-        return NamedDrive(drive.name, DriveSimulation(drive))
+        return NamedDrive(drive.name, SimulationSource(drive))
 
     def _simulated(
         self, some: _Drives, *, made: bool = True

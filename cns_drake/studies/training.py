@@ -27,7 +27,7 @@ from cns_drake.base.terminal import resumable
 from cns_drake.base.version import __version__
 from cns_drake.studies.training_drives import (
     DRAWN_STREETS,
-    DrawnCity,
+    SampledCity,
     scan_city,
 )
 from evaluation.methods.learned import (
@@ -545,10 +545,10 @@ class TrainingPlan:
         steps = max(10, round(_STEPS_A_MINUTE * minutes))
         return cls(**{"cities": cities, "steps": steps, **fields})
 
-    def drawn(self) -> list[DrawnCity]:
+    def drawn(self) -> list[SampledCity]:
         """Returns the cities on which the network is trained."""
         return [
-            DrawnCity(
+            SampledCity(
                 DRAWN_STREETS
                 if self.drawn_streets
                 else MAPS[number % len(MAPS)],

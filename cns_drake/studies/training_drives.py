@@ -60,7 +60,7 @@ _OVERLAP_POINTS = 1000
 
 
 @dataclass(frozen=True)
-class DrawnCity:
+class SampledCity:
     """A city with its drives, all drawn from a seed.
 
     Attributes:
@@ -169,7 +169,7 @@ class DrawnCity:
 
 
 def scan_city(
-    reporter: Reporter, drawn: DrawnCity, folder: Path
+    reporter: Reporter, drawn: SampledCity, folder: Path
 ) -> dict[str, np.ndarray]:
     """Simulates the drives through a city, without recording them.
 

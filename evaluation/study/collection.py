@@ -15,7 +15,7 @@ from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns
 from evaluation.drives.kitti import holds_kitti
-from evaluation.study.surveys import DriveSource, RecordedDrive
+from evaluation.study.surveys import DriveSource, RecordingSource
 from evaluation.study.tasks.task import NamedDrive
 
 # The names of drives that state map and stage, the first ones as those of NCLT,
@@ -67,7 +67,7 @@ class RecordingInfo:
     @property
     def source(self) -> DriveSource:
         """Function that opens the drive."""
-        return self.made_by or RecordedDrive(self.path.absolute())
+        return self.made_by or RecordingSource(self.path.absolute())
 
     @property
     def named(self) -> NamedDrive:
@@ -333,7 +333,7 @@ def _place(
         stage = match["stage"]
     source = None
     if (lidar, columns) != (None, None):
-        source = RecordedDrive(path.absolute(), lidar, columns)
+        source = RecordingSource(path.absolute(), lidar, columns)
     return RecordingInfo(
         drive.name,
         path,

@@ -27,7 +27,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import KeptDrive
+from evaluation.study.surveys import KeptScans
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
@@ -50,7 +50,7 @@ def explain_faults(
 
     Args:
         reporter: reports progress.
-        drives: files with the scans (`KeptDrive`) of the database and of the
+        drives: files with the scans (`KeptScans`) of the database and of the
             query.
         methods: methods of the results.
         results: file with each method's outcomes on the pair.
@@ -72,8 +72,8 @@ def explain_faults(
 
 
 def find_evidence(
-    database: Drive | KeptDrive,
-    query: Drive | KeptDrive,
+    database: Drive | KeptScans,
+    query: Drive | KeptScans,
     results: Sequence[PlaceOutcome],
     protocol: RetrievalProtocol,
 ) -> PairEvidence:
@@ -178,7 +178,7 @@ class _Shown:
 
     @classmethod
     def of(
-        cls, drive: Drive | KeptDrive, frame: int, max_range: float
+        cls, drive: Drive | KeptScans, frame: int, max_range: float
     ) -> _Shown:
         scan = drive.scan(frame)
         points = xyz(scan)

@@ -23,11 +23,11 @@ from evaluation.report.page_data import (
 from evaluation.results.drawing import PIXELS
 from evaluation.study.collection import City, Recordings
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.recorded import SurveyJobs
+from evaluation.study.recorded import ExtractionJobs
 from evaluation.study.surveys import (
     DriveSource,
-    RecordedDrive,
-    SurveyedDrive,
+    DriveSummary,
+    RecordingSource,
 )
 from evaluation.study.tasks.task import job_name
 
@@ -48,7 +48,7 @@ def draw_city(
     Args:
         reporter: reports progress.
         map_name: name of the map.
-        stages: for each stage, its name, the file with its `SurveyedDrive`, the
+        stages: for each stage, its name, the file with its `DriveSummary`, the
             file with a cloud for pictures, and the source of the drive.
         stem: path of the figure without the ending.
 
@@ -68,7 +68,7 @@ def draw_city(
         views.append(view)
         routes.append(drive.positions)
         images = None
-        if isinstance(source, RecordedDrive):
+        if isinstance(source, RecordingSource):
             stamps_ns = drive.stamps_ns[drive.frames]
             images = camera_images(source(), stamps_ns, reporter.note)
         drives[drive.name] = make_drive(
@@ -98,7 +98,7 @@ def draw_stages(
         changes: files with the results of the task `change`: of the earlier and
             the later drive, and, if there is one, of their control.
         drives: the earlier drive and the later one. Each is a file with a
-            `SurveyedDrive`; both are in one world frame.
+            `DriveSummary`; both are in one world frame.
         clouds: files with the clouds of the earlier and the later drive.
         stems: paths of the two figures, without ending. The first figure shows
             what changed, the second figure shows the sets of points from which
@@ -107,7 +107,7 @@ def draw_stages(
     doing("comparing the maps on other grids")
     report: ChangeReport
     report, *controls = (part.read() for part in changes)
-    read: list[SurveyedDrive] = [part.read() for part in drives]
+    read: list[DriveSummary] = [part.read() for part in drives]
     earlier, later = (one.surveyed for one in read)
     spread = spread_over_grids(earlier, later, report.change)
     report = replace(report, spread=spread)
@@ -127,7 +127,7 @@ def draw_stages(
 
 
 def drawing_job(
-    city: City, files: StudyFiles, planned: SurveyJobs
+    city: City, files: StudyFiles, planned: ExtractionJobs
 ) -> tuple[Part, Job]:
     """Returns the job that draws a city, and the file of its result.
 
@@ -157,7 +157,7 @@ def change_job(
     pair: Recordings,
     changes: tuple[Part, ...],
     files: StudyFiles,
-    planned: SurveyJobs,
+    planned: ExtractionJobs,
 ) -> tuple[Part, Job]:
     """Returns the job that draws a change, and the file of its result.
 

@@ -53,7 +53,7 @@ def shown_overlaps(
 
     Args:
         reporter: unused.
-        scans: files with the scans of database and query: a `KeptDrive`, or a
+        scans: files with the scans of database and query: a `KeptScans`, or a
             list of them.
         described: files with a method's descriptions of both, for the poses.
         choice: the method.

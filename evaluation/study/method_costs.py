@@ -29,7 +29,7 @@ def measure_method_costs(
     Args:
         reporter: reports progress.
         source: opens the query drive.
-        surveyed: file with the `SurveyedDrive` of the query drive, from which
+        surveyed: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
         methods: the methods.
         described: files with the descriptions of a database, and of the

@@ -10,7 +10,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import SETTINGS
 from evaluation.study.chosen_methods import MethodChoice, Setting
 from evaluation.study.engine import Engine
-from evaluation.study.surveys import RecordedDrive
+from evaluation.study.surveys import RecordingSource
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Held, NamedDrive, Pair
 
@@ -48,7 +48,7 @@ def write_pair_tables(
     tasks = {task.name: task({}, _EXPERIMENT) for task in (PlaceTask, PoseTask)}
     names = outcome.database, outcome.query
     database, asked = (
-        NamedDrive(one, RecordedDrive(path))
+        NamedDrive(one, RecordingSource(path))
         for one, path in zip(names, paths, strict=True)
     )
     engine = Engine(_EXPERIMENT, tasks, {name: (choice, columns)}, output)

@@ -506,7 +506,7 @@ def _identity(argument: Any) -> object:
 
 
 @dataclass(frozen=True)
-class SurveyFiles:
+class FeatureFiles:
     """The files (`Part`) with all that a study needs of a recording.
 
     These are the drive's poses and map, its scans at places and queries, and,
@@ -520,7 +520,7 @@ class SurveyFiles:
 
     @property
     def drive(self) -> Part:
-        """The file with the drive's poses and map, a `SurveyedDrive`."""
+        """The file with the drive's poses and map, a `DriveSummary`."""
         return Part(self.folder / "drive.data")
 
     @property
@@ -532,7 +532,7 @@ class SurveyFiles:
     def scans(self) -> Part:
         """The file with the drive's scans at places and queries.
 
-        For a drive with a map, the file contains a `KeptDrive`; otherwise a
+        For a drive with a map, the file contains a `KeptScans`; otherwise a
         list of scans (N, 3).
         """
         return Part(self.folder / "scans.data")
@@ -575,10 +575,10 @@ class StudyFiles:
         """The folder of all figures."""
         return self.output / "figures"
 
-    def survey(self, recording: str) -> SurveyFiles:
+    def survey(self, recording: str) -> FeatureFiles:
         """Returns the files with a recording's map and descriptions."""
         folder = self.output / "parts" / "surveys"
-        return SurveyFiles(folder / file_name(recording))
+        return FeatureFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:
         """Returns the file of an intermediate result.

@@ -14,8 +14,8 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import City
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.parts import Part, SurveyFiles
-from evaluation.study.surveys import Further, Survey
+from evaluation.study.parts import FeatureFiles, Part
+from evaluation.study.surveys import FeatureExtraction, Further
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
 
 # Expected seconds: for the maps of a drive of 3000 scans, and for its places or
@@ -95,7 +95,7 @@ def recorded_comparisons(
 
 
 @dataclass
-class SurveyJobs(Jobs):
+class ExtractionJobs(Jobs):
     """Jobs of a study that read each drive once.
 
     One job surveys a drive: it maps the drive, describes its places and its
@@ -145,7 +145,7 @@ class SurveyJobs(Jobs):
             return super().mapped(drive, spacing, needs)
         return self.survey(drive, needs).drive
 
-    def survey(self, drive: NamedDrive, needs: list[str]) -> SurveyFiles:
+    def survey(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
         """Returns the files of a drive's survey, and adds its job.
 
         Args:
@@ -157,7 +157,7 @@ class SurveyJobs(Jobs):
         files = self.files.survey(drive.name)
         if name not in self.jobs:
             roles = frozenset(self._roles.get(drive.name, ()))
-            step = Survey(
+            step = FeatureExtraction(
                 drive.source,
                 roles,
                 self.methods,

@@ -11,11 +11,11 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Steps
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.surveys import Survey
+from evaluation.study.surveys import FeatureExtraction
 
 
 def spend(jobs: Iterable[Job]) -> None:
-    """Removes the descriptions of surveys that say so, see `Survey.spends`.
+    """Removes descriptions where `FeatureExtraction.spends` says so.
 
     All jobs must be done.
 
@@ -23,7 +23,7 @@ def spend(jobs: Iterable[Job]) -> None:
         InputError: a file cannot be written.
     """
     for job in jobs:
-        if isinstance(job.step, Survey) and job.step.spends:
+        if isinstance(job.step, FeatureExtraction) and job.step.spends:
             job.step.files.spend()
 
 
@@ -34,7 +34,8 @@ def restore(jobs: Collection[Job]) -> None:
         jobs: all jobs of a study, each behind those that it needs.
     """
     if not any(
-        isinstance(one.step, Survey) and one.step.spends for one in jobs
+        isinstance(one.step, FeatureExtraction) and one.step.spends
+        for one in jobs
     ):
         return
     names = {job.name for job in jobs}
@@ -42,7 +43,7 @@ def restore(jobs: Collection[Job]) -> None:
     stale: set[Path] = set()
     needed: list[Part] = []
     for job in jobs:
-        if isinstance(job.step, Survey):
+        if isinstance(job.step, FeatureExtraction):
             stale.update(part.path for part in job.step.missing())
             if not names.issuperset(job.needs):
                 stale.add(job.step.files.folder)

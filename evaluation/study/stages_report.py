@@ -36,8 +36,8 @@ from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.method_costs import measure_method_costs
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.recorded import (
+    ExtractionJobs,
     RecordedCondition,
-    SurveyJobs,
     recorded_comparisons,
 )
 from evaluation.study.repeats import Repeat, repeats_of
@@ -304,9 +304,9 @@ class _CityReport:
             (*one.names, one.factors[STAGE]): one for one in measured
         }
         planned = study.engine.add(
-            measured, make_jobs=partial(SurveyJobs, further=self._further())
+            measured, make_jobs=partial(ExtractionJobs, further=self._further())
         )
-        assert isinstance(planned, SurveyJobs)
+        assert isinstance(planned, ExtractionJobs)
         self._drawing, job = figures.drawing_job(city, self._files, planned)
         jobs = [job]
         self._changes = []

@@ -1,4 +1,4 @@
-"""Surveys of drives: maps, places and queries, found in one pass.
+"""Features of drives: maps, places and queries, extracted in one pass.
 
 A job that works on a drive may run in another process, or on another machine,
 before or after the drive is recorded. The job therefore gets the source of the
@@ -35,7 +35,7 @@ from evaluation.methods import MethodConfig
 from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import Part, SurveyFiles
+from evaluation.study.parts import FeatureFiles, Part
 
 # Divisions of a cell's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 2
@@ -110,8 +110,8 @@ class DriveSource(Protocol):
 
 
 @dataclass(frozen=True)
-class RecordedDrive:
-    """A recorded drive, in any format that `open_drive` reads.
+class RecordingSource:
+    """The source of a recorded drive, in any format that `open_drive` reads.
 
     An object is called without arguments, and returns the opened `Drive`.
 
@@ -143,7 +143,7 @@ class RecordedDrive:
 
 
 @dataclass(frozen=True)
-class SurveyedDrive:
+class DriveSummary:
     """A drive with its map, and with its scans reduced to small pictures.
 
     Attributes:
@@ -181,7 +181,7 @@ class SurveyedDrive:
 
 
 @dataclass(frozen=True)
-class KeptDrive:
+class KeptScans:
     """A drive of which only the scans of places and queries are kept.
 
     Attributes:
@@ -224,7 +224,7 @@ class KeptDrive:
 
 
 @dataclass(frozen=True)
-class RecordingSurvey:
+class ExtractedFeatures:
     """The results of reading a recording once: map, places and queries.
 
     Attributes:
@@ -232,7 +232,7 @@ class RecordingSurvey:
         described: key of a method -> its descriptions of the places and
             queries; empty if the drive has neither.
         scans: scans of places and queries; None if they are not kept. If there
-            is a map, this is a `KeptDrive` with the recorded scans. Otherwise
+            is a map, this is a `KeptScans` with the recorded scans. Otherwise
             it is a list of arrays (N, 3) float32, in which queries are changed
             as the protocol says: turned, tilted or without a sector.
         drive: the drive with its map; None without a map.
@@ -241,13 +241,13 @@ class RecordingSurvey:
 
     placed: PlacedDrive
     described: dict[str, description.DescribedDrive]
-    scans: KeptDrive | list[np.ndarray] | None
-    drive: SurveyedDrive | None = None
+    scans: KeptScans | list[np.ndarray] | None
+    drive: DriveSummary | None = None
     fine: np.ndarray | None = None
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key in `RecordingSurvey.described` for a second protocol.
+    """Returns the key in `ExtractedFeatures.described` for a second protocol.
 
     A method's descriptions by the study's own protocol have the key of the
     method. Use this function for its descriptions by any other protocol.
@@ -266,7 +266,7 @@ def survey_recording(
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     *,
     with_scans: bool = False,
-) -> RecordingSurvey:
+) -> ExtractedFeatures:
     """Maps a recording and describes its places and queries.
 
     Each scan is read once, in order.
@@ -288,10 +288,10 @@ def survey_recording(
     frames: list[int] = []
     thumbnails = []
     mapped = MappedDrive(recording, _most_scans(asked))
-    kept: KeptDrive | None = None
+    kept: KeptScans | None = None
     if with_scans:
         known = recording.instances
-        kept = KeptDrive(mapped.name, mapped.X_WS, known and dict(known))
+        kept = KeptScans(mapped.name, mapped.X_WS, known and dict(known))
 
     def keep(frame: int, cloud: np.ndarray) -> None:
         # Pictures show the scan as recorded, whatever its query sees.
@@ -310,7 +310,7 @@ def survey_recording(
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
     placed = PlacedDrive.of(recording)
-    surveyed = SurveyedDrive(
+    surveyed = DriveSummary(
         placed=placed,
         stamps_ns=mapped.stamps_ns,
         X_WS=mapped.X_WS,
@@ -318,7 +318,7 @@ def survey_recording(
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return RecordingSurvey(placed, described, kept, surveyed, fine)
+    return ExtractedFeatures(placed, described, kept, surveyed, fine)
 
 
 def map_city(
@@ -346,7 +346,7 @@ def describe_recording(
     roles: Set[description.Role],
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
-) -> RecordingSurvey:
+) -> ExtractedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
 
     No map is made. Only the scans of places and queries are read, each once.
@@ -359,7 +359,7 @@ def describe_recording(
         seen.append(cloud.astype(np.float32))
 
     described = _described(drive, roles, asked, protocol, keep)
-    return RecordingSurvey(PlacedDrive.of(recording), described, seen)
+    return ExtractedFeatures(PlacedDrive.of(recording), described, seen)
 
 
 def _most_scans(asked: Mapping[str, description.Request]) -> int:
@@ -381,10 +381,10 @@ def _described(
 
 
 @dataclass(frozen=True)
-class Survey(Step):
-    """A job step that surveys a drive and writes the files that are missing.
+class FeatureExtraction(Step):
+    """A job step that reads a drive once and writes the files that are missing.
 
-    A survey consists of the drive's map and of descriptions of its places and
+    The files contain the drive's map and descriptions of its places and
     queries.
 
     Attributes:
@@ -405,7 +405,7 @@ class Survey(Step):
     roles: frozenset[description.Role]
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
-    files: SurveyFiles
+    files: FeatureFiles
     with_scans: bool = False
     with_map: bool = True
     further: tuple[Further, ...] = ()

@@ -22,7 +22,7 @@ from shapely.geometry import Polygon
 import yaml
 
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 
 _BUILDING = 50
 _EVERY = 75
@@ -97,7 +97,7 @@ def main() -> None:
     options = parser.parse_args()
     origin = yaml.safe_load((options.map / "import.yaml").read_text())["origin"]
     polygons = Polygons(options.city, origin)
-    drive = DriveSimulation(load_scenario(options.map / "sequence_01.yaml"))()
+    drive = SimulationSource(load_scenario(options.map / "sequence_01.yaml"))()
     rng = np.random.default_rng(0)
     differences = []
     for frame in range(0, len(drive), _EVERY):

@@ -8,7 +8,7 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeReport, compare_maps
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.parts import Part
-from evaluation.study.surveys import SurveyedDrive
+from evaluation.study.surveys import DriveSummary
 from evaluation.study.tasks.task import Jobs, Pair, Task, positive
 
 
@@ -67,10 +67,10 @@ def measure_change(
     Args:
         reporter: reports progress.
         first, second: files with the maps of the two drives: the results of
-            `evaluation.study.surveys.map_city`, or a `SurveyedDrive`.
+            `evaluation.study.surveys.map_city`, or a `DriveSummary`.
     """
     maps = (part.read() for part in (first, second))
     a, b = (
-        one.surveyed if isinstance(one, SurveyedDrive) else one for one in maps
+        one.surveyed if isinstance(one, DriveSummary) else one for one in maps
     )
     return compare_maps(a, b, grids=())

@@ -19,7 +19,7 @@ from evaluation.results.table import FRESH
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.surveys import DriveSource, Survey, map_city
+from evaluation.study.surveys import DriveSource, FeatureExtraction, map_city
 
 # Expected time to describe a drive by all methods [s].
 _DESCRIPTION_COST = 30.0
@@ -217,7 +217,7 @@ class Jobs:
             needs += drive.needs
             return drive.source
         files = self.files.survey(name)
-        step = Survey(
+        step = FeatureExtraction(
             drive.source,
             frozenset({role}),
             self.methods,

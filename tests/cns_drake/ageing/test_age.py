@@ -13,7 +13,7 @@ import shapely
 
 from cns_drake.ageing import plots
 from cns_drake.ageing.aged_map import age_map, past
-from cns_drake.ageing.history import City
+from cns_drake.ageing.history import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot, last, new_building, section
 from cns_drake.ageing.rates import (
@@ -210,7 +210,7 @@ def test_replacements_are_of_another_kind(long):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_rates_come_about(world, seed):
     """Numbers of 30 years are Poisson's, at one in a thousand for each."""
-    city = City(world, DEFAULT_RATES, seed, shapely.Polygon())
+    city = AgeingCity(world, DEFAULT_RATES, seed, shapely.Polygon())
     for _ in range(30):
         city.live()
     tally = city.tally
@@ -231,7 +231,7 @@ def test_rates_come_about(world, seed):
 
 @pytest.mark.slow
 def test_nothing_happens_at_rate_zero(world):
-    city = City(
+    city = AgeingCity(
         world,
         dict.fromkeys(DEFAULT_RATES, 0.0),
         1,
@@ -256,7 +256,7 @@ def test_what_is_painted_is_known_by_its_material(town, tmp_path):
             text = text.replace(f",{old},road,", f",{new},road,")
         path.write_text(text)
     rates = {**dict.fromkeys(DEFAULT_RATES, 0.0), "markings": 1.0}
-    city = City(OldWorld(MapFolder(folder)), rates, 1, shapely.Polygon())
+    city = AgeingCity(OldWorld(MapFolder(folder)), rates, 1, shapely.Polygon())
     city.live()
     painted = [e.structure for e in city.events if e.event == "markings"]
     assert painted == ["crossing_n1"]
@@ -271,7 +271,7 @@ def test_furniture_moves_as_far_as_allowed(world, farthest, least):
         "lamps": 1.0,
         "moved": farthest,
     }
-    city = City(world, rates, 1, shapely.Polygon())
+    city = AgeingCity(world, rates, 1, shapely.Polygon())
     city.live()
     moves = [e for e in city.events if e.event == "furniture"]
     assert moves
@@ -481,7 +481,7 @@ def test_each_stage_is_what_the_history_tells(long):
 
 @pytest.mark.slow
 def test_a_scaffold_stands_before_its_building(world):
-    city = City(world, _BUSY, 3, shapely.Polygon())
+    city = AgeingCity(world, _BUSY, 3, shapely.Polygon())
     seen = 0
     for _ in range(8):
         city.live()
@@ -503,7 +503,7 @@ def test_a_scaffold_stands_before_its_building(world):
 @pytest.mark.slow
 @pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
 def test_a_scaffold_stands_in_nothing_however_thin(world, offset, stands):
-    city = City(world, _BUSY, 3, shapely.Polygon())
+    city = AgeingCity(world, _BUSY, 3, shapely.Polygon())
     # The canopies of another building are not in the way of this one's.
     first, *_, other = (lot for lot in city._lots if lot.building)
     parts = []

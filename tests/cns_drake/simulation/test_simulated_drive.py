@@ -9,7 +9,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.simulation.simulation import simulate
 from evaluation.drives import open_drive
 from evaluation.study.surveys import survey_recording
@@ -30,7 +30,7 @@ def check_same(simulated, recorded, frames):
 
 def test_scans_and_poses_are_those_of_a_recording(short_recording):
     recorded = open_drive(short_recording)
-    source = DriveSimulation(load_scenario(short_recording / "scenario.yaml"))
+    source = SimulationSource(load_scenario(short_recording / "scenario.yaml"))
     simulated = pickle.loads(pickle.dumps(source))()
     check_same(simulated, recorded, [0, 1, 2, 17, 39])
     keys = ("map", "stage", "route")
@@ -51,14 +51,14 @@ def test_noise_and_motion_distortion_too(tmp_path):
     """A frame's noise depends on its number only, in any order."""
     scenario = tiny_scenario(tmp_path)
     recorded = open_drive(simulate(scenario, tmp_path / "out").folder)
-    simulated = DriveSimulation(scenario)()
+    simulated = SimulationSource(scenario)()
     assert len(simulated) == FRAMES
     check_same(simulated, recorded, [40, 0, 41, FRAMES - 1, 40])
 
 
 def test_scans_of_a_still_world_in_any_order(tmp_path):
     """The time stands still there: only the sensor's pose differs."""
-    source = DriveSimulation(
+    source = SimulationSource(
         tiny_scenario(
             tmp_path, lidars={"lidar": {"preset": "vlp-16", "columns": 64}}
         )
@@ -91,17 +91,17 @@ def test_calibrated_returns_in_fog_too(tmp_path):
     assert described["lidar"]["unit_seed"] == 4
     assert described["lidar"]["elevations_deg"] == list(range(15, -16, -2))
     recorded = open_drive(folder)
-    simulated = DriveSimulation(scenario)()
+    simulated = SimulationSource(scenario)()
     check_same(simulated, recorded, [2, 0, 3])
     clear = scenario.with_returns("ideal")
-    assert len(DriveSimulation(clear)().scan(0)) != len(simulated.scan(0))
+    assert len(SimulationSource(clear)().scan(0)) != len(simulated.scan(0))
 
 
 def test_identity_differs_by_scenario_and_world(tmp_path):
     scenario = tiny_scenario(tmp_path)
-    source = DriveSimulation(scenario)
-    other = DriveSimulation(scenario.model_copy(update={"seed": 5}))
-    assert source.identity() == DriveSimulation(scenario).identity()
+    source = SimulationSource(scenario)
+    other = SimulationSource(scenario.model_copy(update={"seed": 5}))
+    assert source.identity() == SimulationSource(scenario).identity()
     assert source.identity() != other.identity()
     before = source.identity()
     sdf = tmp_path / "tiny.sdf"
@@ -112,4 +112,4 @@ def test_identity_differs_by_scenario_and_world(tmp_path):
 def test_too_many_frames_are_refused(tmp_path):
     scenario = tiny_scenario(tmp_path, frames=100_000)
     with pytest.raises(InputError, match="frames: 100000 is too many"):
-        DriveSimulation(scenario)()
+        SimulationSource(scenario)()

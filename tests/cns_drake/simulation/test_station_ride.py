@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.simulation.station import make_station
 
 
@@ -100,5 +100,5 @@ def test_motion_distortion_takes_each_column_from_its_own_pose(small_map):
         heights = (odometry.X_WB @ X_BS).multiply(p_SP)[2]
         np.testing.assert_allclose(heights, 0.0, atol=1e-3)
     # The drive simulated for the evaluation is the same.
-    simulated = DriveSimulation(scenario)()
+    simulated = SimulationSource(scenario)()
     np.testing.assert_array_equal(simulated.scan(180), scan)

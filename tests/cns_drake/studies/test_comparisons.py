@@ -17,7 +17,7 @@ from cns_drake.simulation.loaded_drive import (
     load_ways,
     plan_scenario_traffic,
 )
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.comparisons import MissingError, PairMaker
 from cns_drake.studies.experiment import (
     Experiment,
@@ -130,7 +130,7 @@ def differences(one, other):
 def poses_beside(compared):
     """X_QD (N, 4, 4): the LiDAR of the database seen from the query's."""
     query, database = (
-        DriveSimulation(one)().X_WS
+        SimulationSource(one)().X_WS
         for one in (compared.query, compared.database)
     )
     return np.linalg.inv(query) @ database
@@ -484,9 +484,9 @@ def test_queries_lie_at_the_same_places_in_every_condition(query_drive):
     rungs = Conditions(
         ladder("weather", "returns", "sensor", levels=(4,)), query_drive
     ).by_cause()
-    expected = DriveSimulation(rungs.pop(("none", 0)).query)().X_WS
+    expected = SimulationSource(rungs.pop(("none", 0)).query)().X_WS
     for rung in rungs.values():
-        X_WS = DriveSimulation(rung.query)().X_WS
+        X_WS = SimulationSource(rung.query)().X_WS
         np.testing.assert_array_equal(X_WS, expected)
 
 

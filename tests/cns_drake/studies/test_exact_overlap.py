@@ -13,7 +13,7 @@ import pytest
 from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
 from evaluation.recognition.overlap_truth import overlap_matrix, read_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -35,7 +35,7 @@ def drive(folder, visuals, **lidar):
     scenario = tiny_scenario(
         folder, world=str(world), lidars={"lidar": config}, frames=1
     )
-    return DriveSimulation(scenario)()
+    return SimulationSource(scenario)()
 
 
 def test_the_part_before_a_screen_is_seen(tmp_path):
@@ -100,7 +100,7 @@ def test_the_field_of_view_and_the_ranges_count(tmp_path):
 @pytest.mark.slow
 @pytest.mark.night
 def test_the_estimate_from_scans_is_close(short_recording):
-    drive = DriveSimulation(load_scenario(short_recording / "scenario.yaml"))()
+    drive = SimulationSource(load_scenario(short_recording / "scenario.yaml"))()
     protocol = RetrievalProtocol(query_spacing=0.1, place_spacing=0.3)
     exact = exact_overlaps(drive, drive, protocol)
     estimate = overlap_matrix(drive, drive, protocol)

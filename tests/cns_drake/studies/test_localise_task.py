@@ -17,7 +17,7 @@ from evaluation.localisation.localise import (
     localise,
     summary,
 )
-from evaluation.study.surveys import RecordedDrive
+from evaluation.study.surveys import RecordingSource
 from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
@@ -26,7 +26,7 @@ STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))
 @pytest.fixture(scope="module")
 def found(towns):
     """The results of two methods from two starts each."""
-    sources = (RecordedDrive(towns / f"town_0{i}") for i in (2, 1))
+    sources = (RecordingSource(towns / f"town_0{i}") for i in (2, 1))
     return measure_localisation(
         Reporter(), *sources, ("plane-icp", "gicp"), ("", ""), STARTS, 10.0
     )
@@ -81,7 +81,7 @@ def test_one_start_needs_no_name(found):
 
 
 def test_a_query_far_from_the_map_is_not_localised(towns):
-    mapped = RecordedDrive(towns / "town_02")
+    mapped = RecordingSource(towns / "town_02")
 
     def far():
         drive = open_drive(towns / "town_01")

@@ -16,7 +16,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.lidar.patterns import BeamCoverage
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.map_task import TRUTH, measure_maps
 from cns_drake.studies.map_truth import (
     NEAR,
@@ -236,7 +236,7 @@ def test_an_aged_city_has_another_name(small_map, tmp_path):
     ):
         values = scenario_values(folder) | {"stage": stage, "frames": 20}
         values |= {"name": name, "lidars": {"lidar": {"columns": 90}}}
-        drives.append(DriveSimulation(make_scenario(values, name)))
+        drives.append(SimulationSource(make_scenario(values, name)))
     scores = measure_maps(Reporter(), *drives, (TRUTH,), 1.0)
     assert scores[TRUTH]["miou"] == 1.0
     surveys = [simulate_survey(drive.scenario) for drive in drives]

@@ -14,7 +14,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import DriverConfig
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
@@ -220,8 +220,8 @@ def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
     (control,) = control_drives(drives)
     assert recordings.keys() == {"town_01", "town_04", control.name}
     assert recordings["town_01"].made_by is None
-    assert recordings["town_04"].made_by == DriveSimulation(drives[1])
-    assert recordings[control.name].made_by == DriveSimulation(control)
+    assert recordings["town_04"].made_by == SimulationSource(drives[1])
+    assert recordings[control.name].made_by == SimulationSource(control)
     assert not recordings.keys() & jobs.keys()
 
 

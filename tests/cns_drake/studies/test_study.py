@@ -14,7 +14,7 @@ from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.simulated_drive import DriveSimulation
+from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies import redrawing
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
@@ -132,9 +132,9 @@ def test_the_numbers_are_those_of_the_single_commands(
     assert {row.protocol for row in results.rows} == {"own"}
     protocol = RetrievalProtocol(query_spacing=5)
     drives = {
-        "own": DriveSimulation(database)(),
-        "last": DriveSimulation(database.replaced(stage="04"))(),
-        "query": DriveSimulation(query)(),
+        "own": SimulationSource(database)(),
+        "last": SimulationSource(database.replaced(stage="04"))(),
+        "query": SimulationSource(query)(),
     }
     mapped = {}
     for name, drive in drives.items():
@@ -277,7 +277,7 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
     fields = STAGES | {"protocol": {"base": "recorded", "radius": [2.0, 9.0]}}
     results = measure(experiment(town, **fields), tmp_path)
     database, query = (
-        DriveSimulation(load_scenario(town / f"sequence_{k}.yaml"))()
+        SimulationSource(load_scenario(town / f"sequence_{k}.yaml"))()
         for k in ("01", "04")
     )
     for radius in (2.0, 9.0):

@@ -22,7 +22,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.file_digests import file_digests
 from evaluation.drives import open_drive
-from evaluation.study.surveys import RecordedDrive
+from evaluation.study.surveys import RecordingSource
 
 MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
 _opened: list[str] | None = None
@@ -136,10 +136,10 @@ def test_every_file_that_is_opened_is_named(tmp_path, write):
     opened = {path for path in opened_by(use) if path.startswith(inside)}
     files = open_drive(folder).files
     assert opened == {os.path.realpath(path) for path in files}
-    first = RecordedDrive(folder).identity()
+    first = RecordingSource(folder).identity()
     files[-1].write_bytes(files[-1].read_bytes()[::-1])
     try:
-        assert RecordedDrive(folder).identity() != first
+        assert RecordingSource(folder).identity() != first
     except InputError:  # A recording that is written backwards.
         assert write is mcap
 
@@ -150,17 +150,17 @@ def digest(data):
 
 def test_corrected_poses_are_another_drive(tmp_path):
     folder = kitti(tmp_path)
-    first = RecordedDrive(folder).identity()
+    first = RecordingSource(folder).identity()
     table = tmp_path / "poses" / "07.txt"
     table.write_text(table.read_text().replace("0", "00", 1))
-    second = RecordedDrive(folder).identity()
+    second = RecordingSource(folder).identity()
     assert second != first
     # The LiDAR's mount lies two folders above the drive.
     folder = cns(tmp_path / "cns")
-    first = RecordedDrive(folder).identity()
+    first = RecordingSource(folder).identity()
     mount = tmp_path / "cns" / "transformation_lidar.yaml"
     mount.write_text(MATRIX.replace("1.6", "1.7"))
-    assert RecordedDrive(folder).identity() != first
+    assert RecordingSource(folder).identity() != first
 
 
 def test_a_link_stands_for_its_target(tmp_path):
@@ -168,9 +168,9 @@ def test_a_link_stands_for_its_target(tmp_path):
     scans = folder / "velodyne"
     scans.rename(tmp_path / "elsewhere")
     scans.symlink_to(tmp_path / "elsewhere")
-    first = RecordedDrive(folder).identity()
+    first = RecordingSource(folder).identity()
     (tmp_path / "elsewhere" / "000001.bin").write_bytes(xyzi(make_points(5, 9)))
-    assert RecordedDrive(folder).identity() != first
+    assert RecordingSource(folder).identity() != first
 
 
 def test_digests_are_kept_until_a_file_changes(tmp_path, monkeypatch):

@@ -15,8 +15,8 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import measurements
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import measure_places
-from evaluation.study.parts import MakePart, Part, SurveyFiles
-from evaluation.study.surveys import RecordedDrive, Survey
+from evaluation.study.parts import FeatureFiles, MakePart, Part
+from evaluation.study.surveys import FeatureExtraction, RecordingSource
 
 METHODS = (
     MethodChoice("solid"),
@@ -60,9 +60,9 @@ def folder(tmp_path_factory):
 
 def described(folder, name, role):
     """The parts of a drive's scans and descriptions, which are there."""
-    files = SurveyFiles(folder / "parts" / name)
-    step = Survey(
-        RecordedDrive(folder / name),
+    files = FeatureFiles(folder / "parts" / name)
+    step = FeatureExtraction(
+        RecordingSource(folder / name),
         frozenset({role}),
         METHODS,
         PROTOCOL,
@@ -173,7 +173,7 @@ def test_another_database_is_another_pair(folder, tmp_path):
     other = pair(
         folder,
         step.part.path,
-        database=RecordedDrive(folder / "metropolis_04"),
+        database=RecordingSource(folder / "metropolis_04"),
     )
     assert step.is_done()
     assert not other.is_done()

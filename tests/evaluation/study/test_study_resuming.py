@@ -12,7 +12,7 @@ from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import Part
 from evaluation.study.stages_report import StagesReport
-from evaluation.study.surveys import Survey
+from evaluation.study.surveys import FeatureExtraction
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,7 @@ def measuring_jobs(recordings, output):
     return [
         job
         for job in StagesReport(find_recordings(recordings), output).jobs()
-        if isinstance(job.step, Survey)
+        if isinstance(job.step, FeatureExtraction)
         or job.name.startswith(("place", "explain"))
     ]
 

@@ -18,10 +18,10 @@ from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.measurements import measure_method
-from evaluation.study.parts import MakePart, Part, SurveyFiles
+from evaluation.study.parts import FeatureFiles, MakePart, Part
 from evaluation.study.surveys import (
-    RecordedDrive,
-    Survey,
+    FeatureExtraction,
+    RecordingSource,
     survey_recording,
 )
 
@@ -82,7 +82,7 @@ class Source:
 
 def survey(source, methods, files, roles=BOTH, **options):
     """Runs a survey unless all its parts exist."""
-    step = Survey(
+    step = FeatureExtraction(
         source, roles, tuple(methods), PAPER_PROTOCOL, files, **options
     )
     if not step.is_done():
@@ -126,7 +126,7 @@ def source(recorded):
 
 @pytest.fixture
 def files(tmp_path):
-    return SurveyFiles(tmp_path / "survey")
+    return FeatureFiles(tmp_path / "survey")
 
 
 def test_stored_surveys_equal_computed_ones(recorded, source, files):
@@ -193,34 +193,34 @@ def test_only_missing_or_stale_parts_are_computed(source, files):
 def test_a_recording_is_identified_by_its_files(tmp_path):
     folder = tmp_path / "metropolis_01"
     drive(folder, "01", "a")
-    first = RecordedDrive(folder).identity()
-    assert RecordedDrive(folder).identity() == first
+    first = RecordingSource(folder).identity()
+    assert RecordingSource(folder).identity() == first
     link = tmp_path / "link"
     link.symlink_to(folder)
-    assert RecordedDrive(link).identity() == first
+    assert RecordingSource(link).identity() == first
     (path,) = folder.glob("*.mcap")
     content = path.read_bytes()
     path.unlink()
     drive(tmp_path / "other" / "metropolis_01", "02", "a")
     (other,) = (tmp_path / "other").rglob("*.mcap")
     other.rename(path)
-    assert RecordedDrive(folder).identity() != first
+    assert RecordingSource(folder).identity() != first
     path.write_bytes(content)
-    assert RecordedDrive(folder).identity() == first
+    assert RecordingSource(folder).identity() == first
     with pytest.raises(InputError, match=r"none: no such file"):
-        RecordedDrive(tmp_path / "none").identity()
+        RecordingSource(tmp_path / "none").identity()
 
 
 def test_a_copy_of_a_recording_is_the_same(tmp_path):
     folder = tmp_path / "metropolis_01"
     drive(folder, "01", "a")
     (path,) = folder.glob("*.mcap")
-    identities = [RecordedDrive(one).identity() for one in (folder, path)]
+    identities = [RecordingSource(one).identity() for one in (folder, path)]
     copy = tmp_path / "copy" / "metropolis_01"
     shutil.copytree(folder, copy)
     os.utime(copy / path.name, ns=(1, 1))
-    assert RecordedDrive(copy).identity() == identities[0]
-    assert RecordedDrive(copy / path.name).identity() == identities[1]
+    assert RecordingSource(copy).identity() == identities[0]
+    assert RecordingSource(copy / path.name).identity() == identities[1]
 
 
 def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
@@ -230,7 +230,7 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
             self.world_frame = "utm"
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
-    surveys = (SurveyFiles(tmp_path / "a"), SurveyFiles(tmp_path / "b"))
+    surveys = (FeatureFiles(tmp_path / "a"), FeatureFiles(tmp_path / "b"))
     survey(Source(recorded), (solid,), surveys[0])
     other = Source(Elsewhere(recorded))
     survey(other, (solid,), surveys[1])
