@@ -19,11 +19,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.simulation.station import plan_drive
 
 pytestmark = pytest.mark.slow
 
