@@ -3,13 +3,12 @@
 from collections.abc import Iterable, Sequence
 import csv
 import io
-import math
 from pathlib import Path
 import re
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
-from cns_drake.base.number_rows import other_separator
+from cns_drake.base.number_rows import other_separator, to_number
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
@@ -145,10 +144,7 @@ def number_within(text: str, largest: float, where: object) -> float:
         InputError: the text is not a number, or its absolute value exceeds
             `largest`. The message begins with `where`.
     """
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = to_number(text)
     if not abs(value) <= largest:
         raise InputError(
             f"{where}: {text[:40]!r} is no number up to {largest:g}"

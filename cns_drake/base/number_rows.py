@@ -130,4 +130,10 @@ def is_number(word: str) -> bool:
         float(word)
     except ValueError:
         return False
-    return "_" not in word
+    # Python would read 1_0 as 10, and digits of other scripts.
+    return "_" not in word and word.isascii()
+
+
+def to_number(text: str) -> float:
+    """Returns the number that a text is, or else NaN."""
+    return float(text) if is_number(text) else math.nan

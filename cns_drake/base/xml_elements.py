@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import math
 from pathlib import Path
 import re
 from typing import cast
@@ -12,6 +11,7 @@ from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.number_rows import to_number
 
 _MOST_BYTES = 256 * 2**20
 _MOST_ELEMENTS = 1_000_000
@@ -67,10 +67,7 @@ class Element(ElementTree.Element):
         if default is not None and name not in self.attrib:
             return default
         text = self.value(name)
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
+        value = to_number(text)
         if not abs(value) <= _LARGEST:
             fault = f"{text[:40]!r} is no number up to {_LARGEST:g}"
             raise ValueError(f"line {self.line}: {self.tag}: {name}: {fault}")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-import math
 from pathlib import Path
 
 import numpy as np
 
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError
+from cns_drake.base.number_rows import to_number
 from cns_drake.scene.labels import MAX_INSTANCE, Labels
 from cns_drake.scene.materials import (
     MATERIALS,
@@ -159,10 +159,7 @@ def load_structure_table(path: Path) -> StructureTable:
 def _reflectivity(text: str, where: str) -> float | None:
     if not text:
         return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = to_number(text)
     if not 0.0 <= value <= 1.0:
         raise InputError(
             f"{where}: reflectivity: {text!r} is not a number from 0 to 1"

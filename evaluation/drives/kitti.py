@@ -294,6 +294,8 @@ def _read_calibration(path: Path) -> dict[str, np.ndarray]:
                 raise InputError(
                     f"{path}: {key}: {values.shape[1]} numbers instead of 12"
                 )
+            if key in rows:
+                raise InputError(f"{path}: {key}: is there twice")
             rows[key] = values
     if "Tr" not in rows:
         raise InputError(f"{path}: Tr: missing")

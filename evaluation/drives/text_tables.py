@@ -157,6 +157,8 @@ def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
         ValueError: if a string is no such number.
     """
     try:
+        if not all(map(is_number, texts)):
+            raise ValueError
         return np.asarray(texts).astype(np.int64)
     except (ValueError, OverflowError):
         return np.array(
@@ -232,6 +234,8 @@ def _seconds_to_ns(text: str) -> int:
 
 def _to_ns(text: str, unit_ns: int) -> int:
     try:
+        if not is_number(text):
+            raise ValueError(text)
         stamp_ns = int((Decimal(text) * unit_ns).to_integral_value())
     except (ArithmeticError, ValueError) as error:
         raise ValueError(f"{text!r} is no time") from error

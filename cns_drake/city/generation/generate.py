@@ -15,6 +15,7 @@ import yaml
 from cns_drake.base.csv_files import csv_text, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, user_errors, write_text
+from cns_drake.base.number_rows import to_number
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of
@@ -221,10 +222,7 @@ def _has_changed(
 def _read(table: Path) -> list[_Row]:
     rows = []
     for line, row in read_records(table, _COLUMNS):
-        try:
-            xy = float(row["x"]), float(row["y"])
-        except ValueError:
-            xy = np.nan, np.nan
+        xy = to_number(row["x"]), to_number(row["y"])
         if not np.isfinite(xy).all():
             raise InputError(f"{table}: line {line}: no finite x and y")
         rows.append(_Row(row["name"], row["class"], xy, row["tags"]))

@@ -105,6 +105,16 @@ def test_whole_numbers():
 
 def test_numbers_up_to_a_size():
     assert number_within("-2e0", 2.0, "x") == -2.0
-    for text in ("", "abc", "nan", "inf", "-inf", "2.0000001", "1e1000000"):
+    for text in (
+        "",
+        "abc",
+        "nan",
+        "inf",
+        "-inf",
+        "2.0000001",
+        "1e1000000",
+        "1_0",
+        "٢",
+    ):
         with pytest.raises(InputError, match=r"^x: .* is no number up to 2"):
             number_within(text, 2.0, "x")

@@ -254,6 +254,8 @@ def eleven_columns(root, folder):
         (eleven_columns, "rows of 11 numbers instead of 12"),
         (replace("calib.txt", "Tr:", "Tr_velo_to_cam:"), "Tr: missing"),
         (replace("calib.txt", "Tr: ", "Tr: 0 "), "Tr: 13 numbers"),
+        (replace("calib.txt", "P3:", "Tr:"), "Tr: is there twice"),
+        (replace("calib.txt", "P1:", "P0:"), "P0: is there twice"),
         (replace("calib.txt", "Tr: ", "Tr: x"), "Tr: could not convert 'x4"),
     ],
 )

@@ -101,7 +101,19 @@ def test_faults_of_rows_are_in_our_words(tmp_path, text, fault):
 
 
 @pytest.mark.parametrize(
-    "text", ["1e1000000", "-1e999999", "9" * 5000, "1e19", "inf", "nan", "0x1"]
+    "text",
+    [
+        "1e1000000",
+        "-1e999999",
+        "9" * 5000,
+        "1e19",
+        "inf",
+        "nan",
+        "0x1",
+        "1_0",
+        "1_0.5",
+        "٢",
+    ],
 )
 def test_times_that_are_none(text):
     for parse in (parse_seconds, parse_stamps_ns):
