@@ -136,10 +136,10 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what methods and outside networks keep; returns the title.
+    """Draws what methods and outside networks retain; returns the title.
 
-    The networks were measured by R@1 alone, with queries that are not turned,
-    so that a panel of its own shows all methods that were measured so.
+    The networks were measured only by R@1, without random yaw. A panel of its
+    own shows all methods that were measured like this.
     """
     numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
     tables = [kept_shares(name) for name in ("stages", "fresh")]
@@ -168,7 +168,7 @@ def survival(path: Path) -> str:
     names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
     panels[0].set_yticks(range(len(order)), names)
     for axes, metric in zip(panels, ("AUC", "AUC strict"), strict=True):
-        axes.set_xlabel(f"{metric} kept [%]")
+        axes.set_xlabel(f"retained {metric} [%]")
     finding = (
         f"{numbers[len(survivors)]} of {numbers[len(order)].lower()} methods"
         " survive a rebuilt city:\nboth are this project's own (*)"
@@ -192,7 +192,7 @@ def survival(path: Path) -> str:
         mark = "*" if key in OURS else "†" if row in _NETWORKS else ""
         names.append((title(key) if key else row) + mark)
     below.set_yticks(range(len(rows)), names)
-    below.set_xlabel("R@1 kept [%], queries that are not turned")
+    below.set_xlabel("retained R@1 [%], without random yaw")
     below.set_title(
         "● Metropolis   ○ Suburbia   † network trained by others",
         loc="left", x=-0.25,
@@ -207,7 +207,7 @@ def survival(path: Path) -> str:
 
 
 def outside_shares() -> dict[str, dict[tuple[str, str], float]]:
-    """Returns the R@1 that methods and networks of others keep.
+    """Returns the retained R@1 of methods and of networks of others.
 
     Returns:
         Method -> (city, weights of a network or "") -> R@1 in the map of the
@@ -229,7 +229,7 @@ def outside_shares() -> dict[str, dict[tuple[str, str], float]]:
 
 
 def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
-    """Returns method -> the shares of a metric that it keeps, one a pair.
+    """Returns method -> retained shares of a metric, one for each pair.
 
     Args:
         table: `stages` or `fresh`, a shipped table.
@@ -244,7 +244,7 @@ def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
 
 
 def assumptions(path: Path) -> None:
-    """Draws what BTC keeps after 40 years, by where new furniture stands."""
+    """Draws what BTC retains after 40 years, by where new furniture stands."""
     head, *rows = _table("docs/ageing.md", "In the row *none*")
     colour, _, marker = METHOD_STYLES["btc"]
     figure = Figure(figsize=(_WIDTH, 6.6), layout="constrained")
@@ -264,7 +264,7 @@ def assumptions(path: Path) -> None:
     axes.set_yticks(list(ticks), ticks.values())
     axes.set(xlim=(0.0, 122.0), ylim=(y - 0.7, -0.7))
     axes.axvline(100.0, color=PALE, zorder=0)
-    axes.set_xlabel("AUC that BTC keeps in a map 40 years old [%]")
+    axes.set_xlabel("retained AUC of BTC in a map 40 years old [%]")
     axes.set_title(f"{head[0]}:", loc="left")
     _plain(axes)
     _head(
@@ -278,7 +278,7 @@ def assumptions(path: Path) -> None:
 def ranking(path: Path) -> None:
     """Draws the mean AUC strict and AUC over the radius of a match."""
     metrics = {"auc_strict": "AUC strict", "auc": "AUC"}
-    gates = {"0": "without gate", "1": "with gate"}
+    gates = {"0": "not verified", "1": "verified"}
     kinds = {
         "shipped": "shipped cities",
         "fresh": "fresh cities",
@@ -313,8 +313,8 @@ def ranking(path: Path) -> None:
     grid[-1][1].set_xlabel("radius of a match [m]")
     _head(
         figure,
-        "Layered overlap is best with the gate;\n"
-        "without it, the radius decides",
+        "Layered overlap is best with geometric\n"
+        "verification; without it, the radius decides",
     )
     figure.legend(
         *grid[0][0].get_legend_handles_labels(), loc="outside lower center",
@@ -355,7 +355,7 @@ def years(path: Path) -> None:
         _plain(axes, "both")
     for axes in grid[1]:
         axes.set_xlabel("age of the map [years]")
-    figure.supylabel("AUC kept [%]", fontsize=13)
+    figure.supylabel("retained AUC [%]", fontsize=13)
     _head(figure, "BTC fails in each city as its map grows old")
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(
@@ -370,7 +370,7 @@ def ladder(path: Path) -> None:
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
     chart = {"kind": "matrix", "over": "cause", "metric": "kept"}
     drawn = charts.draw(chart, results, 480)
-    _head(drawn.figure, "Fog, another lane\nand another LiDAR cost most")
+    _head(drawn.figure, "Weather, lateral offset\nand another sensor cost most")
     drawn.figure.savefig(path, dpi=220)
 
 

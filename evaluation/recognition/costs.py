@@ -114,8 +114,8 @@ def query_ms(
     """Returns the median CPU time of several queries, on one core [ms].
 
     A query is compared with all places, including the method's second stage if
-    it has one. Geometric verification (the gate) and the pose of the best place
-    do not count: not each method has them, and they take the same time however
+    it has one. Geometric verification and the pose of the top-ranked place do
+    not count: not each method has them, and they take the same time however
     many places there are. The first query does not count.
 
     Args:

@@ -1,4 +1,4 @@
-"""Tells wrong best places elsewhere apart, by both drives' scans."""
+"""Finds why top-ranked places are wrong, from both drives' scans."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,10 +21,17 @@ FAULT_KINDS = (
     *(one for one in FAULTS if one not in ("other_city", ELSEWHERE)),
     *ELSEWHERE_KINDS,
 )
+# Names of reasons in words, where these differ from the values in tables.
+_WORDS = {"too_far": "near miss", "twin": "perceptual aliasing"}
 # Overlap below which two scans show different surroundings.
 _ENOUGH = 0.5
 # Share of the surroundings that must have changed for the reason `changed`.
 MUCH_CHANGED = 0.25
+
+
+def fault_words(kind: str) -> str:
+    """Returns the name of a reason in words, such as `near miss`."""
+    return _WORDS.get(kind, kind.replace("_", " "))
 
 
 @dataclass(frozen=True)
@@ -92,20 +99,21 @@ class PairEvidence:
 def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
     """Returns, for each query, why its best place is wrong.
 
-    The best place is the one that the method ranks first. The right place is
-    the match whose scan shows most of the query's scan.
+    The right place is the match whose scan shows most of the query's scan.
 
     Returns:
-        For each of Q queries, "" if the best place is a match, and otherwise
-        the reason as `evaluation.recognition.place_outcome.faults` finds it.
-        In place of `elsewhere` stands the first of these kinds that applies:
+        For each of Q queries, "" if the top-ranked place is a match, and
+        otherwise the reason as `evaluation.recognition.place_outcome.faults`
+        finds it. In place of `elsewhere` stands the first of these kinds that
+        applies:
 
         - `occluded`: the right place's scan shows less than half of the query's
-          scan, and at least half of the rest is hidden from its sensor.
+          scan, and at least half of the rest is occluded for its sensor.
         - `no_overlap`: the right place's scan shows less than half of the
           query's scan, for another reason.
         - `changed`: at least a quarter of the surroundings is new or gone.
-        - `twin`: the best place fits the query as well as the right place does.
+        - `twin` (perceptual aliasing): the top-ranked place resembles the query
+          as much as the right place does.
         - `unexplained`: no other kind applies.
     """
     reasons = result.columns["why"]

@@ -60,8 +60,8 @@ class PlaceOutcome:
         method: name of the method; if it has settings, with them.
         database: name of the drive of the places.
         query: name of the drive of the queries.
-        protocol: protocol with the method's own choices. Its gate and radius
-            are those of the outcome.
+        protocol: protocol with the method's own choices. Its radius, and
+            whether it has geometric verification, are those of the outcome.
         protocol_name: name of the protocol in tables, see
             `RetrievalProtocol.name_with`.
         outcomes: outcomes of Q queries.
@@ -110,8 +110,8 @@ class PlaceOutcome:
         Args:
             name: name of the method, with its settings.
             method: the method.
-            protocol: protocol of the retrieval, with the gate that has changed
-                the scores, and the radius of a match.
+            protocol: protocol of the retrieval: the radius of a match, and
+                whether geometric verification has changed the scores.
             retrieval: scores and truth of Q queries and D places.
             query: name of the drive of the queries, and time stamps (Q,) [ns]
                 and positions (Q, 3) [m] of the queries.
@@ -175,10 +175,10 @@ class PlaceOutcome:
 
     @property
     def is_gated(self) -> bool:
-        """Whether the gate was used.
+        """Whether geometric verification was used.
 
-        It rejects places that lie too far away by the method's own pose
-        estimate.
+        Geometric verification rejects places that lie too far away according to
+        the method's own pose estimate.
         """
         return self.protocol.gate
 
@@ -370,7 +370,7 @@ class Number(NamedTuple):
     Attributes:
         method: method, estimator or baseline; "" if there is none. For a place
             recognition method, it is the method's name with its settings.
-        gate: whether the gate was used.
+        gate: whether geometric verification was used.
         metric: name of the metric.
         value: its value.
         interval: its 95 % interval.

@@ -146,9 +146,9 @@ def pose_metrics(errors: PoseErrors, outcomes: QueryOutcomes) -> PoseMetrics:
 
 
 def pose_success(errors: PoseErrors, outcomes: QueryOutcomes) -> float:
-    """Returns, of the queries with a match, the share with a right pose.
+    """Returns the pose success: a share of the queries with a match.
 
-    A pose is right within 2 m and 5 deg of the truth; see
+    A pose is a success within 2 m and 5 deg of the ground truth; see
     `PoseMetrics.success`.
     """
     # A method that finds no place localises no query.

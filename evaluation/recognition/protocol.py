@@ -58,15 +58,15 @@ class RetrievalProtocol:
             show to be a match, at any distance (see
             `evaluation.recognition.overlap_truth`). None if places within
             `radius` are matches.
-        gate: whether to reject top-ranked places that lie beyond the radius
-            according to the method's own pose estimate.
-        turn_queries: whether each query is turned by a random yaw. Places stay
+        gate: geometric verification, which rejects top-ranked places that lie
+            beyond the radius according to the method's own pose estimate.
+        turn_queries: whether each query is rotated by a random yaw. Places stay
             as recorded.
         tilt_queries: largest random roll and pitch by which each query is
             tilted, from 0 to 90 [deg].
-        hide_sector: angle of a random sector that is hidden from each query,
+        hide_sector: angle of a random sector that is occluded in each query,
             from 0 to below 360 [deg].
-        seed: seed of the random turns, tilts and hidden sectors.
+        seed: seed of the random yaws, tilts and occluded sectors.
 
     Raises:
         InputError: a value is out of range; the message names the command-line
@@ -179,7 +179,8 @@ class RetrievalProtocol:
 
         Only a shipped protocol as it is has its name; if any field that changes
         a number differs, such as the radius or a spacing, the name is `own`.
-        The gate does not count, because tables have a column for it.
+        Geometric verification does not count, because tables have a column for
+        it.
         """
         return self._named(lambda one: one)
 
@@ -204,7 +205,8 @@ class RetrievalProtocol:
         """Returns a hash of everything in the protocol that changes a number.
 
         Two results can be compared only if their protocols have the same
-        digest. The gate does not count, because tables have a column for it.
+        digest. Geometric verification does not count, because tables have a
+        column for it.
 
         Args:
             further: settings outside of the protocol that change a number, such
@@ -237,7 +239,7 @@ class RetrievalProtocol:
 
     @property
     def gate_radius(self) -> float | None:
-        """Greatest distance that the gate accepts [m]; None without a gate."""
+        """Radius of geometric verification [m]; None without it."""
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
@@ -319,10 +321,10 @@ class RetrievalProtocol:
         return text
 
 
-# The gate in words, for readers of a table.
+# Geometric verification in words, for readers of a table.
 GATE_TEXT = (
-    "With the gate: each method's own pose says how far a place is from the"
-    " query, and places beyond the radius are rejected."
+    "With geometric verification: each method's own pose says how far a place"
+    " is from the query, and places beyond the radius are rejected."
 )
 
 RECORDED_PROTOCOL = RetrievalProtocol()

@@ -140,18 +140,18 @@ def compare_with_gates(
     overlaps: np.ndarray | None = None,
     is_known: np.ndarray | None = None,
 ) -> list[Retrieval]:
-    """Returns the scores after each of several gates.
+    """Returns the scores after geometric verification with several radii.
 
-    A gate rejects places that lie beyond a radius according to the method's own
-    pose estimate. Queries are described and scored only once.
+    Geometric verification rejects places that lie beyond a radius according to
+    the method's own pose estimate. Queries are described and scored only once.
 
     Args:
         method: method that described both drives.
         database: drive with described places.
         query: drive with described queries, in the same world frame.
-        protocol: protocol by which both drives were described; its own gate
+        protocol: protocol by which both drives were described; its field `gate`
             does not matter.
-        gate_radii: radius of each gate [m]; None stands for no gate.
+        gate_radii: radii of geometric verification [m]; None stands for none.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
         is_known: (Q, D) bool, which places are allowed for each query; by

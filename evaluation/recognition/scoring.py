@@ -1,4 +1,4 @@
-"""Checks a method's scores, applies the gate and ranks places."""
+"""Checks a method's scores, verifies places by their poses, ranks them."""
 
 from collections.abc import Sequence
 import contextlib
@@ -36,9 +36,9 @@ def ranked_places(scores: np.ndarray) -> np.ndarray:
 def gate_weight(
     distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
 ) -> np.ndarray:
-    """Returns the factor from 1 to 0 by which the gate scales a score.
+    """Returns the factor by which geometric verification scales a score.
 
-    The factor is 1 for near places, 0 for far ones, and 1/2 at the radius.
+    The factor is 1 for near places, 0 for far places, and 1/2 at the radius.
 
     Args:
         distance: distances from query to place according to the method's own
@@ -57,14 +57,15 @@ def gated(
     scores: np.ndarray,
     radii: Sequence[float],
 ) -> list[np.ndarray]:
-    """Returns the scores (D,) after the gate, one array for each radius.
+    """Returns scores after geometric verification: (D,) for each radius.
 
-    The gate tests the `NUM_GATED` places with the best scores. The method
-    estimates the distance of each from the query, and `gate_weight` returns a
-    weight w from 1 (near) to 0 (far). If w is 0, the place is rejected: its
-    score becomes NaN. Otherwise the score s becomes s - (1 - w) |s|; a positive
-    score is thus multiplied by w. A place for which the method estimates no
-    pose keeps its score. Scores of places that are not tested become NaN.
+    Geometric verification tests the `NUM_GATED` places with the best scores.
+    The method estimates the distance of each from the query, and `gate_weight`
+    returns a weight w from 1 (near) to 0 (far). If w is 0, the place is
+    rejected: its score becomes NaN. Otherwise the score s becomes s - (1 - w)
+    |s|; a positive score is thus multiplied by w. A place for which the method
+    estimates no pose keeps its score. Scores of places that are not tested
+    become NaN.
 
     If the method estimates no pose at all, all scores stay the same.
 
@@ -115,8 +116,8 @@ def score_places(
 ) -> np.ndarray:
     """Returns a method's scores for the last of several queries, (D,).
 
-    The scores are float64, and include the method's second stage, if it has
-    one, and the gate.
+    The scores are float64, and include geometric verification and the method's
+    second stage, if there is one.
 
     Args:
         method: method that described queries and places.
@@ -127,8 +128,8 @@ def score_places(
         is_known: (D,) bool, which places may be candidates. If this excludes a
             place, the query is compared with every place, because a search for
             a few best places might return only excluded ones.
-        gate_radius: radius of a match [m], at which the gate takes effect (see
-            `gated`); None without a gate.
+        gate_radius: radius of geometric verification [m] (see `gated`); None
+            for none.
         exhaustive: whether to compare also with places that a search would skip
             only to save time.
         where: the name of the current query, for errors.

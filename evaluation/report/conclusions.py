@@ -54,10 +54,9 @@ def ranked_methods(
 def beside(results: Results) -> dict[str, dict[str, float]]:
     """Returns further columns of the ranking: column -> method -> mean.
 
-    The columns are shares of the queries with a match: queries whose best place
-    is right; queries whose best place is wrong, but at most twice the radius of
-    a match away; and queries with a correct pose. The means are over the pairs
-    of drives with results of all methods.
+    The columns are shares of the queries with a match: R@1; near misses, which
+    are wrong top-ranked places within twice the radius of a match; and the pose
+    success. The means are over the pairs of drives with results of all methods.
     """
     rows = results.where({STAGE: OWN})
     r1, far, matched, pose = (
@@ -68,7 +67,7 @@ def beside(results: Results) -> dict[str, dict[str, float]]:
         )
     )
     far = {name: far[name] / max(matched[name], 1.0) for name in far}
-    return {"R@1": r1, "only too far": far, "right pose": pose}
+    return {"R@1": r1, "near miss": far, "pose success": pose}
 
 
 def _headline(
@@ -224,7 +223,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 
 
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
-    """Returns a table, for print, of how much of its AUC each method keeps.
+    """Returns a table, for print, of how much of its AUC each method retains.
 
     The share that a method keeps is its AUC with change, divided by its AUC
     without change.
@@ -249,7 +248,7 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
 def _shown(
     group: str, metric: str, kept: str | None = None
 ) -> tables.Columns[Survival]:
-    """Returns table columns: a metric without change, with change, and kept."""
+    """Returns columns: a metric without change, with change, and retained."""
 
     def share(one: Survival) -> str | None:
         row = one.after.get(str(kept))
@@ -263,11 +262,11 @@ def _shown(
         ),
         (group, "with change"): lambda s: s.number("after", metric),
     }
-    return columns if kept is None else columns | {(group, "kept"): share}
+    return columns if kept is None else columns | {(group, "retained"): share}
 
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
-    """Returns one or two sentences on the share of AUC that methods keep."""
+    """Returns one or two sentences on the retained AUC of methods."""
     groups = tables.by_pair(survivals)
     known = [one for one in survivals if one.before]
     without = len(groups) - len(tables.by_pair(known))
@@ -288,7 +287,7 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
         number = len(groups) - without
         over = f"median of {number} pairs" if number > 1 else "one pair"
         parts.append(
-            f"Share of its AUC without change that each method keeps ({over}):"
+            f"Retained AUC, relative to the AUC without change ({over}):"
             f" {listed}."
         )
     if without:

@@ -23,7 +23,11 @@ from cns_drake.base.files import write_text
 from cns_drake.base.listing import natural_key
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost
-from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
+from evaluation.recognition.fault_kinds import (
+    FAULT_KINDS,
+    PairEvidence,
+    fault_words,
+)
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report import conclusions, result_tables
@@ -90,7 +94,7 @@ class Report:
 
     Attributes:
         results: the results of all pairs and of their controls, with or without
-            the gate as the report's protocol says.
+            geometric verification as the report's protocol says.
         changes: change between the stages of each map.
         pairs: place recognition results of each pair of drives and, if there
             is one, of its control (the same routes without a change of the
@@ -309,7 +313,7 @@ def write_page(path: Path, report: Report) -> None:
         "survivals_by_pair": by_pair(report.survivals),
         "drives_of_maps": drives_of_maps,
         "other_forms": list(forms_of_table)[1:],
-        "fault_kinds": FAULT_KINDS,
+        "fault_kinds": {kind: fault_words(kind) for kind in FAULT_KINDS},
         "image_step": data["imageStep"] if data else 1,
     }
     sections = [

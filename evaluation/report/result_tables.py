@@ -23,6 +23,7 @@ from evaluation.recognition.fault_kinds import (
     FAULT_KINDS,
     PairEvidence,
     fault_kinds,
+    fault_words,
 )
 from evaluation.recognition.metrics import (
     MODES,
@@ -465,7 +466,7 @@ def pose_error_numbers(results: Sequence[PlaceOutcome]) -> Table:
 
 
 class _Faults(NamedTuple):
-    """Why best places of a result are wrong: reasons, and changed classes."""
+    """Why top-ranked places are wrong: reasons, and changed classes."""
 
     result: PlaceOutcome
     kinds: Counter[str]
@@ -483,7 +484,7 @@ class _Faults(NamedTuple):
 
 
 def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
-    """Returns a table, for print, of the reasons why best places are wrong."""
+    """Returns a table, for print, why top-ranked places are wrong."""
 
     def share(one: _Faults, kind: str) -> str | None:
         part = one.kinds[kind] / max(one.wrong, 1)
@@ -494,7 +495,7 @@ def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
         {
             **_inner(_SHOWN),
             "wrong": lambda one: one.wrong,
-            **keyed({k.replace("_", " "): k for k in FAULT_KINDS[1:]}, share),
+            **keyed({fault_words(k): k for k in FAULT_KINDS[1:]}, share),
             "changed by": lambda one: (
                 ", ".join(
                     f"{n} {name}" for name, n in one.changed.most_common()
@@ -507,10 +508,10 @@ def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
 
 
 def fault_numbers(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
-    """Returns the table `why.csv`: why best places were wrong.
+    """Returns the table `why.csv`: why top-ranked places were wrong.
 
     For each method on each pair of drives, it counts the queries with a wrong
-    best place, by reason.
+    top-ranked place, by reason.
     """
     return Table.of(
         _count_faults(results, evidence),

@@ -13,9 +13,10 @@
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
 show. By default, the task is `place`, or else the only task with the metric,
-and the gate is 0. Each method has the same colour in all charts. The title says
-in words what the chart shows. Where the answers to all queries are known, it
-also says which methods differ by the test of `evaluation.recognition.metrics`.
+and `gate` is 0 (without geometric verification). Each method has the same
+colour in all charts. The title says in words what the chart shows. Where the
+answers to all queries are known, it also says which methods differ by the test
+of `evaluation.recognition.metrics`.
 """
 
 from collections import Counter
@@ -45,6 +46,7 @@ from evaluation.results.headlines import (
 from evaluation.results.ranges import checked
 from evaluation.results.smoothing import curves
 from evaluation.results.summaries import (
+    CAUSE,
     LEAST_POINTS,
     correlations,
     means,
@@ -86,7 +88,7 @@ _METRICS = {
     "auc": "AUC",
     "auc_strict": "AUC strict",
     "r1": "R@1",
-    "kept": "kept share",
+    "kept": "retained share",
     "tcr_sym": "TCR_sym",
     "miou": "mean IoU",
     "visible_change_added": "visible change minus the baseline's",
@@ -96,6 +98,12 @@ _METRICS = {
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
 # Values of the factor `both.stage`, in words.
 _STAGES = {LAST: "without the change", OWN: "with the change"}
+# Causes in words, where these differ from the values in tables.
+_CAUSES = {
+    "hidden": "occluded sector",
+    "lateral": "lateral offset",
+    "turn": "random yaw",
+}
 # Told apart by all kinds of colour vision, and light enough for letters.
 _COLOURS = LinearSegmentedColormap.from_list(
     "shares", colormaps["RdYlBu"](np.linspace(0.15, 0.8, 64))
@@ -356,7 +364,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     shares = {name: 100.0 * median_kept(kept[name]) for name in kept}
     number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
     message = (
-        f"Share of the {words(chart.metric)} that is kept, {number}:"
+        f"Share of the {words(chart.metric)} that is retained, {number}:"
         f" {from_least_to_greatest(shares, _PERCENT)}"
     )
     return chart.tested(message, after), figure
@@ -481,6 +489,8 @@ def value_words(value: object, factor: str = "") -> str:
     """Returns the value of a factor in words; lists have no brackets."""
     if factor == STAGE:
         return _STAGES.get(str(value), str(value))
+    if factor == CAUSE and value in _CAUSES:
+        return _CAUSES[str(value)]
     if isinstance(value, float):
         return f"{value:g}"
     text = re.sub(r"[\[\]]", "", str(value).replace("_", " "))

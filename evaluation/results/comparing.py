@@ -208,8 +208,8 @@ def compare(
             or, in a table without this protocol, the table's only protocol.
             Rows whose protocols differ in anything that changes a number (see
             `RetrievalProtocol.digest`) are never compared.
-        gate: whether to compare the rows with the gate (true) or without it
-            (false).
+        gate: whether to compare the rows with geometric verification (true) or
+            those without (false).
         rankings: whether to compare only the order of the methods in these
             tables, without the shipped ones. The tables need no condition in
             common; one can contain simulated drives and another real drives.
@@ -232,7 +232,8 @@ def compare(
     for path, results in zip(paths, read, strict=True):
         chosen_rows = results.where(wanted).rows
         if not chosen_rows:
-            chosen = f"{metric} {'with' if gate else 'without'} the gate"
+            with_or = "with" if gate else "without"
+            chosen = f"{metric} {with_or} geometric verification"
             by = f" by protocol {protocol}" if protocol else ""
             known = ", ".join(sorted(results.distinct("metric")))
             raise InputError(

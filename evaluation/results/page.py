@@ -202,9 +202,9 @@ def _corners(marker: str) -> str:
 def _summary(results: Results, task: str) -> dict[str, Any]:
     """Returns a table of a task's main results: a row for each method.
 
-    Results without and with the gate are in different rows. If there are few
-    conditions, each column is a condition with the task's main metric;
-    otherwise each column is a metric, averaged over all conditions.
+    Results without and with geometric verification are in different rows. If
+    there are few conditions, each column is a condition with the task's main
+    metric; otherwise each column is a metric, averaged over all conditions.
     """
     rows = results.where(task=task).rows
     known = dict.fromkeys(row.metric for row in rows)
@@ -229,7 +229,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     lines = [
         {
             "name": (title_of(name) or "–")
-            + (", with the gate" if gate else ""),
+            + (", with geometric verification" if gate else ""),
             "cells": [found.get((name, gate, *one)) for one in columns],
         }
         for gate in sorted({row.gate for row in rows})

@@ -50,7 +50,7 @@ _RANGES = (
     (r"(paper_s_)?(auc|r1|r@\d+%?|f1|f1max)(_(?!kept)\w+)?", _SHARE),
     (r"strict|precision\w*|recall\w*|success\w*|pose_success\w*", _SHARE),
     (r"mean_reciprocal_rank|(match_)?auroc\w*|(\w+_)?m?iou\w*|p", _SHARE),
-    (r"(\w+_)?kept\w*", _NOT_NEGATIVE),
+    (r"(\w+_)?kept\w*|retained\w*|\w+_retained", _NOT_NEGATIVE),
     (r"with_match|n_with_a_match|queries|wrong|tp?_of_[\w@]+", _COUNT),
     (r"(of_)?places|scans_a_place|first_right_rank", _COUNT),
     (r"accepted_matches", _COUNT),

@@ -108,8 +108,8 @@ class Summary(NamedTuple):
         map: name of the map.
         task: the task from whose results it is computed.
         method: name of the method, with its settings.
-        gate: whether the gate was used, which rejects places by the method's
-            own pose estimate.
+        gate: whether geometric verification was used, which rejects places by
+            the method's own pose estimate.
         value: the number.
         low, high: limits of its interval or range; NaN if unknown.
         n: number of conditions from which it is computed; None if unknown.
@@ -138,8 +138,8 @@ class Summary(NamedTuple):
 
         Args:
             what: name of the number.
-            key: names the map, the task and the method, and tells whether the
-                gate was used.
+            key: names the map, the task and the method, and says whether
+                geometric verification was used.
             value: the number itself.
             low, high: its interval or range.
         """
@@ -319,8 +319,8 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 
     `x` is a factor or another metric. The value of a metric comes from a row
     with the same condition and, in this order of preference: the same method
-    and gate; the same method without the gate; no method, such as a row of
-    `tcr_sym`. Rows for which there is no value of `x` are left out.
+    and `gate`; the same method without geometric verification; no method, such
+    as a row of `tcr_sym`. Rows for which there is no value of `x` are left out.
     """
     wider: tuple[tuple[str, ...], ...] = (
         ("task", "protocol"),
@@ -348,10 +348,11 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 def growths(results: Results, over: str, metric: str) -> list[Summary]:
     """Returns how fast a metric grows with a factor or another metric.
 
-    Rows of the same experiment, map and method, all with or all without the
-    gate, form a curve of the metric. For each two neighbouring points of a
-    curve, there is a summary whose value is an exponent: 1 if the metric grows
-    in proportion between them, 2 if it grows with the square.
+    Rows of the same experiment, map and method, all with or all without
+    geometric verification, form a curve of the metric. For each two
+    neighbouring points of a curve, there is a summary whose value is an
+    exponent: 1 if the metric grows in proportion between them, 2 if it grows
+    with the square.
 
     Args:
         results: the table of results.
@@ -386,8 +387,7 @@ def correlations(
 
     Args:
         results: the table of results. Its rows must be either all measured with
-            the gate, which rejects places by the method's own pose estimate, or
-            all without it.
+            geometric verification, or all without.
         x: name of the factor or metric.
         metric: name of a metric of place recognition.
     """

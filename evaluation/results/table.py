@@ -118,7 +118,8 @@ class Key:
             does not apply is missing or None.
         task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
         method: method, estimator or baseline; "" for the task `change`.
-        gate: whether places were rejected by the method's own pose.
+        gate: whether geometric verification rejected places, by the method's
+            own pose.
         protocol: name of the protocol: `fair`, `paper` or `recorded` for the
             shipped protocol as it is, and `own` for any other.
         protocol_digest: hash of everything in the protocol that changes a

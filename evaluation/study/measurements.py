@@ -145,8 +145,9 @@ def measure_places(
     """Returns the outcomes of methods, for several radii of a match.
 
     There are two outcomes for each method and radius. The first counts all
-    candidates. For the second (with the gate), candidates are rejected that lie
-    beyond the radius according to the method's own pose estimate.
+    candidates. The second is with geometric verification, which rejects
+    candidates that lie beyond the radius according to the method's own pose
+    estimate.
 
     A method that would take more than an hour for all queries is left out.
 

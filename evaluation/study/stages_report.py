@@ -384,7 +384,7 @@ class _CityReport:
     def _outcomes(
         self, pair: Recordings, parts: Iterable[Result]
     ) -> list[PlaceOutcome]:
-        """Returns outcomes with the names and the gate that the page shows.
+        """Returns the outcomes that the page shows, with the page's names.
 
         Methods for which no query has a match are left out.
         """

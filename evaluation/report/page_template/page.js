@@ -16,12 +16,13 @@ function showStatus() {
   const best = method.best[state.query];
   if (best.length) {
     byId("status").append(
-      ` – best match ${metres(state.query, best[0])} away, score ` +
+      ` – top-ranked place ${metres(state.query, best[0])} away, score ` +
       method.scores[state.query][0].toFixed(4));
   }
   const why = method.why?.[state.query];
   if (kind === "wrong" && why)
-    byId("status").append(` – ${why.replace("_", " ")}`);
+    byId("status").append(
+      ` – ${byId("why").querySelector(`[value="${why}"]`).textContent}`);
   byId("query").value = state.query;
   byId("query").setAttribute(
     "aria-valuetext", `query ${state.query + 1}: ${WORDS[kind]}`);
@@ -31,7 +32,7 @@ function showStatus() {
     "query", "Query", pair.query, pair.queries[state.query]);
   const place = best[state.rank];
   showCaption(
-    "match", `Match ${state.rank + 1}`, pair.database, pair.places[place]);
+    "match", `Place ${state.rank + 1}`, pair.database, pair.places[place]);
 }
 
 /** Says below a scan which it is; an index of undefined stands for none. */
@@ -193,7 +194,7 @@ function readAddress() {
   return true;
 }
 
-/** The first query that has a true place; else the first. */
+/** The first query that has a match; else the first. */
 function firstPlaced() {
   return Math.max(0, pairNow().matches.findIndex((places) => places.length));
 }

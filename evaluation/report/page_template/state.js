@@ -13,7 +13,7 @@ const COLOURS = {
 const WORDS = {
   right: "right",
   wrong: "wrong",
-  none: "no true place",
+  none: "no match",
   silent: "no candidate",
 };
 const byId = (id) => document.getElementById(id);

@@ -193,7 +193,7 @@ def measure_costs(
 
 
 def _same(before: Outcomes | None, now: PlaceOutcome) -> PlaceOutcome | None:
-    """Returns the baseline's outcome with the method and gate of `now`."""
+    """Returns the baseline's outcome with `now`'s method and verification."""
     for one in before or ():
         if (one.method, one.is_gated) == (now.method, now.is_gated):
             return one

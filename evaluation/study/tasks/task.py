@@ -409,9 +409,9 @@ class Task(abc.ABC):
     def answers(self, found: Any) -> Iterable[Answered]:
         """Yields the answers of each method to all queries; by default none.
 
-        Each item has three parts: the method; whether the gate was used (see
-        `evaluation.recognition.scoring.gated`); and a mapping from columns of
-        `queries.csv` to values (Q,).
+        Each item has three parts: the method; whether geometric verification
+        was used (see `evaluation.recognition.scoring.gated`); and a mapping
+        from columns of `queries.csv` to values (Q,).
 
         Args:
             found: the task's result for a pair of drives.

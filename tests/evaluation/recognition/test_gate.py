@@ -192,7 +192,7 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
     assert status == 0
     assert json.loads(out)["protocol"]["gate"] is True
     _, out, _ = run_program(capsys, "pr", *both, "--gate")
-    assert "With the gate" in out
+    assert "With geometric verification" in out
     tables = []
     for options in ((), ("--gate",), ("--gate", "--radius", "1000")):
         output = tmp_path / "scores.csv"

@@ -220,8 +220,8 @@ def test_answers_that_are_only_too_far_stand_beside_the_ranking():
     ]
     assert beside(Results.of(rows)) == {
         "R@1": {"btc": pytest.approx(0.6)},
-        "only too far": {"btc": pytest.approx(0.3)},
-        "right pose": {"btc": pytest.approx(0.9)},
+        "near miss": {"btc": pytest.approx(0.3)},
+        "pose success": {"btc": pytest.approx(0.9)},
     }
 
 
@@ -334,9 +334,9 @@ def test_reasons_are_offered_and_counted(text):
     choice = text[text.index('<select id="why">') :]
     choice = choice[: choice.index("</select>")]
     assert re.findall(r'value="(\w*)"', choice) == ["", *FAULT_KINDS]
-    section = text[text.index("Why best places are wrong") :]
+    section = text[text.index("Why top-ranked places are wrong") :]
     row = re.search(r"<tr>.*?Scan Context\+\+.*?</tr>", section, re.S).group()
-    # Two that have a place are wrong: a twin, and no candidate.
+    # Two that have a place are wrong: perceptual aliasing, and no candidate.
     assert "<td>2</td>" in row
     assert re.findall(r"(\d+) %", row) == ["50", "50"]
 

@@ -220,14 +220,14 @@ def test_fingers_hit(browser, address):
 
 def test_slider_and_keys(reader):
     assert status(reader).startswith(
-        "Query 1 of 5, Scan Context++: right – best match 2.0 m away, score"
-        " 0.9000"
+        "Query 1 of 5, Scan Context++: right – top-ranked place 2.0 m away,"
+        " score 0.9000"
     )
     reader.press("ArrowRight")
     shown(reader, 0, 0, 1, 0)
     # From (10, 2) to (45, 0).
     assert status(reader).startswith(
-        "Query 2 of 5, Scan Context++: wrong – best match 35.1 m"
+        "Query 2 of 5, Scan Context++: wrong – top-ranked place 35.1 m"
     )
     reader.evaluate('byId("query").focus()')
     for key, query in (("ArrowRight", 2), ("ArrowLeft", 1)):
@@ -238,7 +238,7 @@ def test_slider_and_keys(reader):
         ' byId("query").dispatchEvent(new Event("input"))'
     )
     shown(reader, 0, 0, 4, 0)
-    assert "no true place" in status(reader)
+    assert "no match" in status(reader)
     # At the last query it stays there.
     reader.press("ArrowRight")
     reader.evaluate('byId("next").click()')
@@ -303,13 +303,13 @@ def test_only_those_of_one_reason(reader):
     choose(reader, "why", "twin")
     shown(reader, 0, 0, 1, 0)
     assert reader.evaluate('byId("filtered").value') == "1 of 5"
-    assert status(reader).endswith(" – twin")
+    assert status(reader).endswith(" – perceptual aliasing")
     choose(reader, "filter", "right")
     assert reader.evaluate('byId("filtered").value') == "0 of 5"
     choose(reader, "filter", "all")
     choose(reader, "why", "no_place")
     shown(reader, 0, 0, 4, 0)
-    assert status(reader).startswith("Query 5 of 5, Scan Context++: no true")
+    assert status(reader).startswith("Query 5 of 5, Scan Context++: no match")
     choose(reader, "why", "")
     assert reader.evaluate('byId("filtered").value') == "5 of 5"
 
@@ -337,7 +337,7 @@ def test_other_places_and_pairs(reader):
     reader.evaluate('byId("best").tBodies[0].rows[2].click()')
     shown(reader, 0, 0, 0, 2)
     caption = 'byId("match-caption").textContent'
-    assert reader.evaluate(caption) == "Match 3: metropolis_01, frame 2 "
+    assert reader.evaluate(caption) == "Place 3: metropolis_01, frame 2 "
     reader.press("ArrowRight")
     shown(reader, 0, 0, 1, 0)
     choose(reader, "pair", "1")

@@ -98,7 +98,7 @@ def test_table_for_print():
 
 def test_summary():
     assert survival_summary(of(SOME)) == (
-        "Share of its AUC without change that each method keeps (median of 2"
+        "Retained AUC, relative to the AUC without change (median of 2"
         " pairs): BTC 62 %, SOLiD 10 %."
     )
     assert survival_summary(of(SOME[:9])).endswith("(one pair): BTC 50 %.")

@@ -133,8 +133,24 @@ def test_a_matrix_has_strips_and_the_last_number():
         "none",
         "parked cars",
     ]
-    assert drawn.message == ("Least kept share: 0.60 (SOLiD; parked cars)")
+    assert drawn.message == ("Least retained share: 0.60 (SOLiD; parked cars)")
     assert not drawn.legend
+
+
+@pytest.mark.parametrize(
+    ("value", "factor", "text"),
+    [
+        ("hidden", "cause", "occluded sector"),
+        ("lateral", "cause", "lateral offset"),
+        ("turn", "cause", "random yaw"),
+        ("parked_cars", "cause", "parked cars"),
+        # Only a cause has a word of its own.
+        ("hidden", "map", "hidden"),
+        (2.0, "cause", "2"),
+    ],
+)
+def test_causes_have_the_words_of_the_field(value, factor, text):
+    assert charts.value_words(value, factor) == text
 
 
 def test_a_dumbbell_joins_both_ends():
@@ -153,8 +169,8 @@ def test_a_dumbbell_joins_both_ends():
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == ["SOLiD", "x", "y", "RING++", "x", "y"]
     assert shown(drawn.message) == (
-        "Share of the AUC that is kept, median of 2 pairs: from 20 % (SOLiD) to"
-        " 75 % (RING++)"
+        "Share of the AUC that is retained, median of 2 pairs: from 20 %"
+        " (SOLiD) to 75 % (RING++)"
     )
     assert drawn.figure.get_supxlabel() == (
         "AUC without the change (hollow) and with the change (filled)"
@@ -442,7 +458,7 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
         (
             {"kind": "dumbbell", "over": YEARS, "metric": "auc"},
             aged().where(method="solid", seed=0),
-            "Share of the AUC that is kept, one pair: 40 %",
+            "Share of the AUC that is retained, one pair: 40 %",
         ),
     ],
 )

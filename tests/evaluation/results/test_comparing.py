@@ -409,7 +409,9 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(capsys, ["compare", one, other], one, "in common")
     assert_refused(capsys, ["compare", one], "shipped tables")
     assert_refused(capsys, ["compare", one, "--metric", "r1"], "r1", "auc")
-    assert_refused(capsys, ["compare", one, "--gate"], "with the gate")
+    assert_refused(
+        capsys, ["compare", one, "--gate"], "with geometric verification"
+    )
     assert_refused(capsys, ["compare", one, "--protocol", "x"], "--protocol")
     assert_refused(capsys, ["compare", one, "--rankings"], "two tables")
     pair = ["compare", one, other, "--rankings"]
