@@ -1,12 +1,17 @@
 """The pose of a sensor on its carrier, the carrier's motion, and names."""
 
+from collections.abc import Collection
 import math
 
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame, RigidBody
 from pydrake.systems.framework import DiagramBuilder, InputPort, System
 
+from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.sensors.sensor_config import Mount
+
+# Endings of the names of an IMU's systems.
+IMU_PARTS = ("accelerometer", "gyroscope", "noise")
 
 
 def sensor_pose(mount: Mount) -> RigidTransform:
@@ -47,6 +52,30 @@ def body_and_pose(
     if isinstance(place, Frame):
         return place.body(), place.GetFixedPoseInBodyFrame() @ X_PS
     return place, X_PS
+
+
+def check_new_sensor(
+    builder: DiagramBuilder,
+    name: str,
+    own: str | None = None,
+    parts: Collection[str] = (),
+) -> None:
+    """Checks the name of a sensor that is added to a diagram.
+
+    Args:
+        builder: builder of the diagram.
+        name: the name.
+        own: a reserved name that this kind of sensor can have.
+        parts: endings of the names of its systems, after an underscore.
+
+    Raises:
+        ValueError: the name cannot be a part of a ROS 2 topic, is reserved, or
+            another system or sensor of the diagram has it.
+    """
+    check_sensor_name(name, own=own)
+    # An IMU has the first part, but no system of the name itself.
+    endings = dict.fromkeys((IMU_PARTS[0], *parts))
+    check_free(builder, name, *(f"{name}_{part}" for part in endings))
 
 
 def check_free(builder: DiagramBuilder, *names: str) -> None:

@@ -27,17 +27,20 @@ def check_topic_part(name: str) -> None:
         )
 
 
-def check_sensor_name(name: str, taken: Collection[str] = ()) -> None:
-    """Checks the name of a sensor with a frame and topics of its own.
+def check_sensor_name(
+    name: str, taken: Collection[str] = (), own: str | None = None
+) -> None:
+    """Checks the name of a sensor, which others must not have.
 
     Args:
         name: the name.
         taken: names of the other sensors.
+        own: a reserved name that this sensor can have.
 
     Raises:
         ValueError: the name cannot be a part of a ROS 2 topic, or belongs to
             another frame or topic.
     """
     check_topic_part(name)
-    if name in RESERVED_NAMES or name in taken:
+    if name in taken or (name != own and name in RESERVED_NAMES):
         raise ValueError(f"'{name}' is the name of another frame or topic")

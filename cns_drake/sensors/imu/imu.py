@@ -23,7 +23,7 @@ from pydrake.systems.sensors import Accelerometer, Gyroscope
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.drives.drive import ImuSamples
-from cns_drake.base.drives.sensor_names import check_topic_part
+from cns_drake.base.drives.sensor_names import IMU_FRAME
 from cns_drake.base.elementary import product, rotated
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.sensors import carriers
@@ -38,8 +38,6 @@ _BLOCK = 512
 # second.
 _REMEMBERED = 256
 _NAMES = ("specific_force", "angular_velocity")
-# The systems of an IMU are named after it and these.
-_PARTS = ("accelerometer", "gyroscope", "noise")
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,7 @@ def add_imu(
         RuntimeError: the plant is not finalized.
         TypeError: `body` is neither a body nor a frame.
         ValueError: there is noise without a rate, the rate is not positive, or
-            the name is taken or cannot be a part of a ROS 2 topic.
+            the name is taken, reserved or cannot be a part of a ROS 2 topic.
 
     Example:
         from cns_drake import add_imu
@@ -127,9 +125,9 @@ def add_imu(
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
-    check_topic_part(name)
-    systems = [f"{name}_{part}" for part in _PARTS]
-    carriers.check_free(builder, *systems)
+    parts = carriers.IMU_PARTS
+    carriers.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
+    systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PI)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()

@@ -13,11 +13,11 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.scene import perception_geometry
 from cns_drake.sensors.carriers import (
     body_and_pose,
     check_free,
+    check_new_sensor,
     connect_motion,
 )
 from cns_drake.sensors.lidar.config import (
@@ -140,8 +140,7 @@ def add_lidar(
         )
     if not isinstance(X_PS, RigidTransform):
         raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
-    check_sensor_name(name)
-    check_free(builder, name)
+    check_new_sensor(builder, name)
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
     preset = pattern if isinstance(pattern, str) else None

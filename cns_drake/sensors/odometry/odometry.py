@@ -13,8 +13,11 @@ from pydrake.systems.framework import (
     System,
 )
 
-from cns_drake.base.drives.sensor_names import check_topic_part
-from cns_drake.sensors.carriers import body_and_pose, check_free, connect_motion
+from cns_drake.sensors.carriers import (
+    body_and_pose,
+    check_new_sensor,
+    connect_motion,
+)
 
 
 @dataclass(frozen=True)
@@ -141,15 +144,15 @@ def add_odometry(
     Raises:
         RuntimeError: the plant is not finalized.
         TypeError: the body is of another type.
-        ValueError: the name is taken or cannot be a part of a ROS 2 topic.
+        ValueError: the name is taken, reserved or cannot be a part of a ROS 2
+            topic.
 
     Example:
         from cns_drake import add_odometry
 
         odometry = add_odometry(builder, body)
     """
-    check_topic_part(name)
-    check_free(builder, name)
+    check_new_sensor(builder, name, own="odometry")
     carrier, X_CB = body_and_pose(body, X_PB or RigidTransform())
     is_body = X_PB is None and not isinstance(body, Frame)
     sensor = builder.AddNamedSystem(
