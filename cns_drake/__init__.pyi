@@ -68,7 +68,9 @@ from cns_drake.simulation.loaded_drive import (
 from cns_drake.simulation.sensor_recording import (
     add_mcap_recorder as add_mcap_recorder,
 )
-from cns_drake.simulation.simulation import Run as Run
+from cns_drake.simulation.simulation import (
+    FinishedSimulation as FinishedSimulation,
+)
 from cns_drake.simulation.simulation import simulate as simulate
 from cns_drake.simulation.station import make_station as make_station
 from cns_drake.traffic.traffic_motion import add_traffic as add_traffic

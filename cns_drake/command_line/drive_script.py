@@ -14,7 +14,7 @@ from cns_drake.command_line import options
 
 if TYPE_CHECKING:
     from cns_drake.sensors.lidar.config import WeatherConfig
-    from cns_drake.simulation.simulation import Run
+    from cns_drake.simulation.simulation import FinishedSimulation
 
 
 def run_drive(
@@ -35,7 +35,7 @@ def run_drive(
     graphviz: Path | str | None = None,
     overwrite: bool = False,
     json: bool = False,
-) -> Run:
+) -> FinishedSimulation:
     """Simulates and records a drive, and shows on stderr what it does.
 
     All cores are used. `simulate` does the same for a scenario that is already

@@ -147,7 +147,7 @@ def study(
         from evaluation.study.chosen_methods import with_standard
 
     overrides = override or ()
-    experiment = load_experiment(name, overrides, quick=quick)
+    experiment = load_experiment(name, overrides, quick=quick, on_note=note)
     chosen: list[str | tuple[str, Any]] = list(overrides)
     for field, names in (
         ("tasks", task),

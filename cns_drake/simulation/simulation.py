@@ -48,7 +48,7 @@ NoteCallback = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Run:
+class FinishedSimulation:
     """The files, counts and times of a finished simulation.
 
     Attributes:
@@ -92,7 +92,7 @@ def simulate(
     num_threads: int = 1,
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
-) -> Run:
+) -> FinishedSimulation:
     """Simulates a scenario and records it in the folder `<output>/<name>`.
 
     If this folder contains frames of an interrupted run of the same scenario,
@@ -177,7 +177,7 @@ def simulate(
         if page is not None and page_file is not None:
             doing("writing the page of the drive")
             page.save(page_file, title=scenario.name)
-    return Run(
+    return FinishedSimulation(
         name=scenario.name,
         folder=folder,
         num_frames=drive.num_frames,

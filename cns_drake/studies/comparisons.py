@@ -291,10 +291,10 @@ class PairMaker:
             )
 
     def _check_side(self, side: str, changes: Changes) -> None:
-        if "fresh" in changes:
+        if isinstance(changes.get("redraw"), Mapping):
             raise InputError(
-                f"{self.source}: {side}.fresh: it is a field of both, and of no"
-                " case"
+                f"{self.source}: {side}.redraw: give a number, or frozen: it is"
+                " a field of both, and of no case"
             )
         if "version" in changes:
             raise InputError(

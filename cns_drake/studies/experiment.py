@@ -8,7 +8,14 @@ product of all factors.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import (
+    Callable,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+    Set,
+)
 import contextlib
 from dataclasses import dataclass, replace
 import itertools
@@ -38,7 +45,7 @@ from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
-from evaluation.results.table import FRESH
+from evaluation.results.table import FROZEN_REDRAW
 
 _FOLDER = Path(__file__).with_name("experiments")
 SIDES = ("both", "database", "query")
@@ -267,14 +274,17 @@ class Experiment(Section):
     quick: dict[str, Any] = Field(default_factory=dict)
 
     @property
-    def fresh(self) -> list[int]:
-        """Numbers of the fresh versions of maps on which the experiment runs.
+    def frozen_redraws(self) -> list[int]:
+        """Numbers of the frozen redraws on which the experiment runs.
 
-        A fresh version of a shipped map has other buildings along the same
-        streets. The numbers come from the field `both.fresh`; without it, the
-        list is empty.
+        A redraw of a map has other buildings along the same streets. The
+        numbers of the frozen ones come from the field `both.redraw.frozen`;
+        without it, the list is empty.
         """
-        found = spread(self.both.get("fresh", []))
+        redraw = self.both.get("redraw")
+        found: Any = []
+        if isinstance(redraw, Mapping):
+            found = spread(redraw.get("frozen", []))
         return found if isinstance(found, list) else [found]
 
     @property
@@ -318,6 +328,7 @@ def load_experiment(
     overrides: Iterable[str | tuple[str, Any]] = (),
     *,
     quick: bool = False,
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> Experiment:
     """Reads an experiment.
 
@@ -328,6 +339,7 @@ def load_experiment(
             separate nested fields, as in `database.years=[0, 5]`.
         quick: whether the fields in the section `quick` of the experiment
             replace its other fields.
+        on_note: is called with a note on each word of an earlier version.
 
     Raises:
         InputError: there is no such experiment, or a field is unknown or not
@@ -367,6 +379,7 @@ def load_experiment(
             values = change(values, fields)
         else:
             values = values | dict([one])
+    values = _in_words_of_now(values, f"{path}: ", on_note)
     experiment = validated(Experiment, values, path)
     with value_errors(path):
         conditions(experiment)
@@ -375,6 +388,26 @@ def load_experiment(
         with errors_at(f"{path}: quick", f"{path}: "):
             load_experiment(name_or_file, overrides, quick=True)
     return experiment
+
+
+def _in_words_of_now(
+    values: dict[str, Any], place: str, on_note: Callable[[str], None]
+) -> dict[str, Any]:
+    """Returns fields in which words of earlier versions are replaced.
+
+    The field `fresh` of both sides is now `redraw.frozen`.
+    """
+    quick = values.get("quick")
+    if isinstance(quick, dict):
+        inner = _in_words_of_now(quick, f"{place}quick.", on_note)
+        values = {**values, "quick": inner}
+    both = values.get("both")
+    if not (isinstance(both, dict) and "fresh" in both):
+        return values
+    on_note(f"{place}both.fresh: this field is now {FROZEN_REDRAW}")
+    number = {"redraw": {"frozen": both["fresh"]}}
+    left = {name: one for name, one in both.items() if name != "fresh"}
+    return {**values, "both": merged(left, number)}
 
 
 def _of_method(
@@ -531,9 +564,9 @@ def _factors(
     for side in _FACTORED:
         single, varied = _split(getattr(experiment, side), (side,))
         for path, value in single.items():
-            if path != FRESH:
+            if path != FROZEN_REDRAW:
                 _put(fixed, path, value)
-        factors |= {n: some for n, some in varied.items() if n != FRESH}
+        factors |= {n: some for n, some in varied.items() if n != FROZEN_REDRAW}
     return fixed, factors
 
 

@@ -179,7 +179,7 @@ def export_pairs(
         return [_write_overlaps(output, runs, found)]
     numbers = list(dict.fromkeys(cities))
     placed = [
-        Run(f"runs/{name}", runs[name], numbers.index(city))
+        ExportedDrive(f"runs/{name}", runs[name], numbers.index(city))
         for name, city in zip(names, cities, strict=True)
     ]
     learned, tested = placed[: len(scenarios)], placed[len(scenarios) :]
@@ -269,7 +269,7 @@ def compare_runs(
 
 
 @dataclass(frozen=True)
-class Run:
+class ExportedDrive:
     """An exported drive with N clouds.
 
     Attributes:
@@ -298,8 +298,8 @@ class Run:
 
 def _write_pickles(
     output: Path,
-    learned: Sequence[Run],
-    tested: Sequence[Run],
+    learned: Sequence[ExportedDrive],
+    tested: Sequence[ExportedDrive],
     on_note: Callable[[str], None],
 ) -> list[Path]:
     """Writes the pickles of PointNetVLAD, as MinkLoc3Dv2 reads them.
@@ -333,8 +333,8 @@ def _write_pickles(
 
 
 def _locations(
-    runs: Sequence[Run], on_note: Callable[[str], None]
-) -> dict[str, list[Run]]:
+    runs: Sequence[ExportedDrive], on_note: Callable[[str], None]
+) -> dict[str, list[ExportedDrive]]:
     """Returns the drives of each location of MinkLoc3Dv2's evaluation.
 
     A location is a city; if there are fewer cities than locations, some cities
@@ -343,7 +343,7 @@ def _locations(
     these numbers is 0 are left out, with a note. If no city is left, there is
     no location.
     """
-    cities: dict[int, list[Run]] = {}
+    cities: dict[int, list[ExportedDrive]] = {}
     for run in runs:
         cities.setdefault(run.city, []).append(run)
     usable = []
@@ -365,7 +365,7 @@ def _locations(
     }
 
 
-def _evaluation_fault(drives: Sequence[Run]) -> str | None:
+def _evaluation_fault(drives: Sequence[ExportedDrive]) -> str | None:
     """Returns why MinkLoc3Dv2 cannot evaluate the drives of a city, if so."""
     names = [run.folder.removeprefix("runs/") for run in drives]
     if len(drives) < 2:
@@ -382,7 +382,7 @@ def _evaluation_fault(drives: Sequence[Run]) -> str | None:
     return None
 
 
-def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
+def training_tuples(runs: Sequence[ExportedDrive]) -> dict[int, Any]:
     """Returns the training data of PointNetVLAD: number of a cloud -> tuple.
 
     A `TrainingTuple` names the cloud's file, its position, and the numbers of
@@ -410,7 +410,9 @@ def training_tuples(runs: Sequence[Run]) -> dict[int, Any]:
     return found
 
 
-def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
+def evaluation_sets(
+    runs: Sequence[ExportedDrive],
+) -> tuple[list[dict], list[dict]]:
     """Returns the evaluation data of PointNetVLAD: databases and queries.
 
     Args:
@@ -424,7 +426,7 @@ def evaluation_sets(runs: Sequence[Run]) -> tuple[list[dict], list[dict]]:
     """
     trees = [cKDTree(run.positions) for run in runs]
 
-    def entries(run: Run) -> dict[int, dict]:
+    def entries(run: ExportedDrive) -> dict[int, dict]:
         return {
             number: {"query": file, "northing": north, "easting": east}
             for number, (file, (north, east)) in enumerate(

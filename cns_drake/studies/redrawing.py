@@ -3,10 +3,10 @@
 Roads and plan stay, and only the plan's seed changes: buildings, plants, cars
 and furniture are drawn anew. Each such city is a map folder.
 
-Fresh cities are versions of the shipped maps that were not used to develop any
+Frozen redraws are redraws of the shipped maps that were not used to develop any
 method. They also have the map's stages, and its drives with realistic drivers.
 Some are rotated as a whole, so that their streets are not parallel to the axes
-of the world. `worlds/fresh.csv` contains the seeds and rotations, which were
+of the world. `worlds/redraws.csv` contains the seeds and rotations, which were
 drawn before any method ran.
 """
 
@@ -35,6 +35,7 @@ from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from evaluation.results.table import FROZEN_REDRAW
 from evaluation.study.parts import Part
 
 # The first line of each input that is written here.
@@ -46,7 +47,7 @@ _COST = 15.0
 # Fields of inputs that hold a place, and lists of places.
 _PLACES = frozenset({"position", "at", "block", "start", "end"})
 _LISTS_OF_PLACES = frozenset({"via", "area", "line", "within", "points"})
-_COLUMNS = ("map", "version", "seed", "turn_deg")
+_COLUMNS = ("map", "number", "seed", "turn_deg")
 # The driver, frozen with the seeds.
 _DRIVER = {"wander": 0.35, "lane_changes": 6.0, "follows": True}
 
@@ -268,12 +269,12 @@ def to_yaml(title: str, values: dict) -> bytes:
 
 
 @dataclass(frozen=True)
-class Version:
-    """A freshly drawn version of a shipped map.
+class FrozenRedraw:
+    """A redraw of a shipped map that stays the same in all releases.
 
     Attributes:
         map_name: name of the shipped map.
-        number: number of the version, from 1.
+        number: number of the redraw, from 1.
         seed: seed of its city.
         turn_deg: angle by which its city is rotated about the world's origin
             [deg].
@@ -285,13 +286,13 @@ class Version:
     turn_deg: float
 
 
-def fresh_versions() -> list[Version]:
-    """Returns the fresh versions of shipped maps in `worlds/fresh.csv`."""
-    rows = read_records(worlds_folder() / "fresh.csv", _COLUMNS)
+def frozen_redraws() -> list[FrozenRedraw]:
+    """Returns the frozen redraws of shipped maps in `worlds/redraws.csv`."""
+    rows = read_records(worlds_folder() / "redraws.csv", _COLUMNS)
     return [
-        Version(
+        FrozenRedraw(
             row["map"],
-            int(row["version"]),
+            int(row["number"]),
             int(row["seed"]),
             float(row["turn_deg"]),
         )
@@ -299,21 +300,21 @@ def fresh_versions() -> list[Version]:
     ]
 
 
-def draw_fresh_cities(
+def redraw_frozen(
     maps: Sequence[str],
     numbers: Sequence[int],
     output: Path,
     cluster: Cluster,
     source: object,
 ) -> list[Path]:
-    """Generates fresh versions of shipped maps; returns their map folders.
+    """Generates frozen redraws of shipped maps; returns their map folders.
 
-    A fresh version has the streets of the map, in some cases rotated, but other
+    A redraw has the streets of the map, in some cases rotated, but other
     buildings, plants and objects.
 
     Args:
         maps: names of shipped maps; all of them if empty.
-        numbers: numbers of the versions; all of them if empty.
+        numbers: numbers of the redraws; all of them if empty.
         output: folder for the maps, which are named `<map>_f<number>`.
         cluster: runs the jobs.
         source: file of the experiment, for errors.
@@ -322,29 +323,29 @@ def draw_fresh_cities(
         The folders, sorted by map, then by number.
 
     Raises:
-        InputError: a version is unknown or could not be generated.
+        InputError: a redraw is unknown or could not be generated.
     """
-    versions = fresh_versions()
+    redraws = frozen_redraws()
     for what, given, known in (
-        ("map", maps, [one.map_name for one in versions]),
-        ("both.fresh", numbers, [one.number for one in versions]),
+        ("map", maps, [one.map_name for one in redraws]),
+        (FROZEN_REDRAW, numbers, [one.number for one in redraws]),
     ):
         for one in given:
             if one not in known:
                 there = ", ".join(map(str, dict.fromkeys(known)))
                 raise InputError(
-                    f"{source}: {what}: no fresh version {one!r} (there are:"
+                    f"{source}: {what}: no frozen redraw {one!r} (there are:"
                     f" {there})"
                 )
     steps = [
-        DrawFreshCity(
+        RedrawFrozen(
             output.resolve() / f"{one.map_name}_f{one.number:02d}",
             shipped_maps()[one.map_name],
             max(MapFolder(shipped_maps()[one.map_name]).stages()),
             one.seed,
             one.turn_deg,
         )
-        for one in versions
+        for one in redraws
         if (not maps or one.map_name in maps)
         and (not numbers or one.number in numbers)
     ]
@@ -353,8 +354,8 @@ def draw_fresh_cities(
 
 
 @dataclass(frozen=True)
-class DrawFreshCity(RedrawCity):
-    """A job step that draws a fresh version of a map, with its drives."""
+class RedrawFrozen(RedrawCity):
+    """A job step that makes a frozen redraw of a map, with its drives."""
 
     turn_deg: float = 0.0
 

@@ -45,15 +45,15 @@ from cns_drake.studies.made_maps import (
     distracting_drives,
     made_map_step,
 )
-from cns_drake.studies.map_task import MapTask
+from cns_drake.studies.map_task import DrivenMapTask
 from cns_drake.studies.recording import is_recorded
-from cns_drake.studies.redrawing import draw_fresh_cities, make_maps
+from cns_drake.studies.redrawing import make_maps, redraw_frozen
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts import check
 from evaluation.results.page import write_page
 from evaluation.results.table import (
-    FRESH,
+    FROZEN_REDRAW,
     LAST,
     OWN,
     QUERIES,
@@ -87,7 +87,7 @@ TASKS: Mapping[str, type[Task]] = {
         PlaceTask,
         PoseTask,
         LocaliseTask,
-        MapTask,
+        DrivenMapTask,
         ChangeTask,
         CostTask,
     )
@@ -315,12 +315,12 @@ class Study:
         known: set[str] = set()
         for one in wanted:
             # A wrong name is found before any map is made.
-            if self.experiment.fresh and (
+            if self.experiment.frozen_redraws and (
                 isinstance(one, MadeMap) or one not in shipped_maps()
             ):
                 raise InputError(
-                    f"{self.source}: {FRESH}: {getattr(one, 'name', one)}: no"
-                    " shipped map"
+                    f"{self.source}: {FROZEN_REDRAW}:"
+                    f" {getattr(one, 'name', one)}: no shipped map"
                 )
             if isinstance(one, str) and not Path(one).is_dir():
                 try:
@@ -349,9 +349,9 @@ class Study:
             yield _Drives(one.name, {}, self._pairs(folder))
             return
         path = shipped_maps().get(one, Path(one))
-        versions = self.experiment.fresh
+        versions = self.experiment.frozen_redraws
         if versions:
-            cities = draw_fresh_cities(
+            cities = redraw_frozen(
                 [one],
                 versions,
                 self.output / "cities",
@@ -359,7 +359,7 @@ class Study:
                 self.source,
             )
             for number, folder in zip(sorted(versions), cities, strict=True):
-                yield _Drives(one, {FRESH: number}, self._pairs(folder))
+                yield _Drives(one, {FROZEN_REDRAW: number}, self._pairs(folder))
             return
         if path.is_dir() and not MapFolder(path).drives():
             for city in group_cities(find_recordings(path, self.on_note)):
@@ -402,7 +402,7 @@ class Study:
         engine = Engine(
             self.experiment.name,
             self._tasks,
-            self._variants,
+            dict(self._variants),
             self.output,
             self.on_note,
         )

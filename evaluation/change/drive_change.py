@@ -8,7 +8,7 @@ the city that both routes saw.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,9 +87,17 @@ class ChangeReport:
     change: TemporalChange
     spread: tuple[float, float]
     masked: TemporalChange | None
-    control: TemporalChange | None
-    control_names: tuple[str, str] | None
+    control: TemporalChange | None = None
+    control_names: tuple[str, str] | None = None
     alignment: AlignmentReport | None = None
+
+    def beside(self, control: ChangeReport) -> ChangeReport:
+        """Returns the same change beside that of its control."""
+        return replace(
+            self,
+            control=control.change,
+            control_names=(control.source, control.target),
+        )
 
     def to_json(self) -> dict:
         """Returns all numbers as a dictionary for JSON.
@@ -216,6 +224,20 @@ def compare_maps(
         InputError: A, B and the control are not in one world, or the control is
             on neither route.
     """
+    report = change_between(source, target)
+    if control is not None:
+        both = control, same_stage_partner(source, target, control)
+        report = report.beside(change_between(*both))
+    spread = spread_over_grids(source, target, report.change, grids)
+    return replace(report, spread=spread, alignment=alignment)
+
+
+def change_between(source: Surveyed, target: Surveyed) -> ChangeReport:
+    """Returns the change between two maps, without its context.
+
+    Raises:
+        InputError: the maps are not in one world.
+    """
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
     change, clouds = _change(source, target)
@@ -223,21 +245,8 @@ def compare_maps(
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
         masked = change.restricted(*(covered(one, both) for one in clouds))
-    control_change = control_names = None
-    if control is not None:
-        partner = _same_stage_partner(source, target, control)
-        control_change, _ = _change(control, partner)
-        control_names = (control.name, partner.name)
-    return ChangeReport(
-        source.name,
-        target.name,
-        change,
-        spread_over_grids(source, target, change, grids),
-        masked,
-        control_change,
-        control_names,
-        alignment,
-    )
+    spread = change.symmetric, change.symmetric
+    return ChangeReport(source.name, target.name, change, spread, masked)
 
 
 def spread_over_grids(
@@ -296,12 +305,16 @@ def _survey(source: Drive | Path, columns: int | None = None) -> Surveyed:
     return Surveyed(source.name, accumulator.to_map(), notes=tuple(notes))
 
 
-def _same_stage_partner(
+def same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
     """Returns which of two drives is in the control's stage.
 
     It is the drive whose route the control does not follow.
+
+    Raises:
+        InputError: one of them is no drive, they are not in one world, or the
+            control follows neither route.
     """
     if (
         source.drive is None

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from evaluation.methods.method import Method
     from evaluation.recognition.metrics import Interval, Mode
     from evaluation.recognition.place_outcome import PlaceOutcome
+    from evaluation.study.chosen_methods import MethodChoice
 
 # Command of an earlier version -> the command that replaces it.
 RENAMED = {
@@ -82,6 +83,7 @@ def tcr(
     lidar: commands.LidarName = None,
     columns: commands.Columns = None,
     paths: Annotated[bool, typer.Option("--paths")] = False,
+    output: options.Tables = None,
     json: commands.Json = False,
 ) -> None:
     """Measure how much changed between two drives or maps.
@@ -112,16 +114,39 @@ def tcr(
         )
         compare_paths(first, second, align, json=json)
         return
+    from cns_drake.base.files import make_folder
     from evaluation.change import drive_change as change
+    from evaluation.results.table import LAST, OWN, STAGE
+    from evaluation.study import one_pair
+    from evaluation.study.tasks.change import ChangeTask
 
     named = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
         named, align, lidar, columns
     )
-    report = change.compare_maps(
-        surveys[0],
-        surveys[1],
-        control=None if control is None else surveys[2],
+    before, after, *controls = surveys
+    compared = [(before, after)] + [
+        (one, change.same_stage_partner(before, after, one)) for one in controls
+    ]
+    pairs = [
+        one_pair.pair_of_surveys(
+            both,
+            (before.name, after.name),
+            factors={STAGE: stage} if controls else {},
+            is_baseline=stage == LAST,
+            key=stage,
+        )
+        for both, stage in zip(compared, (OWN, LAST), strict=False)
+    ]
+    if output is not None:
+        make_folder(output)
+    engine = one_pair.measured("tcr", pairs, [ChangeTask({}, "tcr")], output)
+    report, *beside = (engine.found(one, ChangeTask.name) for one in pairs)
+    for one in beside:
+        report = report.beside(one)
+    report = replace(
+        report,
+        spread=change.spread_over_grids(before, after, report.change),
         alignment=alignments[0] if alignments else None,
     )
     for one in surveys:
@@ -132,6 +157,8 @@ def tcr(
             terminal.note(f"{one.name}: {ignored} {_NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
+    if output is not None:
+        options.write_tables(engine)
     terminal.show(report.to_json(), _change_rows(report), json=json)
 
 
@@ -215,17 +242,19 @@ def pr(
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)
-        chosen = _chosen_method(method, parameter, sensor_height)
+        choice = _choice_of(method, parameter).at_height(sensor_height)
+        chosen = choice.make()
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
     from cns_drake.base import files
     from cns_drake.base.errors import InputError
+    from evaluation.drives import check_same_world
     from evaluation.drives.drive_views import CountedDrive
-    from evaluation.recognition import (
-        overlap_truth,
-        place_recognition,
-        retrieval,
-    )
+    from evaluation.recognition import overlap_truth
+    from evaluation.recognition.place_outcome import check_has_match
+    from evaluation.study import one_pair
+    from evaluation.study.one_pair import OpenSource
+    from evaluation.study.tasks.place import PlaceTask, PoseTask
 
     if turn_queries is not None:
         protocol = replace(protocol, turn_queries=turn_queries)
@@ -256,29 +285,45 @@ def pr(
         files.check_regular(exact_overlaps)
     if output is not None:
         files.make_folder(output)
-    chosen = _chosen_method(method, parameter, sensor_height)
+    given = _choice_of(method, parameter)
+    choice = given.at_height(sensor_height)
+    chosen = choice.make()
     places, query_drive = options.aligned(
         options.open_noted(database, query, lidar=lidar, columns=columns),
         align,
         across_maps=across_maps,
     )
+    check_same_world(places, query_drive, across_maps=across_maps)
     counted = [CountedDrive(one) for one in (places, query_drive)]
     places, query_drive = counted
-    exact = None
+    shares = None
     if exact_overlaps is not None:
         frames = overlap_truth.compared_frames(places, query_drive, protocol)
-        exact = overlap_truth.read_overlaps(exact_overlaps, *frames)
-    found = retrieval.retrieve(
-        places,
-        query_drive,
-        chosen,
+        shares = overlap_truth.read_overlaps(exact_overlaps, *frames)
+    elif protocol.overlap is not None:
+        shares = overlap_truth.overlap_matrix(places, query_drive, protocol)
+    pair = one_pair.pair_of(
+        OpenSource(places),
+        OpenSource(query_drive),
+        (places.name, query_drive.name),
         protocol,
-        across_maps=across_maps,
-        overlaps=exact,
+        overlaps=shares,
     )
-    outcome = place_recognition.judge_retrieval(
-        chosen, places.name, query_drive, found, protocol
+    engine = one_pair.measured(
+        "pr",
+        [pair],
+        [PlaceTask({}, "pr"), PoseTask({}, "pr")],
+        output,
+        # The height is in the protocol's digest.
+        [(choice, given.columns)],
+        terminal.note,
     )
+    (outcome,) = (
+        replace(one, method=choice.name)
+        for one in engine.found(pair, PlaceTask.name)
+        if one.is_gated == protocol.gate
+    )
+    check_has_match(outcome)
     for note in dict.fromkeys(
         chosen.assumption(one.lidar_field) for one in (places, query_drive)
     ):
@@ -288,9 +333,12 @@ def pr(
         if one.num_ignored:
             terminal.note(f"{one.name}: {one.num_ignored} {_NOT_FINITE}")
     if overlaps is not None:
-        assert found.overlaps is not None
+        assert shares is not None
         overlap_truth.write_overlaps(
-            overlaps, found.query_frames, found.database_frames, found.overlaps
+            overlaps,
+            outcome.columns["query_frame"],
+            outcome.place_frames,
+            shares,
         )
         terminal.note(f"wrote {overlaps}")
     if protocol.exclude_recent is None and is_itself:
@@ -299,22 +347,7 @@ def pr(
             "recent places)"
         )
     if output is not None:
-        from evaluation.methods import MethodConfig
-        from evaluation.results.table import QUERIES, RESULTS
-        from evaluation.study.chosen_methods import method_settings
-        from evaluation.study.one_pair import write_pair_tables
-
-        is_usual = sensor_height == MethodConfig().sensor_height
-        write_pair_tables(
-            output,
-            outcome,
-            (database, query),
-            query_drive,
-            protocol,
-            method_settings(parameter or [], [chosen.name])[chosen.name],
-            None if is_usual else sensor_height,
-        )
-        terminal.note(f"wrote {output / RESULTS} and {QUERIES}")
+        options.write_tables(engine)
     values = outcome.to_json(mode)
     values["parameters"] = chosen.config.model_dump(mode="json")
     terminal.show(values, _recognition_rows(outcome, mode), json=json)
@@ -383,13 +416,14 @@ def report(
 
 
 @app.command(cls=Command, epilog=example("cns-eval compare mine/results.csv"))
+@commands.former_options({"--gate": "--verified"})
 def compare(
     tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
     metric: str = "auc",
     protocol: Annotated[
         str | None, typer.Option(metavar="fair|paper|recorded|own")
     ] = None,
-    gate: Annotated[bool, typer.Option("--gate")] = False,
+    verified: Annotated[bool, typer.Option("--verified")] = False,
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
     json: commands.Json = False,
 ) -> None:
@@ -412,8 +446,9 @@ def compare(
             own for results that were measured with changed options. By default,
             results are compared with each other only if they used the same
             protocol.
-        gate: Compare the results that were measured with --gate. By default the
-            results without it are compared.
+        verified: Compare the results with geometric verification, in whose rows
+            the column gate is 1. By default the results without it are
+            compared.
         rankings: Compare only the order of the methods in the tables. Each
             table is ranked over its own conditions. The tables may therefore
             have different conditions, such as simulated and real drives.
@@ -421,7 +456,7 @@ def compare(
     from evaluation.results import comparing
 
     found = comparing.compare(
-        tables, metric, protocol, gate=gate, rankings=rankings
+        tables, metric, protocol, gate=verified, rankings=rankings
     )
     for note in found.notes:
         terminal.note(note)
@@ -493,18 +528,17 @@ def _write_scores(
         terminal.note(note)
 
 
-def _chosen_method(
-    name: str, assignments: list[str] | None, height: float
-) -> Method:
-    from evaluation.methods import make_method
+def _choice_of(name: str, assignments: list[str] | None) -> MethodChoice:
+    """Returns a method with its settings."""
     from evaluation.methods.method import load_method
-    from evaluation.study.chosen_methods import method_settings
+    from evaluation.study.chosen_methods import MethodChoice, method_settings
 
-    if name.endswith(".py"):
-        name = load_method(Path(name)).name
-    parameters: dict[str, object] = {"sensor_height": height}
-    parameters |= method_settings(assignments or [], [name])[name]
-    return make_method(name, parameters)
+    file = Path(name) if name.endswith(".py") else None
+    if file is not None:
+        # Errors name the file as the user does.
+        name, file = load_method(file).name, file.absolute()
+    settings = method_settings(assignments or [], [name])[name]
+    return MethodChoice(name, file, tuple(settings.items()))
 
 
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:

@@ -96,8 +96,10 @@ def localise(
             vehicle's (base_link).
         time_offset: Time to add to the times of --estimate [s], if its clock
             differs from that of the drive.
-        output: Folder to write. It gets localisation.csv, which lists the
-            result of each query. If you give --track, it also gets a picture.
+        output: Folder to write results.csv and queries.csv to, in the same form
+            as those of a study; created if it does not exist. It also gets
+            localisation.csv, with all that is known of each query. If you give
+            --track, it also gets a picture.
     """
     import math
 
@@ -108,7 +110,10 @@ def localise(
     from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import estimators, tracking
     from evaluation.localisation import localise as queries
+    from evaluation.study import one_pair
     from evaluation.study.chosen_methods import method_settings
+    from evaluation.study.one_pair import OpenSource
+    from evaluation.study.tasks.localise import NOT_LOCALISED, LocaliseTask
 
     if estimate is not None:
         commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
@@ -124,14 +129,13 @@ def localise(
     if method is None:
         raise InputError("--method: missing")
     num_jobs = choose_cluster(jobs, None).num_workers
-    starts = queries.Starts(start, start_turn, seed)
+    queries.Starts(start, start_turn, seed)  # It checks them.
     if track and query_spacing is not None:
         raise InputError("--query-spacing: not together with --track")
     if not track and odometry_drift is not None:
         raise InputError("--odometry-drift: only together with --track")
-    query_spacing = 10.0 if query_spacing is None else query_spacing
     odometry_drift = 0.01 if odometry_drift is None else odometry_drift
-    if not (math.isfinite(query_spacing) and query_spacing > 0.0):
+    if query_spacing is not None and not 0.0 < query_spacing < math.inf:
         raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
     if not 0.0 <= odometry_drift <= 1.0:
         raise InputError(
@@ -139,10 +143,11 @@ def localise(
         )
     name = Path(method).stem
     given = method_settings(parameter or [], [name])[name]
-    settings = estimators.default_settings(method).with_values(
-        given.items(), method
+    # Faults are told before the slow work.
+    estimators.make_estimator(
+        method,
+        estimators.default_settings(method).with_values(given.items(), method),
     )
-    estimator = estimators.make_estimator(method, settings)
     source = open_source(place, lidar, columns)
     asked = open_source(query, lidar, columns)
     drive = (
@@ -158,11 +163,34 @@ def localise(
         check_same_world(source, drive)
     if output is not None:
         make_folder(output)
-    surroundings = estimators.make_map(source, settings, columns, terminal.note)
-    is_mapped = queries.mapped_frames(source, surroundings, drive)
-    localiser = queries.Localiser(surroundings, estimator, settings)
+    settings: dict = {
+        "methods": [method],
+        "starts": [[start, start_turn]],
+        "seed": seed,
+        "estimator": given,
+        "odometry_drift": odometry_drift if track else None,
+    }
+    if query_spacing is not None:
+        settings["spacing"] = query_spacing
+    notes: list[str] = []
+    pair = one_pair.pair_of(
+        OpenSource(source, columns),
+        OpenSource(drive),
+        (source.name, drive.name),
+    )
+    engine = one_pair.measured(
+        "localise",
+        [pair],
+        [LocaliseTask(settings, "localise")],
+        output,
+        on_note=notes.append,
+        processes=num_jobs,
+    )
+    if not (measured := engine.found(pair, LocaliseTask.name)):
+        raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
+    (rows,) = measured
     values: dict = {
-        "method": Path(method).stem,
+        "method": name,
         "map": source.name,
         "query": drive.name,
         "start": start,
@@ -170,26 +198,18 @@ def localise(
         "seed": seed,
     }
     if track:
-        rows = tracking.track_drive(
-            localiser, drive, is_mapped, starts, odometry_drift
-        )
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
-    else:
-        frames = queries.query_frames(drive, is_mapped, query_spacing)
-        rows = queries.localise(
-            localiser,
-            drive,
-            frames,
-            starts,
-            num_jobs,
-        )
     if all(map(math.isnan, rows["unmapped"])):
+        least = estimators.default_settings(method).with_values(
+            given.items(), method
+        )
         raise InputError(
             f"{drive.name}: no scan has {estimators.FEWEST_POINTS} points in"
-            f" different voxels of {settings.scan_voxel:g} m"
+            f" different voxels of {least.scan_voxel:g} m"
         )
-    queries.note_sparse(drive.name, rows, terminal.note)
+    for note in notes:
+        terminal.note(note)
     values |= queries.summary(rows)
     if output is not None:
         if track:
@@ -198,6 +218,7 @@ def localise(
             draw_track(rows, output / "track")
         queries.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
+        options.write_tables(engine)
     terminal.show(values, _rows(values), json=json)
 
 

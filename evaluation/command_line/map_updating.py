@@ -9,6 +9,7 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.commands import Json
+from evaluation.command_line import options
 
 
 class BaselineName(str, Enum):
@@ -43,14 +44,15 @@ def map_update(
             `prediction`. Needs --labels-b.
         labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
             The formats are those of --labels-a, which is needed as well.
-        output: Folder for the detector's labels of both maps, A.npy and B.npy.
+        output: Folder for results.csv and queries.csv, in the same form as
+            those of a study, and for the detector's labels of both maps, A.npy
+            and B.npy.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from evaluation.map_update import sessions
-    from evaluation.map_update.baselines import run_baseline
-    from evaluation.map_update.scores import Labels, score
-    from evaluation.map_update.structures import class_names
+    from evaluation.study import one_pair
+    from evaluation.study.tasks.map_scores import GIVEN, LabelledMapTask
 
     if (labels_a is None) != (labels_b is None):
         raise InputError("--labels-a and --labels-b: give both")
@@ -59,21 +61,22 @@ def map_update(
     if output is not None:
         make_folder(output)
     pair = sessions.read_pair(folder)
-    truth = Labels(*sessions.read_truth(pair))
-    name = "labels"
-    if labels_a is not None and labels_b is not None:
-        found = Labels(
-            sessions.read_labels(labels_a, pair.A, truth=False),
-            sessions.read_labels(labels_b, pair.B, truth=False),
-        )
-    else:
-        name = (baseline or BaselineName.FREE_SPACE).value
-        found = run_baseline(name, pair)
+    given = [one for one in (labels_a, labels_b) if one is not None]
+    method = (baseline or BaselineName.FREE_SPACE).value
+    name = GIVEN if given else method
+    one = one_pair.pair_of_maps(
+        pair.A.folder, pair.B.folder, folder.resolve().name
+    )
+    task = LabelledMapTask(folder, [] if given else [method], given)
+    engine = one_pair.measured("map-update", [one], [task], output)
+    found = engine.found(one, task.name)[name]
     if output is not None:
-        for session, labels in zip(pair, found, strict=True):
+        for session, labels in zip(pair, found.labels, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
-    scores = score(pair, truth, found, class_names(folder))
-    terminal.show({"method": name, **scores}, _rows(name, scores), json=json)
+        options.write_tables(engine)
+    terminal.show(
+        {"method": name, **found.scores}, _rows(name, found.scores), json=json
+    )
 
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:

@@ -14,6 +14,7 @@ from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
     from evaluation.drives import Drive
+    from evaluation.study.engine import Engine
 
 
 # Option: when drives are aligned to one world.
@@ -36,6 +37,14 @@ MethodName = Annotated[
         "file that registers your own.",
     ),
 ]
+Tables = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Folder to write results.csv and queries.csv to, in the same form "
+        "as those of a study; created if it does not exist.",
+    ),
+]
 SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
@@ -52,6 +61,14 @@ def open_noted(
         for note in drive.notes:
             terminal.note(note)
     return drives
+
+
+def write_tables(engine: Engine) -> None:
+    """Writes both tables of an engine, and shows a note on them."""
+    from evaluation.results.table import QUERIES, RESULTS
+
+    engine.write_tables()
+    terminal.note(f"wrote {engine.output / RESULTS} and {QUERIES}")
 
 
 def aligned(

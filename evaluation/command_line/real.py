@@ -1,19 +1,20 @@
 """The command `real`."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cns_drake.base import commands, terminal
-from cns_drake.base.errors import InputError
 
 
 def real(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(metavar="DIR")],
     method: commands.Methods = None,
+    parameter: commands.MethodSettings = None,
+    jobs: commands.Jobs = None,
+    scheduler: commands.Scheduler = None,
     simulated: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
 ) -> None:
     """Measure place recognition and registration on real scans.
@@ -22,7 +23,8 @@ def real(
     that the page "Real drives" of the documentation lists: KITTI 00 and its
     revisits, nuScenes 1072, Newer College, NCLT and HeLiPR. If a data set is
     missing, the command says so and goes on without it. It writes results.csv
-    and queries.csv, which cns-eval compare reads.
+    and queries.csv, which cns-eval compare reads. To resume after an
+    interruption, run the same command again.
 
     Args:
         folder: Folder with the excerpts of public data sets.
@@ -38,19 +40,18 @@ def real(
             is trained to tell them from the real scans, which shows how
             realistic the simulated scans are.
     """
-    from cns_drake.base.files import make_folder
-    from evaluation.real.measuring import Measuring
+    from cns_drake.base.jobs.cluster import choose_cluster
+    from evaluation.real.measuring import measure_real
     from evaluation.results.table import RESULTS
     from evaluation.study.chosen_methods import with_standard
 
-    measuring = Measuring(with_standard(method or ()), terminal.note)
-    make_folder(output)
-    measuring.run(folder, simulated)
-    results, _ = measuring.engine.tables()
-    if not results.rows:
-        raise InputError(
-            f"{folder}: no data set that these methods can measure; the notes"
-            " say why"
-        )
-    replace(measuring.engine, output=output).write_tables()
+    measure_real(
+        folder,
+        output,
+        choose_cluster(jobs, scheduler),
+        with_standard(method or ()),
+        parameter or (),
+        simulated,
+        terminal.note,
+    )
     print(output / RESULTS)

@@ -11,7 +11,6 @@ import math
 import multiprocessing
 from pathlib import Path
 import time
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -319,53 +318,70 @@ class Localiser:
         return row, end
 
 
-# The localiser in a forked process.
-_localiser: Localiser
+# The localisers in a forked process.
+_localisers: Sequence[Localiser]
 
 
-def _query(*arguments: Any) -> np.ndarray:
-    return _localiser.query(*arguments)[0]
+def _query(
+    starts: Sequence[Starts],
+    frame: int,
+    stamp_ns: int,
+    scan: np.ndarray,
+    X_WS: np.ndarray,
+    R_WT: np.ndarray,
+) -> list[np.ndarray]:
+    """Returns a record for each localiser and each of its initial poses."""
+    found = []
+    for localiser in _localisers:
+        for some in starts:
+            drawn = some.draw(frame)
+            row, _ = localiser.query(frame, stamp_ns, scan, X_WS, R_WT, *drawn)
+            found.append(row)
+    return found
 
 
 def localise(
-    localiser: Localiser,
+    localisers: Sequence[Localiser],
     query: Drive,
     frames: Sequence[int],
-    starts: Starts,
+    starts: Sequence[Starts],
     jobs: int = 1,
-) -> np.ndarray:
+) -> list[np.ndarray]:
     """Localises scans of a drive, each independently of the others.
 
+    Each scan is read once.
+
     Args:
-        localiser: the map and the estimator.
+        localisers: maps with their estimators.
         query: the drive.
         frames: frames of the scans, in any order.
         starts: how the initial poses are drawn.
         jobs: number of processes, where the system can fork.
 
     Returns:
-        (K,) records of `QUERY`, in the order of the frames.
+        For each localiser and each entry of `starts`, (K,) records of `QUERY`,
+        in the order of the frames: first those of the first localiser.
 
     Raises:
         InputError: a scan cannot be read.
     """
-    global _localiser
+    global _localisers
     X_WS, stamps = query.X_WS, query.stamps_ns
     R_WT = way_axes(X_WS[:, :3, 3], X_WS)
     jobs = max(1, min(jobs, len(frames)))
 
     def arguments(frame: int) -> tuple:
-        drawn = starts.draw(frame)
         scan = query.scan(frame)
         # Only the coordinates are passed on: a scan would be copied to the
         # process with all its fields.
         scan = clouds.from_xyz(clouds.xyz(scan))
-        return frame, stamps[frame], scan, X_WS[frame], R_WT[frame], *drawn
+        stamp_ns = int(stamps[frame])
+        return starts, frame, stamp_ns, scan, X_WS[frame], R_WT[frame]
 
-    def rows() -> Iterator[np.ndarray]:
+    def rows() -> Iterator[list[np.ndarray]]:
         if jobs == 1 or "fork" not in multiprocessing.get_all_start_methods():
             for frame in frames:
-                yield localiser.query(*arguments(frame))[0]
+                yield _query(*arguments(frame))
             return
         context = multiprocessing.get_context("fork")
         with ProcessPoolExecutor(jobs, context) as pool:
@@ -375,12 +391,12 @@ def localise(
                 for one in waiting:
                     yield one.result()
 
-    _localiser = localiser
+    _localisers = localisers
     with errors_at(query.name):
         done = list(
             track(rows(), f"localising {query.name}", len(frames), "scans")
         )
-    return np.array(done, QUERY)
+    return [np.array(list(some), QUERY) for some in zip(*done, strict=True)]
 
 
 def is_right(

@@ -1,5 +1,7 @@
 """Tracks a drive in a map: each scan is registered from the last estimate."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -16,6 +18,7 @@ from evaluation.localisation.localise import (
     Starts,
     way_axes,
 )
+from evaluation.recognition.place_outcome import Number
 
 # Distance driven between two aligned scans [m].
 SPACING = 2.0
@@ -181,6 +184,19 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
             way = float(rows["way"][end] - rows["way"][begin])
             found.append((way, bool(len(back))))
     return found
+
+
+def numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
+    """Yields a method's results for `results.csv` that only a track has.
+
+    Args:
+        tracked: records of `TRACKED`.
+        method: name of the method.
+    """
+    found = summary(tracked)
+    for name in ("within_03m", "lost_per_km"):
+        if (value := found[name]) is not None:
+            yield Number(method, False, name, float(value), n=len(tracked))
 
 
 def summary(tracked: np.ndarray) -> dict[str, float | int | None]:

@@ -6,6 +6,7 @@ same as in earlier measurements.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 import hashlib
 from pathlib import Path
@@ -16,11 +17,14 @@ import numpy as np
 from cns_drake.base.drives.lidar_fields import lidar_field
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
 from evaluation.clouds.cloud_files import OnNote, read_cloud
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions
+from evaluation.study.surveys import RecordingSource
+from evaluation.study.tasks.task import NamedDrive
 
 # Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0
@@ -152,16 +156,48 @@ DATA_SETS = (
 )
 
 
+@dataclass(frozen=True)
+class DataSetSource:
+    """A function that opens a data set, for any process.
+
+    Attributes:
+        folder: folder of the data set.
+        data_set: its name and layout.
+        columns: number of columns of its `.bin` files; None to find it from the
+            values.
+    """
+
+    folder: Path
+    data_set: DataSet
+    columns: int | None
+
+    def __call__(self) -> Drive:
+        files = listed(self.folder, self.data_set.scans)
+        return _open(self.folder, self.data_set, files, self.columns)
+
+    def identity(self) -> list[list]:
+        """Returns what identifies the data set: its name and its files."""
+        drive = self()
+        digests = file_digests(drive.files)
+        names = [file.name for file in drive.files]
+        return [
+            [drive.name, self.data_set.scans, self.columns],
+            *map(list, zip(names, digests, strict=True)),
+        ]
+
+
 class RealScans(NamedTuple):
     """A data set of real scans that was found on the disk.
 
     Attributes:
         data_set: name and origin of the data set.
         drive: scans and poses of the data set.
+        source: opens the data set in any process.
     """
 
     data_set: DataSet
     drive: Drive
+    source: DataSetSource
 
     @property
     def name(self) -> str:
@@ -198,10 +234,11 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
             on_note(
                 f"{folder / one.folder}: other scans than known, still used"
             )
-        drive = _open(folder / one.folder, one, files, columns)
+        source = DataSetSource((folder / one.folder).absolute(), one, columns)
+        drive = source()
         for note in drive.notes:
             on_note(note)
-        found.append(RealScans(one, drive))
+        found.append(RealScans(one, drive, source))
     for path in listed(folder):
         if path.is_dir() and path.name not in known:
             on_note(f"{path}: not known, left out")
@@ -255,7 +292,9 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
     return read_quaternions(table, None).at(numbers, 0)
 
 
-def simulated_drives(folder: Path, unit: str, on_note: OnNote) -> list[Drive]:
+def simulated_drives(
+    folder: Path, unit: str, on_note: OnNote
+) -> list[NamedDrive]:
     """Returns the drives in a folder whose LiDAR is like a real one.
 
     Args:
@@ -269,10 +308,13 @@ def simulated_drives(folder: Path, unit: str, on_note: OnNote) -> list[Drive]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    paths = [one for one in listed(folder) if one.is_dir()]
-    drives = [open_drive(path) for path in paths]
     field = lidar_field(unit)
-    alike = [one for one in drives if field and one.lidar_field == field]
-    for note in (note for one in alike for note in one.notes):
-        on_note(note)
+    alike = []
+    for path in (one for one in listed(folder) if one.is_dir()):
+        drive = open_drive(path)
+        if field and drive.lidar_field == field:
+            source = RecordingSource(path.absolute())
+            alike.append(NamedDrive(drive.name, source))
+            for note in drive.notes:
+                on_note(note)
     return alike

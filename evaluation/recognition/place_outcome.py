@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
@@ -104,6 +105,7 @@ class PlaceOutcome:
         query: tuple[str, np.ndarray, np.ndarray],
         drives: Sequence[str],
         overlaps: np.ndarray | None = None,
+        num_here: int | None = None,
     ) -> PlaceOutcome:
         """Returns the outcomes of a method's queries in a retrieval.
 
@@ -116,11 +118,13 @@ class PlaceOutcome:
             query: name of the drive of the queries, and time stamps (Q,) [ns]
                 and positions (Q, 3) [m] of the queries.
             drives: name of each place's drive (D names). The first name is
-                that of the drive through the query's own city; distances to
-                places of all other drives are unknown.
+                that of the database drive.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
                 match. None if it is unknown.
+            num_here: number of places in the query's own city, which come
+                first; by default all of the database drive. Distances to all
+                other places are unknown.
         """
         scores = retrieval.scores
         order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)
@@ -130,7 +134,9 @@ class PlaceOutcome:
         names = np.array([drives[k] if k >= 0 else "" for k in best])
         outcomes = judge(scores, retrieval.matches, retrieval.query_blocks)
         distances = retrieval.best_distances
-        distances[names != drives[0]] = math.nan
+        if num_here is None:
+            num_here = sum(name == drives[0] for name in drives)
+        distances[retrieval.best_places >= num_here] = math.nan
         if overlaps is None:
             overlaps = np.full(len(outcomes), math.nan)
         query_name, stamps_ns, positions = query
@@ -288,6 +294,31 @@ class PlaceOutcome:
         return Number(
             self.method, self.is_gated, metric, value, interval, count
         )
+
+
+def check_has_match(outcome: PlaceOutcome) -> None:
+    """Checks that a query has a match.
+
+    Raises:
+        InputError: none has one.
+    """
+    if outcome.outcomes.has_match.any():
+        return
+    protocol, database = outcome.protocol, outcome.database
+    if protocol.exclude_recent is not None and database == outcome.query:
+        raise InputError(
+            f"{outcome.query}: never within {protocol.radius:g} m of where it"
+            f" was {protocol.exclude_recent:g} s or more before"
+        )
+    if protocol.overlap is not None:
+        raise InputError(
+            f"{outcome.query}: no place of {database} shows"
+            f" {protocol.overlap:.0%} of what a query shows"
+        )
+    raise InputError(
+        f"{outcome.query}: no query lies within {protocol.radius:g} m of a"
+        f" place of {database} (the nearest at {outcome.nearest.min():.1f} m)"
+    )
 
 
 def faults(

@@ -3,9 +3,11 @@
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_outcome import (
+    PlaceOutcome,
+    check_has_match,
+)
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
@@ -65,24 +67,8 @@ def judge_retrieval(
     Raises:
         InputError: if no query has a match.
     """
-    if not retrieval.matches.any():
-        if protocol.exclude_recent is not None and database == query.name:
-            raise InputError(
-                f"{query.name}: never within {protocol.radius:g} m of where it"
-                f" was {protocol.exclude_recent:g} s or more before"
-            )
-        if protocol.overlap is not None:
-            raise InputError(
-                f"{query.name}: no place of {database} shows"
-                f" {protocol.overlap:.0%} of what a query shows"
-            )
-        nearest = retrieval.distances.min()
-        raise InputError(
-            f"{query.name}: no query lies within {protocol.radius:g} m of a"
-            f" place of {database} (the nearest at {nearest:.1f} m)"
-        )
     frames = retrieval.query_frames
-    return PlaceOutcome.of(
+    outcome = PlaceOutcome.of(
         method.name,
         method,
         protocol,
@@ -90,3 +76,5 @@ def judge_retrieval(
         (query.name, query.stamps_ns[frames], query.X_WS[frames, :3, 3]),
         [database] * len(retrieval.database_frames),
     )
+    check_has_match(outcome)
+    return outcome

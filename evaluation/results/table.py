@@ -47,8 +47,10 @@ _MEASURED = ("metric", "value", "low", "high", "n")
 STAGE = "both.stage"
 OWN = "own"
 LAST = "last"
-# The factor of the fresh versions of the shipped maps.
-FRESH = "both.fresh"
+# The factor of the frozen redraws of the shipped maps.
+FROZEN_REDRAW = "both.redraw.frozen"
+# Names of factors in tables of earlier versions -> names of now.
+_FORMER_FACTORS = {"both.fresh": FROZEN_REDRAW}
 # Names of other columns of `Key`, which no factor can have.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
@@ -420,6 +422,8 @@ class QueryRows:
             QUERIES,
             (*_NEEDED, *_NEEDED_ANSWERS),
             (*_MADE, *_ANSWERS),
+            # Tasks such as `change` and `map` have no queries.
+            may_be_empty=True,
         )
         names = [name for name in _ANSWERS if name in table.columns]
         found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
@@ -665,6 +669,8 @@ class _Cells:
         usual: str,
         needed: Iterable[str],
         known: Iterable[str] = (),
+        *,
+        may_be_empty: bool = False,
     ) -> _Cells:
         """Reads the lines of a table of results.
 
@@ -673,6 +679,7 @@ class _Cells:
             usual: name of the file in a folder.
             needed: names of columns that the file must have.
             known: names of further columns that are not factors.
+            may_be_empty: whether the file may have no rows.
         """
         path = Path(path)
         file = path / usual if path.is_dir() else path
@@ -701,6 +708,7 @@ class _Cells:
                     " character"
                 )
         needed = tuple(needed)
+        names = [_FORMER_FACTORS.get(name, name) for name in names]
         width = len(names)
         missing = [name for name in needed if name not in names]
         for former, command in _FORMER:
@@ -722,7 +730,7 @@ class _Cells:
                 raise InputError(f"{file}: line 1: '{name}' names no factor")
         columns = {name: k for k, name in enumerate(names)}
         rows = [one for one in rows if any(one[1])]
-        if not rows:
+        if not (rows or may_be_empty):
             raise InputError(f"{file}: no rows")
         for number, row in rows:
             if len(row) != width:

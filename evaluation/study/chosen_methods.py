@@ -1,5 +1,7 @@
 """Chooses the methods that a study runs: shipped ones and your own."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 import os
@@ -11,12 +13,14 @@ from cns_drake.base.jobs.fingerprint import script_digest
 from cns_drake.base.value_lists import repeated
 from evaluation.methods import (
     Method,
+    MethodConfig,
     known_methods,
     make_method,
     optional_methods,
     shipped_methods,
 )
 from evaluation.methods.method import load_method
+from evaluation.results.table import SETTINGS
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]
@@ -46,6 +50,25 @@ class MethodChoice:
         """Unique name: the method's name with its settings."""
         settings = (f"{name}={value}" for name, value in self.settings)
         return " ".join([self.name, *settings])
+
+    @property
+    def columns(self) -> dict[str, Setting]:
+        """Column of tables -> value of each setting."""
+        return {
+            f"{SETTINGS}{self.name}.{name}": value
+            for name, value in self.settings
+        }
+
+    def at_height(self, height: float) -> MethodChoice:
+        """Returns the method for a LiDAR at a height above the ground [m].
+
+        A height that the user has set for the method stays.
+        """
+        is_set = "sensor_height" in dict(self.settings)
+        if is_set or height == MethodConfig().sensor_height:
+            return self
+        height_set = ("sensor_height", str(height))
+        return replace(self, settings=(height_set, *self.settings))
 
     def make(self) -> Method:
         """Returns the chosen method, with its settings.

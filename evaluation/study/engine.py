@@ -1,6 +1,12 @@
 """Runs pairs of drives x tasks x methods, and turns results into two tables."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Mapping,
+    MutableMapping,
+    Sequence,
+)
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,7 +57,7 @@ class Engine:
 
     experiment: str
     tasks: Mapping[str, Task]
-    methods: Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]
+    methods: MutableMapping[str, tuple[MethodChoice, Mapping[str, Any]]]
     output: Path
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
@@ -63,6 +69,7 @@ class Engine:
         comparisons: Sequence[Pair],
         distractors: Sequence[NamedDrive] = (),
         make_jobs: Callable[..., Jobs] = Jobs,
+        tasks: Collection[str] | None = None,
     ) -> Jobs:
         """Adds the jobs of all comparisons on one map, and returns them.
 
@@ -71,6 +78,8 @@ class Engine:
             distractors: drives through other cities, whose places are added to
                 databases in this order.
             make_jobs: class of the jobs, which says how drives are read.
+            tasks: names of the tasks that measure these comparisons; by default
+                all.
         """
         planned = make_jobs(
             StudyFiles(self.output),
@@ -81,6 +90,8 @@ class Engine:
             for one in comparisons:
                 planned.expect(one)
         for name, task in self.tasks.items():
+            if tasks is not None and name not in tasks:
+                continue
             seen: set[tuple[str, str]] = set()
             for one in comparisons:
                 both = one.database.name, one.query.name
@@ -109,7 +120,13 @@ class Engine:
         self._announce(cluster)
         run_jobs(jobs, cluster)
         doing("writing the tables and the page")
-        tables = self.write_tables()
+        tables = self.tables()
+        if not tables[0].rows:
+            raise InputError(
+                f"{self.experiment}: nothing could be measured; the notes say"
+                " why"
+            )
+        self._write(*tables)
         spend(jobs)
         return tables
 
@@ -119,7 +136,11 @@ class Engine:
         Raises:
             InputError: a job has not been done, or a file cannot be written.
         """
-        results, queries = self.tables()
+        return self._write(*self.tables())
+
+    def _write(
+        self, results: Results, queries: QueryRows
+    ) -> tuple[Results, QueryRows]:
         results.write_csv(self.output / RESULTS)
         queries.write_csv(self.output / QUERIES)
         return results, queries

@@ -112,8 +112,7 @@ def draw_stages(
     spread = spread_over_grids(earlier, later, report.change)
     report = replace(report, spread=spread)
     for control in controls:
-        names = control.source, control.target
-        report = replace(report, control=control.change, control_names=names)
+        report = report.beside(control)
     result = ChangeResult(map_name, stages, report)
     doing("drawing the change")
     make_folder(stems[0].parent)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,21 @@ from evaluation.study.surveys import (
     describe_recording,
 )
 
+
+class Searched(NamedTuple):
+    """A database that is searched: places of one drive or of several.
+
+    Attributes:
+        described: the described places.
+        drives: name of each place's drive.
+        num_here: number of places in the query's own world; they come first.
+    """
+
+    described: DescribedDrive
+    drives: list[str]
+    num_here: int
+
+
 # The source of a drive, or the parts of its scans and of its descriptions by
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
@@ -48,6 +63,8 @@ def shown_overlaps(
     choice: MethodChoice,
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
+    beside: tuple[tuple[Part, Part], ...] = (),
+    leaves_out_itself: bool = False,
 ) -> dict[float, np.ndarray]:
     """Returns how much of each query's scan its best match shows.
 
@@ -59,6 +76,9 @@ def shown_overlaps(
         choice: the method.
         protocol: protocol by which the queries are shown.
         radii: radii of a match [m].
+        beside: files with the scans of further drives in the same world, and
+            with a method's descriptions of their places.
+        leaves_out_itself: see `Pair`.
 
     Returns:
         Radius -> (Q,) overlaps; NaN without a match.
@@ -76,6 +96,12 @@ def shown_overlaps(
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
         ]
+    kept += [scan for scans, _ in beside for scan in scans.read()]
+    database = crowded(
+        database, (), 0, [places for _, places in beside]
+    ).described
+    names = [""] * len(kept)
+    allowed = _others(query, names) if leaves_out_itself else True
     return {
         radius: best_overlaps(
             kept,
@@ -84,7 +110,8 @@ def shown_overlaps(
             query.queries.X_WS,
             matches_within_radius(
                 database, query, replace(protocol, radius=radius)
-            ),
+            )
+            & allowed,
         )
         for radius in radii
     }
@@ -100,6 +127,8 @@ def measure_method(
     overlaps: Part | None,
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
+    beside: tuple[Part, ...] = (),
+    leaves_out_itself: bool = False,
 ) -> list[PlaceOutcome]:
     """Returns the outcomes of one method, as `measure_places` does.
 
@@ -114,6 +143,9 @@ def measure_method(
         overlaps: file with the result of `shown_overlaps`; None to leave
             overlaps unknown.
         protocol, radii: see `measure_places`.
+        beside: files with the method's descriptions of the places of further
+            drives in the same world.
+        leaves_out_itself: see `Pair`.
     """
     # The method comes first, because it registers the type of its
     # descriptions.
@@ -121,14 +153,14 @@ def measure_method(
     (placed, mapped), (placed_query, asked) = database.read(), query.read()
     check_same_world(placed, placed_query, across_maps=True)
     shown = {} if overlaps is None else overlaps.read()
-    searched, drives = crowded(mapped, distractors, num_distractors)
     return _compare(
         (choice, method),
-        (searched, drives),
+        crowded(mapped, distractors, num_distractors, beside),
         asked,
         (protocol, radii),
         lambda radius, matches: shown.get(radius),
         reporter,
+        leaves_out_itself=leaves_out_itself,
     )
 
 
@@ -141,6 +173,8 @@ def measure_places(
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
+    truth: np.ndarray | None = None,
+    leaves_out_slow: bool = True,
 ) -> list[PlaceOutcome]:
     """Returns the outcomes of methods, for several radii of a match.
 
@@ -148,8 +182,6 @@ def measure_places(
     candidates. The second is with geometric verification, which rejects
     candidates that lie beyond the radius according to the method's own pose
     estimate.
-
-    A method that would take more than an hour for all queries is left out.
 
     Args:
         reporter: reports progress.
@@ -165,6 +197,10 @@ def measure_places(
         protocol: the protocol of the comparison; its own radius does not
             matter.
         radii: radii of a match [m].
+        truth: (Q, D) overlap of each query with each place, if the protocol
+            says that matches are by overlap.
+        leaves_out_slow: whether to leave out a method that would take more than
+            an hour for all queries.
     """
     place_scans, places = _describe(
         database, "places", methods, protocol, reporter
@@ -205,43 +241,61 @@ def measure_places(
             (protocol, radii),
             shown,
             reporter,
+            truth,
+            leaves_out_slow=leaves_out_slow,
         )
     return outcomes
 
 
 def _compare(
     chosen: tuple[MethodChoice, Method],
-    database: tuple[DescribedDrive, list[str]],
+    database: Searched,
     query: DescribedDrive,
     asked: tuple[RetrievalProtocol, tuple[float, ...]],
     shown: Callable[[float, np.ndarray], np.ndarray | None],
     reporter: Reporter,
+    truth: np.ndarray | None = None,
+    *,
+    leaves_out_itself: bool = False,
+    leaves_out_slow: bool = True,
 ) -> list[PlaceOutcome]:
     """Returns the outcomes of a method; none if it would take too long.
 
     Args:
         chosen: the method, as it was chosen and as it was made.
-        database: the described places, and the name of each one's drive.
+        database: the places that are searched.
         query: the described queries.
         asked: the protocol, and radii of a match [m].
         shown: function that returns overlaps (Q,) of the queries for a radius
             and the matches (Q, D) within it.
         reporter: reports notes.
+        truth, leaves_out_slow: see `measure_places`.
+        leaves_out_itself: see `Pair`.
     """
     choice, method = chosen
-    searched, drives = database
+    searched, drives, num_here = database
     protocol, radii = asked
-    if len(searched.places.frames) > _MANY and _takes_long(
-        method, searched, query
+    if (
+        leaves_out_slow
+        and len(searched.places.frames) > _MANY
+        and _takes_long(method, searched, query)
     ):
         reporter.note(f"{choice.name}: it would take over an hour")
         return []
     plain, *by_gate = compare_with_gates(
-        method, searched, query, protocol, [None, *radii]
+        method,
+        searched,
+        query,
+        protocol,
+        [None, *radii],
+        truth,
+        _others(query, drives) if leaves_out_itself else None,
     )
     outcomes = []
     for radius, one in zip(radii, by_gate, strict=True):
-        matches = (plain.distances <= radius) & plain.is_known
+        matches = plain.matches
+        if truth is None:
+            matches = (plain.distances <= radius) & plain.is_known
         overlaps = shown(radius, matches)
         outcomes += [
             PlaceOutcome.of(
@@ -252,10 +306,16 @@ def _compare(
                 (query.name, query.queries.stamps_ns, query.queries.p_WSs),
                 drives,
                 overlaps,
+                num_here,
             )
             for is_gated, found in ((False, plain), (True, one))
         ]
     return outcomes
+
+
+def _others(query: DescribedDrive, drives: Sequence[str]) -> np.ndarray:
+    """Returns (Q, D) bool, all places but that of the query's own scan."""
+    return ~np.eye(len(query.queries.frames), len(drives), dtype=bool)
 
 
 def _takes_long(
@@ -292,8 +352,9 @@ def crowded(
     database: DescribedDrive,
     distractors: Sequence[Part],
     num_others: int,
-) -> tuple[DescribedDrive, list[str]]:
-    """Returns a database to which places of other cities are added.
+    beside: Sequence[Part] = (),
+) -> Searched:
+    """Returns a database to which places of other drives are added.
 
     The drives through other cities are moved so far away that none of their
     places is a match. Their first `num_others` places are appended, or all if
@@ -304,20 +365,19 @@ def crowded(
         distractors: for each drive through another city, the file with the
             same method's descriptions of its places.
         num_others: number of places to append.
-
-    Returns:
-        The database with all places; and for each place, the name of the drive
-        from which it comes.
+        beside: files with the same method's descriptions of further drives in
+            the same world. All of their places come before those of other
+            cities.
     """
-    known = [database]
+    known = [database, *(part.read()[1] for part in beside)]
+    num_here = sum(len(one.places.frames) for one in known)
+    most = num_here + num_others
+    worlds = [0] * len(known)
     for part in distractors:
-        if sum(len(d.places.frames) for d in known[1:]) >= num_others:
+        if sum(len(one.places.frames) for one in known) >= most:
             break
         known.append(part.read()[1])
-    places = joined_scans(
-        [one.places for one in known],
-        range(len(known)),
-        len(database.places.frames) + num_others,
-    )
+        worlds.append(worlds[-1] + 1)
+    places = joined_scans([one.places for one in known], worlds, most)
     drives = [one.name for one in known for _ in one.places.frames]
-    return replace(database, places=places), drives
+    return Searched(replace(database, places=places), drives[:most], num_here)

@@ -1,80 +1,209 @@
-"""The two tables of one method on one pair of drives, which was measured."""
+"""A single pair of drives, which the engine measures at once, in this process.
 
-from collections.abc import Mapping
+The commands `pr`, `tcr`, `localise` and `map-update` are studies of one pair.
+Their results stay in memory, and may be written as the two tables of a study.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import SETTINGS
-from evaluation.study.chosen_methods import MethodChoice, Setting
+from cns_drake.base.jobs.step import Reporter
+from evaluation.change.drive_change import Surveyed
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
-from evaluation.study.surveys import RecordingSource
-from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Held, NamedDrive, Pair
+from evaluation.study.parts import Part, StudyFiles
+from evaluation.study.tasks.task import (
+    Held,
+    Jobs,
+    NamedDrive,
+    Pair,
+    Result,
+    Task,
+    job_name,
+)
 
-# Name of the experiment in tables of a single pair.
-_EXPERIMENT = "pr"
+
+@dataclass(frozen=True, eq=False)
+class OpenSource:
+    """The source of a drive, a point cloud or a map that is open already.
+
+    Attributes:
+        opened: the drive, or the path of a point cloud.
+        columns: number of values per point in `.bin` files; by default guessed
+            from the values.
+        surveyed: its map, if it was made already.
+    """
+
+    opened: Drive | Path
+    columns: int | None = None
+    surveyed: Surveyed | None = None
+
+    def __call__(self) -> Any:
+        """Returns the open drive, or the path of the point cloud."""
+        return self.opened
+
+    def identity(self) -> str:
+        """Returns the name; results of open drives are never stored."""
+        return self.opened.name
 
 
-def write_pair_tables(
-    output: Path,
-    outcome: PlaceOutcome,
-    paths: tuple[Path, Path],
-    query: Drive,
-    protocol: RetrievalProtocol,
-    settings: Mapping[str, Setting],
-    sensor_height: float | None = None,
-) -> None:
-    """Writes an outcome as `results.csv` and `queries.csv`.
+@dataclass
+class JobsAtOnce(Jobs):
+    """Jobs that are done when they are added. Their results are in memory.
+
+    Attributes:
+        on_note: is called with each note of a job.
+    """
+
+    # Who asks for one method waits for it.
+    leaves_out_slow = False
+
+    on_note: Callable[[str], None] = lambda text: None
+    _done: dict[str, Held] = field(default_factory=dict)
+
+    def mapped(
+        self, drive: NamedDrive, spacing: float | None, needs: list[str]
+    ) -> Result:
+        if isinstance(drive.source, OpenSource) and drive.source.surveyed:
+            return Held(drive.source.surveyed)
+        return super().mapped(drive, spacing, needs)
+
+    def add(
+        self,
+        part: Part,
+        function: Callable[..., object],
+        arguments: tuple[object, ...],
+        needs: Iterable[str] = (),
+        cost: float = 0.0,
+    ) -> Result:
+        name = job_name(part)
+        if name not in self._done:
+            self._done[name] = Held(function(self._reporter(), *arguments))
+        return self._done[name]
+
+    def _reporter(self) -> Reporter:
+        def send(kind: str, *values: Any) -> None:
+            if kind == "note":
+                self.on_note(*values)
+
+        return Reporter(send)
+
+
+def measured(
+    experiment: str,
+    pairs: Iterable[Pair],
+    tasks: Iterable[Task],
+    output: Path | None = None,
+    methods: Iterable[tuple[MethodChoice, Mapping[str, Any]]] = (),
+    on_note: Callable[[str], None] = lambda text: None,
+    processes: int = 1,
+) -> Engine:
+    """Measures pairs of drives, and returns the engine with the results.
 
     Args:
-        output: folder of the tables.
-        outcome: the outcome.
-        paths: paths of the database and of the query.
-        query: the drive of the queries.
-        protocol: the protocol that was asked for.
-        settings: name -> value of the settings of the method that were given.
-        sensor_height: height of the LiDAR [m]; None for the methods' default.
+        experiment: name of the experiment in the tables.
+        pairs: the pairs.
+        tasks: the tasks.
+        output: folder in which `Engine.write_tables` writes both tables.
+        methods: methods of place recognition, each with the columns of its
+            settings in tables.
+        on_note: is called with notes on what is left out.
+        processes: number of processes that a task may use.
 
     Raises:
-        InputError: a table cannot be written.
+        InputError: something cannot be measured.
     """
-    name = outcome.method
-    columns = {f"{SETTINGS}{name}.{key}": v for key, v in settings.items()}
-    height = {} if sensor_height is None else {"sensor_height": sensor_height}
-    choice = MethodChoice(name, settings=tuple(settings.items()))
-    tasks = {task.name: task({}, _EXPERIMENT) for task in (PlaceTask, PoseTask)}
-    names = outcome.database, outcome.query
-    database, asked = (
-        NamedDrive(one, RecordingSource(path))
-        for one, path in zip(names, paths, strict=True)
-    )
-    engine = Engine(_EXPERIMENT, tasks, {name: (choice, columns)}, output)
-    engine.measured.append(
-        Pair(
-            map_name=_map_of(query),
-            names=names,
-            factors={},
-            seed=protocol.seed,
-            is_baseline=False,
-            stated=protocol,
-            key=" ".join(names),
-            database=database,
-            query=asked,
-            way=database,
-            protocol=protocol,
-            settings=height,
-            parts=dict.fromkeys(tasks, (Held([outcome]),)),
+
+    def jobs(
+        files: StudyFiles,
+        methods: tuple[MethodChoice, ...],
+        distractors: Sequence[NamedDrive],
+    ) -> JobsAtOnce:
+        return JobsAtOnce(
+            files, methods, distractors, processes=processes, on_note=on_note
         )
+
+    engine = Engine(
+        experiment,
+        {one.name: one for one in tasks},
+        {one.key: (one, columns) for one, columns in methods},
+        output or Path(),
+        on_note,
     )
-    engine.write_tables()
+    engine.add(list(pairs), make_jobs=jobs)
+    return engine
 
 
-def _map_of(drive: Drive) -> str:
+def pair_of(
+    database: OpenSource,
+    query: OpenSource,
+    names: tuple[str, str],
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    settings: Mapping[str, Any] | None = None,
+    **more: Any,
+) -> Pair:
+    """Returns a pair of open drives, clouds or maps.
+
+    Args:
+        database, query: the drives.
+        names: their names in tables.
+        protocol: the protocol that was asked for.
+        settings: name -> value of settings outside of the protocol that change
+            a number.
+        more: further fields of the pair.
+    """
+    drives = [
+        NamedDrive(name, source)
+        for name, source in zip(names, (database, query), strict=True)
+    ]
+    values: dict[str, Any] = {
+        "map_name": _map_of(query.opened),
+        "names": names,
+        "factors": {},
+        "seed": protocol.seed,
+        "is_baseline": False,
+        "stated": protocol,
+        "key": " ".join(names),
+        "database": drives[0],
+        "query": drives[1],
+        "way": drives[0],
+        "protocol": protocol,
+        "settings": settings or {},
+    }
+    return Pair(**{**values, **more})
+
+
+def pair_of_surveys(
+    both: tuple[Surveyed, Surveyed], names: tuple[str, str], **more: Any
+) -> Pair:
+    """Returns a pair of drives or map files whose voxel maps are known.
+
+    The other arguments are those of `pair_of`.
+    """
+    database, query = (OpenSource(Path(one.name), surveyed=one) for one in both)
+    drive = both[1].drive
+    map_name = drive if isinstance(drive, Drive) else query.opened
+    return pair_of(database, query, names, map_name=_map_of(map_name), **more)
+
+
+def pair_of_maps(older: Path, newer: Path, map_name: str) -> Pair:
+    """Returns a pair of maps in folders, for a task that reads them itself."""
+    sources = OpenSource(older), OpenSource(newer)
+    return pair_of(
+        *sources, (older.name, newer.name), map_name=one_line(map_name)
+    )
+
+
+def _map_of(opened: Drive | Path) -> str:
     """Returns the name of a drive's map, or else of its world frame."""
-    named = (drive.scenario or {}).get("map")
+    if isinstance(opened, Path):
+        return one_line(opened.name)
+    named = (opened.scenario or {}).get("map")
     if named is not None:
         return one_line(Path(str(named)).name)
-    return drive.world_frame.partition("/")[0] or drive.name
+    return opened.world_frame.partition("/")[0] or opened.name

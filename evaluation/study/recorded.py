@@ -14,9 +14,9 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import City
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.parts import FeatureFiles, Part
+from evaluation.study.parts import FeatureFiles
 from evaluation.study.surveys import FeatureExtraction, Further
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
+from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result
 
 # Expected seconds: for the maps of a drive of 3000 scans, and for its places or
 # queries.
@@ -140,7 +140,7 @@ class ExtractionJobs(Jobs):
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]
-    ) -> Part:
+    ) -> Result:
         if spacing is not None:
             return super().mapped(drive, spacing, needs)
         return self.survey(drive, needs).drive

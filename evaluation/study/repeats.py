@@ -45,7 +45,7 @@ class Repeat:
             pair,
             stated=self.protocol,
             protocol=self.protocol,
-            key=f"{pair.key} {self.protocol.name} {self.method.key}",
+            key=f"{pair.key} published {self.method.key}",
             parts={},
         )
 

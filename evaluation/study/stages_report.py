@@ -20,7 +20,7 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.report import page, result_tables
 from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.results.table import LAST, OWN, SETTINGS, STAGE, Results
+from evaluation.results.table import LAST, OWN, STAGE, Results
 from evaluation.study import figures
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
@@ -103,13 +103,7 @@ class StagesReport:
         return Engine(
             _EXPERIMENT,
             made_tasks({name: {} for name in _TASKS}, _TASKS, _EXPERIMENT),
-            {
-                one.key: (
-                    one,
-                    {f"{SETTINGS}{one.name}.{k}": v for k, v in one.settings},
-                )
-                for one in self.methods
-            },
+            {one.key: (one, one.columns) for one in self.methods},
             self.output.absolute(),
         )
 

@@ -5,11 +5,10 @@ import math
 from typing import Any, ClassVar
 
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import ChangeReport, compare_maps
+from evaluation.change.drive_change import ChangeReport, change_between
 from evaluation.recognition.place_outcome import Number
-from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSummary
-from evaluation.study.tasks.task import Jobs, Pair, Task, positive
+from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
 
 
 class ChangeTask(Task):
@@ -27,7 +26,7 @@ class ChangeTask(Task):
         if value is not None:
             positive(value, where)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if pair.closes_loops:
             return ()
         needs: list[str] = []
@@ -57,7 +56,7 @@ class ChangeTask(Task):
 
 
 def measure_change(
-    reporter: Reporter, first: Part, second: Part
+    reporter: Reporter, first: Result, second: Result
 ) -> ChangeReport:
     """Returns how much changed between two drives.
 
@@ -73,4 +72,4 @@ def measure_change(
     a, b = (
         one.surveyed if isinstance(one, DriveSummary) else one for one in maps
     )
-    return compare_maps(a, b, grids=())
+    return change_between(a, b)

@@ -1,25 +1,26 @@
 """The task `localise`: scans are localised in a map of the database."""
 
 from collections.abc import Iterator, Mapping, Sequence
+import math
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from cns_drake.base import points as clouds
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
-from evaluation.localisation import estimators, localise
+from evaluation.localisation import estimators, localise, tracking
 from evaluation.localisation.localise import Starts
+from evaluation.maps.voxel_maps import map_drive
 from evaluation.recognition.place_outcome import Number, kept_share
-from evaluation.study.parts import Part
 from evaluation.study.surveys import DriveSource
 from evaluation.study.tasks.task import (
     Answered,
     Jobs,
     Pair,
+    Result,
     Task,
     positive,
 )
@@ -29,20 +30,34 @@ SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
 _COST = 60.0
+# Scans within this distance make the map of a scan that is localised among
+# the others of its drive [m].
+_AROUND = 30.0
+# The end of a note on a drive without a query near the map.
+NOT_LOCALISED = ": not localised"
 
 
 class LocaliseTask(Task):
-    """Measures how well scans are aligned to a map from wrong initial poses."""
+    """Measures how well scans are aligned to a map from wrong initial poses.
+
+    With the setting `odometry_drift`, drives are tracked instead of single
+    scans. The setting `estimator` contains settings of all its methods.
+    """
 
     name = "localise"
     defaults: ClassVar[Mapping[str, Any]] = {
         "methods": list(SHIPPED),
         "starts": [[2.0, 10.0]],
         "spacing": None,
+        "seed": 0,
+        "odometry_drift": None,
+        "estimator": {},
     }
 
     def check(self, name: str, value: Any, where: str) -> None:
-        if name == "spacing":
+        if name in ("seed", "odometry_drift", "estimator"):
+            _check(name, value, where)
+        elif name == "spacing":
             positive(value, where)
         elif name == "methods":
             for one in value:
@@ -67,11 +82,11 @@ class LocaliseTask(Task):
             if len(set(radii)) < len(radii):
                 raise InputError(f"{where}: two starts at one distance")
 
-    @staticmethod
-    def _starts(values: Any) -> tuple[Starts, ...]:
-        return tuple(Starts(float(r), float(turn)) for r, turn in values)
+    def _starts(self, values: Any) -> tuple[Starts, ...]:
+        seed = self.settings["seed"]
+        return tuple(Starts(float(r), float(turn), seed) for r, turn in values)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         # Estimators of the user are identified by path and content.
         named = tuple(
             Path(one).absolute() if one.endswith(".py") else one
@@ -81,16 +96,23 @@ class LocaliseTask(Task):
             read_bytes(one).hex() if isinstance(one, Path) else ""
             for one in named
         )
+        starts = self._starts(self.settings["starts"])
+        part = jobs.files.part("localise", pair.key)
+        if pair.leaves_out_itself:
+            only = pair.database.source, named, texts, starts
+            return (jobs.add(part, localise_among_others, only, cost=_COST),)
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
         arguments = (
             pair.database.source,
             pair.query.source,
             named,
             texts,
-            self._starts(self.settings["starts"]),
+            starts,
             spacing,
+            tuple(self.settings["estimator"].items()),
+            self.settings["odometry_drift"],
+            jobs.processes,
         )
-        part = jobs.files.part("localise", pair.key)
         found = jobs.add(part, measure_localisation, arguments, cost=_COST)
         return (found,)
 
@@ -110,6 +132,8 @@ class LocaliseTask(Task):
         then = dict(self._runs(before)) if before is not None else {}
         for method, rows in self._runs(found):
             yield from localise.numbers(rows, method)
+            if self.settings["odometry_drift"] is not None:
+                yield from tracking.numbers(rows, method)
             if method in then:
                 share = kept_share(
                     float(localise.is_right(rows).mean()),
@@ -122,6 +146,21 @@ class LocaliseTask(Task):
             yield method, False, localise.columns(rows)
 
 
+def _check(name: str, value: Any, where: str) -> None:
+    """Checks a setting that has no list of values."""
+    if name == "estimator":
+        fits, wanted = isinstance(value, dict), "a mapping of settings"
+    elif name == "seed":
+        fits = type(value) is int and value >= 0
+        wanted = "a whole number from 0 on"
+    else:
+        is_number = type(value) in (int, float)
+        fits = value is None or (is_number and 0.0 <= value <= 1.0)
+        wanted = "a share from 0 to 1"
+    if not fits:
+        raise InputError(f"{where}: {value!r} is not {wanted}")
+
+
 def measure_localisation(
     reporter: Reporter,
     database: DriveSource,
@@ -130,6 +169,9 @@ def measure_localisation(
     texts: tuple[str, ...],
     starts: tuple[Starts, ...],
     spacing: float,
+    values: tuple[tuple[str, Any], ...] = (),
+    odometry_drift: float | None = None,
+    processes: int = 1,
 ) -> list[np.ndarray]:
     """Localises the queries of a pair of drives in one world.
 
@@ -138,7 +180,7 @@ def measure_localisation(
 
     Args:
         reporter: reports progress.
-        database: the drive of the map.
+        database: the drive of the map, or the file of its points.
         query: the drive whose scans are localised.
         methods: names of registration methods, or Python files with your own.
         texts: contents of those files, and "" for names. Results are computed
@@ -146,52 +188,113 @@ def measure_localisation(
         starts: how the random initial poses of the scans are drawn, one entry
             for each size of their errors.
         spacing: distance between two queries [m].
+        values: settings of the methods that differ from their defaults.
+        odometry_drift: drift of the odometry with which the drive is tracked,
+            see `evaluation.localisation.tracking`; None to localise single
+            scans, `spacing` apart.
+        processes: number of processes, where the system can fork.
 
     Returns:
         An array for each pair of a method and an entry of `starts`: first those
         of the first method, in the order of `starts`. Each array contains one
-        record of `evaluation.localisation.localise.QUERY` per query. If no
-        query is near the map, the list is empty.
+        record of `evaluation.localisation.localise.QUERY` per query, or one of
+        `TRACKED` per tracked scan. If no query is near the map, the list is
+        empty.
     """
     mapped = database()
     asked = query()
+    columns = getattr(database, "columns", None)
     maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
     localisers = []
-    for method in methods:
-        settings = estimators.default_settings(str(method))
+    for method in map(str, methods):
+        settings = estimators.default_settings(method)
+        settings = settings.with_values(values, method)
+        estimator = estimators.make_estimator(method, settings)
         key = settings.voxel, settings.neighbours
         if key not in maps:
             # The drive is opened anew for each other map.
             source = mapped if not maps else database()
-            maps[key] = estimators.make_map(source, settings)
-        estimator = estimators.make_estimator(str(method), settings)
+            maps[key] = estimators.make_map(
+                source, settings, columns, reporter.note
+            )
         localisers.append(localise.Localiser(maps[key], estimator, settings))
     try:
         is_mapped = localise.mapped_frames(
             mapped, localisers[0].surroundings, asked
         )
     except InputError as error:
-        reporter.note(f"{error}: not localised")
+        reporter.note(f"{error}{NOT_LOCALISED}")
         return []
-    frames = localise.query_frames(asked, is_mapped, spacing)
-    X_WS = asked.X_WS
+    if odometry_drift is None:
+        frames = localise.query_frames(asked, is_mapped, spacing)
+        found = localise.localise(localisers, asked, frames, starts, processes)
+    else:
+        found = [
+            # A drive may be simulated while it is read: each track opens it.
+            tracking.track_drive(one, query(), is_mapped, draw, odometry_drift)
+            for one in localisers
+            for draw in starts
+        ]
+    localise.note_sparse(asked.name, found[0], reporter.note)
+    return found
+
+
+def localise_among_others(
+    reporter: Reporter,
+    source: DriveSource,
+    methods: tuple[str | Path, ...],
+    texts: tuple[str, ...],
+    starts: tuple[Starts, ...],
+) -> list[np.ndarray]:
+    """Localises each scan of a drive in a map of the other scans around it.
+
+    A scan without another one within `NEAR` is left out.
+
+    Args:
+        reporter: reports progress.
+        source: the drive, whose scans can be read in any order.
+        methods, texts, starts: see `measure_localisation`.
+
+    Returns:
+        As `measure_localisation`.
+    """
+    drive = source()
+    X_WS = drive.X_WS
     R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
-    found: list[list[np.ndarray]] = [
-        [] for _ in range(len(methods) * len(starts))
+    made = [
+        (estimators.make_estimator(one, settings), settings)
+        for one in map(str, methods)
+        for settings in (estimators.default_settings(one),)
     ]
-    for frame in track(frames, "localising", len(frames), "scans"):
-        scan = clouds.from_xyz(clouds.xyz(asked.scan(frame)))
+    found: list[list[np.ndarray]] = [[] for _ in range(len(made) * len(starts))]
+    frames = range(len(drive))
+    for k in track(frames, f"localising {drive.name}", len(frames), "scans"):
+        apart = np.linalg.norm(X_WS[:, :3, 3] - X_WS[k, :3, 3], axis=1)
+        apart[k] = math.inf
+        if apart.min() > localise.NEAR:
+            continue
+        around = np.flatnonzero(apart < _AROUND).tolist()
+        mapped = map_drive(drive, estimators.Settings.voxel, frames=around)
+        surroundings = estimators.map_of(
+            mapped.centroids_W, drive.name, estimators.Settings()
+        )
+        stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
         ends = iter(found)
-        for localiser in localisers:
-            for draw in starts:
-                row, _ = localiser.query(
-                    frame,
-                    int(asked.stamps_ns[frame]),
-                    scan,
-                    X_WS[frame],
-                    R_WT[frame],
-                    *draw.draw(frame),
+        for estimator, settings in made:
+            one = localise.Localiser(surroundings, estimator, settings)
+            for some in starts:
+                row, _ = one.query(
+                    k, stamp_ns, scan, X_WS[k], R_WT[k], *some.draw(k)
                 )
                 next(ends).append(row)
-    localise.note_sparse(asked.name, np.array(found[0]), reporter.note)
-    return [np.array(rows) for rows in found]
+    number = len(found[0])
+    if number < len(drive):
+        reporter.note(
+            f"{drive.name}: {number} of {len(drive)} scans localised; the"
+            f" others have no other scan within {localise.NEAR:g} m"
+        )
+    if number == 0:
+        return []
+    rows = [np.array(some, localise.QUERY) for some in found]
+    localise.note_sparse(drive.name, rows[0], reporter.note)
+    return rows

@@ -22,7 +22,7 @@ from evaluation.study.measurements import (
     shown_overlaps,
 )
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.tasks.task import Answered, Jobs, Pair, Task
+from evaluation.study.tasks.task import Answered, Jobs, Pair, Result, Task
 
 # Expected time to describe a pair and to compare it by all methods [s].
 _PLACES_COST = 60.0
@@ -42,7 +42,7 @@ class PoseTask(Task):
     asks = True
     _numbers = staticmethod(pose_numbers)
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         needs: list[str] = []
         radii = tuple(sorted(jobs.radii[pair.key]))
         protocol = replace(pair.protocol, radius=radii[0])
@@ -51,6 +51,11 @@ class PoseTask(Task):
             for drive, role in pair.roles
         )
         others = jobs.elsewhere(pair, needs)
+        near = [
+            jobs.described(one, "places", pair.protocol, needs, kept=True)
+            for one in pair.beside
+        ]
+        beside = [one for one in near if isinstance(one, tuple)]
         # The task `place` reads the same files.
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
             part = jobs.files.part("place", pair.key)
@@ -62,6 +67,8 @@ class PoseTask(Task):
                 jobs.methods,
                 protocol,
                 radii,
+                pair.overlaps,
+                jobs.leaves_out_slow,
             )
             return (
                 jobs.add(part, measure_places, arguments, needs, _PLACES_COST),
@@ -76,6 +83,8 @@ class PoseTask(Task):
                 jobs.methods[0],
                 protocol,
                 radii,
+                tuple((parts[0], parts[1]) for parts in beside),
+                pair.leaves_out_itself,
             ),
         )
         overlaps = (shown,) if jobs.shows_overlaps else ()
@@ -92,6 +101,8 @@ class PoseTask(Task):
                     shown.part if overlaps else None,
                     protocol,
                     radii,
+                    tuple(parts[k] for parts in beside),
+                    pair.leaves_out_itself,
                 ),
             )
             for k, choice in enumerate(jobs.methods, start=1)
@@ -134,7 +145,7 @@ class CostTask(Task):
     name = "cost"
     asks = True
 
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         needs: list[str] = []
         database, query = (
             jobs.described(drive, role, pair.protocol, needs, kept=True)
@@ -186,7 +197,7 @@ def measure_costs(
         method = choice.make()
         mapped = database[k].read()[1]
         others = [parts[k] for parts in distractors]
-        places = crowded(mapped, others, num_distractors)[0].places
+        places = crowded(mapped, others, num_distractors).described.places
         asked = query[k].read()[1].queries
         found[choice.key] = measure_search(method, places, asked)
     return found

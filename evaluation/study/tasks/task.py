@@ -15,7 +15,7 @@ from cns_drake.base.value_lists import repeated
 from evaluation.recognition.description import Role
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import FRESH
+from evaluation.results.table import FROZEN_REDRAW
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
@@ -96,6 +96,10 @@ class Pair:
         protocol: protocol of place recognition.
         distractors: number of places of other cities that are added to the
             database.
+        beside: further drives in the same world, whose places are added to the
+            database.
+        leaves_out_itself: whether a drive is compared with itself, and each
+            scan with all scans but itself.
         may_repeat: whether the pair can repeat drives of another pair,
             because its condition changes the queries (turned, tilted or partly
             hidden) or adds distractors. A task whose results depend only on the
@@ -103,6 +107,8 @@ class Pair:
         settings: name -> value of settings outside of the protocol that change
             a number, such as the height of a LiDAR that differs from the
             methods' default.
+        overlaps: (Q, D) overlap of each query with each place, if the protocol
+            says that matches are by overlap; otherwise None.
         parts: task -> its results, as files or in memory, for the tasks that
             measure the pair.
     """
@@ -119,8 +125,11 @@ class Pair:
     way: NamedDrive
     protocol: RetrievalProtocol
     distractors: int = 0
+    beside: tuple[NamedDrive, ...] = ()
+    leaves_out_itself: bool = False
     may_repeat: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
+    overlaps: np.ndarray | None = None
     parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
 
     @property
@@ -129,7 +138,7 @@ class Pair:
         fixed = [
             (name, value)
             for name, value in self.factors.items()
-            if name == FRESH or name.startswith("protocol.")
+            if name == FROZEN_REDRAW or name.startswith("protocol.")
         ]
         return self.map_name, self.names, *fixed
 
@@ -162,11 +171,15 @@ class Jobs:
             keeps the order and omits repetitions.
         radii: key of a pair -> the greatest distances between a query and its
             match that are used for this pair [m].
+        processes: number of processes that a task may use by itself.
         shows_overlaps: whether results contain how much of each query's scan
             its best match shows, which takes time.
+        leaves_out_slow: whether methods that would take more than an hour for a
+            pair are left out.
     """
 
     shows_overlaps: ClassVar[bool] = True
+    leaves_out_slow: ClassVar[bool] = True
 
     files: StudyFiles
     methods: tuple[MethodChoice, ...]
@@ -174,6 +187,7 @@ class Jobs:
     jobs: dict[str, Job] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     radii: dict[str, set[float]] = field(default_factory=dict)
+    processes: int = 1
     # Description -> keys of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
@@ -236,7 +250,7 @@ class Jobs:
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]
-    ) -> Part:
+    ) -> Result:
         """Returns the file with a drive's map, and adds the job that makes it.
 
         Args:
@@ -286,7 +300,7 @@ class Jobs:
         arguments: tuple[object, ...],
         needs: Iterable[str] = (),
         cost: float = _OTHER_COST,
-    ) -> Part:
+    ) -> Result:
         """Adds a job that writes a file of results; returns the file.
 
         The job is named by the file's folder and name.
@@ -383,12 +397,12 @@ class Task(abc.ABC):
         }
 
     @abc.abstractmethod
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Part, ...]:
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         """Adds the jobs that measure a pair of drives to `jobs`.
 
         Returns:
-            The files to which the jobs write the result; none if the task does
-            not apply to the pair.
+            The results, as files to which the jobs write them or in memory;
+            none if the task does not apply to the pair.
         """
 
     def found(self, pair: Pair) -> Any:

@@ -630,8 +630,11 @@ FAULTS = [
     ("query: {distractors: 3}", "query.distractors: it is a field of database"),
     ("both: {lateral: 3}", "query.lateral: it is a field of database"),
     ("database: {hide_sector: 3}", "database.hide_sector: .* field of query"),
-    ("database: {fresh: 1}", "database.fresh: it is a field of both"),
-    ("cases: {a: {both: {fresh: 1}}}", "database.fresh: it is a field of both"),
+    ("database: {redraw: {frozen: 1}}", "database.redraw: give a number"),
+    (
+        "cases: {a: {both: {redraw: {frozen: 1}}}}",
+        "database.redraw: give a number",
+    ),
     ("database: {distractors: -1}", "database.distractors: -1 is not from 0"),
     ("database: {distractors: 100001}", "database.distractors: 100001 is not"),
     ("database: {distractors: 1.5}", "database.distractors: 1.5 is not"),

@@ -237,17 +237,35 @@ def test_cases_beside_factors(read):
     assert [one.is_baseline for one in found] == [True] + [False] * 9
 
 
+def test_words_of_earlier_versions_are_read_with_a_note(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "both: {fresh: [1, 2], stage: [last, own]}\n"
+        "quick: {both: {fresh: [1]}}\n"
+    )
+    for quick, numbers in ((False, [1, 2]), (True, [1])):
+        notes = []
+        found = load_experiment(path, quick=quick, on_note=notes.append)
+        assert found.frozen_redraws == numbers
+        assert "fresh" not in found.both
+        assert f"{path}: both.fresh: this field is now" in notes[-1]
+    # So on the command line.
+    path.write_text("both: {stage: [last, own]}\n")
+    found = load_experiment(path, ["both.fresh=[3]"])
+    assert found.frozen_redraws == [3]
+
+
 def test_lists_of_whole_numbers_can_be_spread(read):
     experiment = read(
         """
         seeds: {from: 3, to: 5, count: 3}
-        both: {fresh: {from: 1, to: 5, count: 2}}
+        both: {redraw: {frozen: {from: 1, to: 5, count: 2}}}
         database: {distractors: {from: 0, to: 1000, count: 3}}
         """
     )
     assert experiment.seeds == (3, 4, 5)
-    assert experiment.fresh == [1, 5]
-    assert [type(one) for one in experiment.fresh] == [int, int]
+    assert experiment.frozen_redraws == [1, 5]
+    assert [type(one) for one in experiment.frozen_redraws] == [int, int]
     values = [one["database.distractors"] for one in factors(experiment)]
     assert [(type(one), one) for one in values] == [
         (int, 0),
@@ -391,10 +409,16 @@ FAULTS = [
     ("database:", "database: "),
     ("database: {years: []}", "database.years: a list without a value"),
     ("database: {a: {b: []}}", "database.a.b: a list without a value"),
-    ("both: {fresh: []}", "both.fresh: a list without a value"),
+    (
+        "both: {redraw: {frozen: []}}",
+        "both.redraw.frozen: a list without a value",
+    ),
     ("database: {years: [0, 5, 0]}", "database.years: 0 is there twice"),
     ("database: {years: [1, 1.0]}", "database.years: 1 is there twice"),
-    ("both: {fresh: [2, 2]}", "both.fresh: 2 is there twice"),
+    (
+        "both: {redraw: {frozen: [2, 2]}}",
+        "both.redraw.frozen: 2 is there twice",
+    ),
     ("protocol: {radius: [5, 5]}", "protocol.radius: 5 is there twice"),
     ("database: {a: [null, {}]}", "database.a: 'none' is there twice"),
     ("database: {a: [1, '1']}", "database.a: '1' is there twice"),

@@ -16,16 +16,16 @@ from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies import redrawing
 from cns_drake.studies.redrawing import (
-    DrawFreshCity,
-    draw_fresh_cities,
-    fresh_versions,
+    RedrawFrozen,
+    frozen_redraws,
     kept_names,
+    redraw_frozen,
     turned,
 )
 
 
 def test_five_versions_of_each_map_of_which_two_are_off_the_axes():
-    versions = fresh_versions()
+    versions = frozen_redraws()
     assert Counter(one.map_name for one in versions) == dict.fromkeys(
         shipped_maps(), 5
     )
@@ -105,7 +105,7 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
         "route": [{"road": name, "direction": "forward", "lane": 1}],
     }
     (town / "sequence_02.yaml").write_text(yaml.safe_dump(drive))
-    step = DrawFreshCity(tmp_path / "out" / "town_f01", town, "02", 5, turn_deg)
+    step = RedrawFrozen(tmp_path / "out" / "town_f01", town, "02", 5, turn_deg)
     step.folder.parent.mkdir()
     assert not step.is_done()
     step.run(Reporter())
@@ -124,19 +124,17 @@ def test_a_version_of_a_small_city(tmp_path, turn_deg):
     expected = np.stack([c * x - s * y, s * x + c * y], axis=1)
     np.testing.assert_allclose(road[:, :2], expected, atol=1e-4)
     # Another seed or turn is another city.
-    other = DrawFreshCity(step.folder, town, "02", 6, turn_deg)
+    other = RedrawFrozen(step.folder, town, "02", 6, turn_deg)
     assert not other.is_done()
 
 
 def test_versions_that_are_none(tmp_path):
     for maps, numbers, fault in (
-        (("atlantis",), (), "map: no fresh version 'atlantis'"),
-        ((), (6,), "mine: both.fresh: no fresh version 6"),
+        (("atlantis",), (), "map: no frozen redraw 'atlantis'"),
+        ((), (6,), "mine: both.redraw.frozen: no frozen redraw 6"),
     ):
         with pytest.raises(InputError, match=fault):
-            draw_fresh_cities(
-                maps, numbers, tmp_path / "out", Cluster(), "mine"
-            )
+            redraw_frozen(maps, numbers, tmp_path / "out", Cluster(), "mine")
     assert not (tmp_path / "out").exists()
 
 
@@ -145,9 +143,7 @@ def test_only_what_is_asked_for_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(
         redrawing, "run_jobs", lambda jobs, cluster, unit="": drawn.extend(jobs)
     )
-    folders = draw_fresh_cities(
-        ["suburbia"], [2, 4], tmp_path, Cluster(), "mine"
-    )
+    folders = redraw_frozen(["suburbia"], [2, 4], tmp_path, Cluster(), "mine")
     assert [folder.name for folder in folders] == [
         "suburbia_f02",
         "suburbia_f04",

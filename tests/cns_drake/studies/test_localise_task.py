@@ -38,7 +38,7 @@ def test_a_pair_is_localised_as_each_scan_alone(towns, found):
     settings = default_settings("gicp")
     place = make_map(mapped, settings)
     found_alone = Localiser(place, make_estimator("gicp", settings), settings)
-    alone = localise(found_alone, asked, range(8), STARTS[1])
+    (alone,) = localise([found_alone], asked, range(8), STARTS[1:])
     for name in COLUMNS:
         if name != "seconds":
             assert np.array_equal(found[3][name], alone[name])

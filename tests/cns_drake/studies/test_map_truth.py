@@ -238,7 +238,7 @@ def test_an_aged_city_has_another_name(small_map, tmp_path):
         values |= {"name": name, "lidars": {"lidar": {"columns": 90}}}
         drives.append(SimulationSource(make_scenario(values, name)))
     scores = measure_maps(Reporter(), *drives, (TRUTH,), 1.0)
-    assert scores[TRUTH]["miou"] == 1.0
+    assert scores[TRUTH].scores["miou"] == 1.0
     surveys = [simulate_survey(drive.scenario) for drive in drives]
     with pytest.raises(InputError, match="through small_s1"):
         write_truth(*surveys, tmp_path / "out")

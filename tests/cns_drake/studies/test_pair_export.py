@@ -13,8 +13,8 @@ from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.studies import pair_export
 from cns_drake.studies.pair_export import (
+    ExportedDrive,
     ExportOptions,
-    Run,
     evaluation_sets,
     export_pairs,
     training_tuples,
@@ -24,7 +24,7 @@ from cns_drake.studies.pair_export import (
 def run_of(seed, number, city=0):
     X_WS = np.tile(np.eye(4), (number, 1, 1))
     X_WS[:, :2, 3] = np.random.default_rng(seed).uniform(0, 150, (number, 2))
-    return Run(f"runs/{seed}", X_WS, city)
+    return ExportedDrive(f"runs/{seed}", X_WS, city)
 
 
 def test_positives_and_non_negatives_by_distances():
@@ -167,7 +167,7 @@ def test_clouds_without_positives_are_counted(tmp_path):
 def line(name, number, city=0, start=0.0):
     X_WS = np.tile(np.eye(4), (number, 1, 1))
     X_WS[:, 0, 3] = start + 10.0 * np.arange(number)
-    return Run(f"runs/{name}", X_WS, city)
+    return ExportedDrive(f"runs/{name}", X_WS, city)
 
 
 @pytest.mark.parametrize(

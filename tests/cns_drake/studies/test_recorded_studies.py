@@ -176,7 +176,10 @@ def test_drives_without_a_control(tmp_path):
             "both.stage: .01.: recordings have",
         ),
         ({"both": {"stage": ["own", "first"]}}, "both.stage: 'first'"),
-        ({"both": {"fresh": [1]}}, "both.fresh: .*: no shipped map"),
+        (
+            {"both": {"redraw": {"frozen": [1]}}},
+            "both.redraw.frozen: .*: no shipped map",
+        ),
     ],
 )
 def test_recordings_are_as_they_are(folder, tmp_path, fields, fault):

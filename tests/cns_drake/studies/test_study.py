@@ -712,19 +712,22 @@ def test_faults_before_any_work(town, tmp_path, fields, fault):
         ),
         ({"database": {"years": 1.5}}, "mine: database.years: 1.5 is not"),
         ({"query": {"years": 0.5}}, "mine: query.years: 0.5 is not"),
-        ({"both": {"fresh": 1}}, "mine: both.fresh: .*town: no shipped map"),
+        (
+            {"both": {"redraw": {"frozen": 1}}},
+            "mine: both.redraw.frozen: .*town: no shipped map",
+        ),
         (
             {
                 "maps": [
                     {"name": "a", "age": "suburbia", "years": 1, "seed": 1}
                 ],
-                "both": {"fresh": 1},
+                "both": {"redraw": {"frozen": 1}},
             },
-            "mine: both.fresh: a: no shipped map",
+            "mine: both.redraw.frozen: a: no shipped map",
         ),
         (
-            {"maps": ["suburbia"], "both": {"fresh": [1, 6]}},
-            "mine: both.fresh: no fresh version 6",
+            {"maps": ["suburbia"], "both": {"redraw": {"frozen": [1, 6]}}},
+            "mine: both.redraw.frozen: no frozen redraw 6",
         ),
         (
             {"database": {"stage": "earlier 1"}},
@@ -765,11 +768,11 @@ def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
     monkeypatch.setattr(
         redrawing, "run_jobs", lambda jobs, cluster, unit="": None
     )
-    wanted = experiment("suburbia", both={"fresh": given})
+    wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
     monkeypatch.setattr(study, "_pairs", lambda folder: [(folder, folder)])
     found = {
-        one.factors["both.fresh"]: one.pairs[0][0].name
+        one.factors["both.redraw.frozen"]: one.pairs[0][0].name
         for one in study._drives_of("suburbia")
     }
     numbers = given if isinstance(given, list) else [given]

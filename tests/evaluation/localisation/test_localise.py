@@ -400,9 +400,11 @@ def test_order_and_jobs_do_not_matter(streets):
     for method in SHIPPED:
         settings = Settings()
         found = Localiser(place, make_estimator(method, settings), settings)
-        rows = localise(found, drive, range(0, 12, 4), starts)
+        (rows,) = localise([found], drive, range(0, 12, 4), [starts])
         jobs = 2 if method == "gicp" else 1
-        backwards = localise(found, drive, range(8, -1, -4), starts, jobs)
+        (backwards,) = localise(
+            [found], drive, range(8, -1, -4), [starts], jobs
+        )
         for name in columns:
             assert np.array_equal(rows[name], backwards[::-1][name])
 

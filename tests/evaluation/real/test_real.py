@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import choose_cluster
+from cns_drake.base.jobs.step import Reporter
 from evaluation.real import data_sets
-from evaluation.real.measuring import Measuring
+from evaluation.real.measuring import measure_real
 from evaluation.results.table import QueryRows, Results
+from evaluation.study import engine
 
 # Frames of KITTI 00 by name: seed of the town, yaw, x, y. The first and the
 # third are of one place, as the second and the fourth are.
@@ -48,13 +51,37 @@ def ask(capsys, folder, output, *words, methods=METHODS):
     return run(capsys, "real", folder, "--output", output, *chosen, *words)
 
 
+def measure(patch, folder, output, methods=METHODS, simulated=None):
+    """Returns both tables, and the notes; jobs run in this process."""
+    notes = []
+
+    def send(kind, *values):
+        if kind == "note":
+            notes.extend(values)
+
+    def run_jobs(jobs, cluster):
+        for job in jobs:
+            if not job.step.is_done():
+                job.step.run(Reporter(send))
+
+    patch.setattr(engine, "run_jobs", run_jobs)
+    tables = measure_real(
+        folder,
+        output,
+        choose_cluster(1, None),
+        methods,
+        simulated=simulated,
+        on_note=notes.append,
+    )
+    return *tables, notes
+
+
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     """Both tables, and the notes."""
-    notes = []
-    measuring = Measuring(METHODS, notes.append)
-    measuring.run(fill(tmp_path_factory.mktemp("real")), None)
-    return *measuring.engine.tables(), notes
+    folder = tmp_path_factory.mktemp("real")
+    with pytest.MonkeyPatch.context() as patch:
+        return measure(patch, fill(folder / "scans"), folder / "out")
 
 
 def values(results, **columns):
@@ -87,39 +114,46 @@ def test_each_scan_is_localised_in_the_map_of_the_others(measured):
     assert {row.protocol for row in results.rows} == {"own"}
 
 
-def test_an_own_registration_function(tmp_path):
+def test_an_own_registration_function(tmp_path, monkeypatch):
     text = (
         "def other(): pass\ndef localise(map, scan, start): return start, 1.0"
     )
     for name in ("mine", "icp"):
         (tmp_path / f"{name}.py").write_text(text)
     mine = str(tmp_path / "mine.py")
-    measuring = Measuring((mine,), lambda note: None)
-    measuring.run(fill(tmp_path / "scans"), None)
-    results, _ = measuring.engine.tables()
+    scans = fill(tmp_path / "scans")
+    results, _, _ = measure(monkeypatch, scans, tmp_path / "out", (mine,))
     found = values(results, task="localise", method="mine")
     # The start is 2 m off.
     assert found["translation_median"] == pytest.approx(2.0)
-    assert {row.task for row in measuring.engine.tables()[0].rows} == {
-        "localise"
-    }
+    assert {row.task for row in results.rows} == {"localise"}
     both = ("icp", str(tmp_path / "icp.py"))
-    with pytest.raises(InputError, match="two registration methods"):
-        Measuring(both, lambda note: None)
+    with pytest.raises(InputError, match="'icp' is there twice"):
+        measure(monkeypatch, scans, tmp_path / "out", both)
 
 
-def test_scans_that_are_alone_are_counted(tmp_path):
+def test_scans_that_are_alone_are_counted(tmp_path, monkeypatch):
     # The limit is 7.5 m.
     alone = {
         **{name: FRAMES[name] for name in ("000026", "003528")},
         "004481": (1, 0.0, 2.0, 8.51),
     }
-    notes = []
-    measuring = Measuring(("icp",), notes.append)
-    measuring.run(fill(tmp_path, alone), None)
+    scans = fill(tmp_path / "scans", alone)
+    results, _, notes = measure(monkeypatch, scans, tmp_path / "out", ("icp",))
     (note,) = (one for one in notes if "localised" in one)
     assert note.startswith("kitti_00_revisits: 2 of 3 scans localised")
-    assert {row.n for row in measuring.engine.tables()[0].rows} == {2}
+    assert {row.n for row in results.rows} == {2}
+    # The results of an earlier run are used.
+    results, _, notes = measure(monkeypatch, scans, tmp_path / "out", ("icp",))
+    assert not any("localised" in one for one in notes)
+    assert {row.n for row in results.rows} == {2}
+
+
+def test_scans_without_any_other_near_leave_no_table(tmp_path, monkeypatch):
+    scans = fill(tmp_path / "scans", {"000026": FRAMES["000026"]})
+    with pytest.raises(InputError, match="nothing could be measured"):
+        measure(monkeypatch, scans, tmp_path / "out", ("icp",))
+    assert not (tmp_path / "out" / "results.csv").exists()
 
 
 def test_what_is_missing_or_another_is_named(measured):
@@ -145,7 +179,7 @@ def test_simulated_scans_add_places(tmp_path, capsys):
             attachments={"scenario.json": scenario},
         )
     output = tmp_path / "out"
-    options = ("--simulated", drives)
+    options = ("--simulated", drives, "--jobs", 1)
     status, out, err = ask(
         capsys, folder, output, *options, methods=METHODS[:1]
     )
@@ -219,7 +253,29 @@ def test_faults_are_one_line(tmp_path, capsys):
         assert not (output / "results.csv").exists()
     status, out, err = ask(capsys, tmp_path, output, methods=("nothing",))
     assert (status, out) == (2, "")
-    assert "no method 'nothing'" in err
+    assert "nothing: neither a Python file nor one of" in err
+
+
+def test_settings_of_methods(tmp_path, monkeypatch):
+    """As in a study, they are columns; the height is in the digest."""
+    scans = fill(tmp_path / "scans")
+    monkeypatch.setattr(engine, "run_jobs", lambda jobs, cluster: None)
+    with pytest.raises(InputError, match="no parameter 'rangs'"):
+        measure_real(
+            scans,
+            tmp_path / "out",
+            choose_cluster(1, None),
+            ("solid",),
+            ("solid.rangs=20",),
+        )
+    with pytest.raises(InputError, match="no method of place recognition"):
+        measure_real(
+            scans,
+            tmp_path / "out",
+            choose_cluster(1, None),
+            ("icp",),
+            ("icp.voxel=0.7",),
+        )
 
 
 def test_other_formats_without_poses(tmp_path, capsys):
@@ -238,9 +294,6 @@ def test_other_formats_without_poses(tmp_path, capsys):
     np.testing.assert_allclose(z, [-0.2 - 0.957, 3.0, 4.0], atol=1e-5)
     assert [len(one.drive) for one in found] == [1, 3, 3]
     # Nothing is asked of scans without poses.
-    measuring = Measuring(("solid",), lambda note: None)
-    measuring.run(tmp_path, None)
-    assert measuring.engine.measured == []
     status, _, err = ask(capsys, tmp_path, tmp_path / "out", methods=["solid"])
     assert status == 2
     assert "no data set that these methods can measure" in err
@@ -270,17 +323,21 @@ def test_the_judge_tells_boxes_from_noise(tmp_path, monkeypatch):
         [yaw_pose(40.0 * k, 0.0, 0.0, 0.0) for k in range(4)],
         attachments={"scenario.json": scenario},
     )
-    notes = []
-    measuring = Measuring(("icp",), notes.append)
-    measuring.run(tmp_path / "scans", tmp_path / "drives")
-    found = measuring.engine.tables()[0].where(task="judge")
+    results, _, _ = measure(
+        monkeypatch,
+        tmp_path / "scans",
+        tmp_path / "out",
+        ("icp",),
+        tmp_path / "drives",
+    )
+    found = results.where(task="judge")
     (row,) = found.where(method="all", metric="auc").rows
     assert row.value > 0.9
     assert (row.database, row.query) == ("simulated", "nuscenes_1072")
     (control,) = found.where(method="all", metric="auc_control").rows
     assert control.value < row.value
     # No scan is within 7.5 m of another one.
-    assert {one.task for one in measuring.engine.tables()[0].rows} == {"judge"}
+    assert {one.task for one in results.rows} == {"judge"}
 
 
 def test_scans_are_in_the_order_of_their_numbers(tmp_path):

@@ -94,7 +94,7 @@ def test_the_shipped_tables_hold_the_published_numbers():
                 row.database,
                 row.query,
                 row.method,
-                row["both.fresh"],
+                row["both.redraw.frozen"],
                 row["both.stage"],
                 row.gate,
                 row.metric,
@@ -410,8 +410,10 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(capsys, ["compare", one], "shipped tables")
     assert_refused(capsys, ["compare", one, "--metric", "r1"], "r1", "auc")
     assert_refused(
-        capsys, ["compare", one, "--gate"], "with geometric verification"
+        capsys, ["compare", one, "--verified"], "with geometric verification"
     )
+    # Of other commands, --gate says how to measure.
+    assert_refused(capsys, ["compare", one, "--gate"], "--verified")
     assert_refused(capsys, ["compare", one, "--protocol", "x"], "--protocol")
     assert_refused(capsys, ["compare", one, "--rankings"], "two tables")
     pair = ["compare", one, other, "--rankings"]

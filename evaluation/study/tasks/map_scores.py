@@ -1,0 +1,149 @@
+"""The part of the task `map` that needs no simulator: scores of labels."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Reporter
+from evaluation.map_update.baselines import BASELINES, run_baseline
+from evaluation.map_update.scores import Labels, score
+from evaluation.map_update.sessions import (
+    Label,
+    read_labels,
+    read_pair,
+    read_truth,
+)
+from evaluation.map_update.structures import class_names
+from evaluation.recognition.place_outcome import Number
+from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
+
+_SCORES = (
+    "miou",
+    *(f"iou_{name}" for name in ("kept", "gone", "new", "unobserved")),
+    *(
+        f"{kind}_{name}"
+        for name in ("gone", "new")
+        for kind in ("precision", "recall")
+    ),
+    "called_points",
+    "called_structures",
+    "right_structures",
+)
+# Name under which the true labels are scored, like a method's labels.
+TRUTH = "truth"
+# Name of labels that the user gives.
+GIVEN = "labels"
+
+
+class MapScores(NamedTuple):
+    """The scores of a change detector.
+
+    Attributes:
+        scores: name of a score -> its value, see
+            `evaluation.map_update.scores.score`.
+        gone, new: number of points with this exact label.
+        labels: the detector's labels of both maps.
+    """
+
+    scores: dict[str, Any]
+    gone: int
+    new: int
+    labels: Labels
+
+
+class MapTask(Task):
+    """Scores change detectors, which label points as kept, gone or new."""
+
+    name = "map"
+    defaults: ClassVar[Mapping[str, Any]] = {"methods": None, "spacing": 5.0}
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        if name == "spacing":
+            positive(value, where)
+            return
+        known = (TRUTH, *BASELINES)
+        for one in value:
+            if one not in known:
+                raise InputError(
+                    f"{where}: {one!r} is none of {', '.join(known)}"
+                )
+
+    def numbers(
+        self, found: Mapping[str, MapScores], before: Any | None
+    ) -> Iterator[Number]:
+        for method, one in found.items():
+            number = one.gone + one.new
+            values = {name: one.scores[name] for name in _SCORES}
+            values |= {"gone": one.gone, "new": one.new}
+            for name, value in values.items():
+                if value is not None:
+                    yield Number(method, False, name, float(value), n=number)
+
+
+class LabelledMapTask(MapTask):
+    """The task on two maps with true labels, which are in a folder already."""
+
+    def __init__(
+        self, maps: Path, methods: Sequence[str], given: Sequence[Path] = ()
+    ):
+        """Takes the folder.
+
+        Args:
+            maps: folder with the maps of two drives and their exact labels.
+            methods: names of change detectors.
+            given: files with labels of the older and of the newer map, which
+                are scored instead.
+        """
+        super().__init__({}, str(maps))
+        self._arguments = maps, tuple(methods), tuple(given)
+
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+        part = jobs.files.part("map", pair.key)
+        return (jobs.add(part, score_methods, self._arguments),)
+
+
+def score_methods(
+    reporter: Reporter,
+    maps: Path,
+    methods: tuple[str, ...],
+    given: tuple[Path, ...] = (),
+) -> dict[str, MapScores]:
+    """Scores the labels of change detectors against exact labels.
+
+    Args:
+        reporter: unused.
+        maps: folder with the maps of two drives and their exact labels.
+        methods: names of change detectors. The name `TRUTH` scores the exact
+            labels themselves.
+        given: files with labels of the older and of the newer map. If they are
+            given, they are scored under the name `GIVEN`.
+
+    Returns:
+        Method -> its scores.
+
+    Raises:
+        InputError: the folder cannot be read, or a detector cannot run.
+    """
+    pair = read_pair(maps)
+    truth = Labels(*read_truth(pair))
+    number = {
+        "gone": int((truth.A == Label.GONE).sum()),
+        "new": int((truth.B == Label.NEW).sum()),
+    }
+    found = {}
+    for method in (*methods, *((GIVEN,) if given else ())):
+        if method == GIVEN:
+            labels = Labels(
+                *(
+                    read_labels(path, session, truth=False)
+                    for path, session in zip(given, pair, strict=True)
+                )
+            )
+        elif method == TRUTH:
+            labels = truth
+        else:
+            labels = run_baseline(method, pair)
+        scores = score(pair, truth, labels, class_names(maps))
+        found[method] = MapScores(scores, **number, labels=labels)
+    return found
