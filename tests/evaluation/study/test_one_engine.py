@@ -1,6 +1,8 @@
 """Commands of one pair beside a report of it: the same rows, one engine."""
 
-from helpers import studies
+import re
+
+from helpers import documents, studies
 from helpers.eval_program import run
 import numpy as np
 import pytest
@@ -113,3 +115,18 @@ def test_every_command_writes_its_tables_by_the_engine(
     ]
     studies.report(towns, tmp_path / "report", choose_methods(["solid"]))
     assert written[3:] == [("stages", {"place", "pose", "change"})]
+
+
+def test_only_the_engine_writes_both_tables():
+    users = {
+        path.as_posix()
+        for package in ("evaluation", "cns_drake")
+        for path in (documents.ROOT / package).rglob("*.py")
+        if {"RESULTS", "QUERIES", "write_csv"}
+        <= set(re.findall(r"\w+", path.read_text()))
+    }
+    root = documents.ROOT / "evaluation"
+    assert users == {
+        (root / "study/engine.py").as_posix(),
+        (root / "results/table.py").as_posix(),
+    }
