@@ -37,8 +37,8 @@ def main(page: Path = Path("wrist.html"), duration: float = 4.0) -> None:
     builder.Connect(goal.get_output_port(), target)
     # x of the sensor is z of the wrist; its row of beams is across the sweep.
     wrist = plant.GetBodyByName("pitch")
-    X_PS = RigidTransform(RotationMatrix(np.eye(3)[:, [2, 0, 1]]), [0, 0, 0.17])
-    lidar = add_lidar(builder, scene_graph, wrist, X_PS, "hokuyo-ust-20lx")
+    X_PB = RigidTransform(RotationMatrix(np.eye(3)[:, [2, 0, 1]]), [0, 0, 0.17])
+    lidar = add_lidar(builder, scene_graph, wrist, X_PB, "hokuyo-ust-20lx")
     meshcat = Meshcat()
     meshcat.SetCameraPose([-0.6, -1.8, 1.8], [0.9, 0.0, 0.5])
     MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)

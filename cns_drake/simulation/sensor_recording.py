@@ -238,7 +238,7 @@ def _place_of(
     """Returns X_BS if the LiDAR is on the body of the odometry."""
     if odometry is None or odometry.frame_id != lidar.parent_frame_id:
         return None
-    return odometry.X_PB.inverse() @ lidar.X_PS
+    return odometry.X_PB.inverse() @ lidar.X_PB
 
 
 def _describe(camera: RgbdSensor) -> RecordedCamera:

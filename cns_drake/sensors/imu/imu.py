@@ -79,7 +79,7 @@ class Imu:
 def add_imu(
     builder: DiagramBuilder,
     body: RigidBody | Frame,
-    X_PI: RigidTransform,
+    X_PB: RigidTransform,
     *,
     rate: float | None = None,
     noise: ImuNoise | None = None,
@@ -92,7 +92,7 @@ def add_imu(
         builder: builder of a diagram with the plant, or with `motion`.
         body: the carrier P of the IMU: a body of a finalized plant, or a frame
             that is fixed on such a body.
-        X_PI: pose of the IMU in P.
+        X_PB: pose of the IMU in P, as in Drake's RgbdSensor.
         rate: samples per second; None for one per frame (scan) of a recorder.
         noise: errors of the IMU, which need a rate; by default none. The random
             numbers depend on the name of the IMU, unless the noise has a
@@ -128,7 +128,7 @@ def add_imu(
     parts = carriers.IMU_PARTS
     carriers.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
     systems = [f"{name}_{part}" for part in parts]
-    body, X_BI = carriers.body_and_pose(body, X_PI)
+    body, X_BI = carriers.body_and_pose(body, X_PB)
     # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
     accelerometer = builder.AddNamedSystem(

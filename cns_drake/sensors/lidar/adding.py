@@ -43,7 +43,7 @@ def add_lidar(
     builder: DiagramBuilder,
     scene_graph: SceneGraph,
     body: RigidBody | Frame | FrameId,
-    X_PS: RigidTransform,
+    X_PB: RigidTransform,
     pattern: BeamPattern | str,
     *,
     name: str = "lidar",
@@ -72,7 +72,8 @@ def add_lidar(
             that any other source has registered there. A frame on a body keeps
             the pose from its model, even if a Context changes it, as for
             Drake's cameras.
-        X_PS: pose of the sensor S in P.
+        X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
+            the frame of the sensor is S.
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
             LiDAR turns at the rate of its data sheet, and coordinates are not
             rounded.
@@ -138,11 +139,11 @@ def add_lidar(
             f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
             "AddMultibodyPlantSceneGraph returns one beside the plant"
         )
-    if not isinstance(X_PS, RigidTransform):
-        raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
+    if not isinstance(X_PB, RigidTransform):
+        raise TypeError(f"X_PB: {X_PB!r} is not a RigidTransform")
     check_new_sensor(builder, name)
     if not isinstance(body, FrameId):
-        body, X_PS = body_and_pose(body, X_PS)
+        body, X_PB = body_and_pose(body, X_PB)
     preset = pattern if isinstance(pattern, str) else None
     if preset is not None:
         pattern = make_beam_pattern(preset)
@@ -233,7 +234,7 @@ def add_lidar(
         name,
         Lidar(
             frame_id,
-            X_PS,
+            X_PB,
             pattern,
             measurement=measurement,
             returns=model,
@@ -265,7 +266,7 @@ def add_described_lidar(
     builder: DiagramBuilder,
     scene_graph: SceneGraph,
     body: RigidBody | Frame,
-    X_PS: RigidTransform,
+    X_PB: RigidTransform,
     *,
     name: str = "lidar",
     seed: int = 0,
@@ -287,7 +288,7 @@ def add_described_lidar(
         scene_graph: the SceneGraph to scan.
         body: the carrier P: a body of a finalized plant, or a frame that is
             fixed on such a body.
-        X_PS: pose of the sensor S in P.
+        X_PB: pose of the sensor B in P.
         name: name of the system.
         seed: seed of noise and returns.
         weather: weather of calibrated returns.
@@ -306,7 +307,7 @@ def add_described_lidar(
         builder,
         scene_graph,
         body,
-        X_PS,
+        X_PB,
         make_pattern(config, period),
         name=name,
         measurement=MeasurementModel(

@@ -155,19 +155,19 @@ class Lidar(LeafSystem):
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
-        X_PS: the pose of the LiDAR in P.
+        X_PB: the pose of the LiDAR in P, named as in Drake's RgbdSensor.
         pattern: the beams of a turn.
 
     Example:
         from cns_drake import Lidar, make_beam_pattern
 
-        lidar = Lidar(frame_id, X_PS, make_beam_pattern("os1-64", 0.1))
+        lidar = Lidar(frame_id, X_PB, make_beam_pattern("os1-64", 0.1))
     """
 
     def __init__(
         self,
         parent_frame_id: FrameId,
-        X_PS: RigidTransform,
+        X_PB: RigidTransform,
         pattern: BeamPattern,
         *,
         measurement: MeasurementModel = IDEAL,
@@ -184,7 +184,7 @@ class Lidar(LeafSystem):
 
         Args:
             parent_frame_id: the frame P that carries the sensor.
-            X_PS: pose of the sensor in P.
+            X_PB: pose of the sensor in P.
             pattern: the beams.
             measurement: the model of noise, losses and rounding.
             returns: the model of a real unit; None for ideal returns. With a
@@ -222,7 +222,7 @@ class Lidar(LeafSystem):
             raise ValueError(f"num_threads: {num_threads} is less than 1")
         pattern.check()
         self.parent_frame_id = parent_frame_id
-        self.X_PS = RigidTransform(X_PS)
+        self.X_PB = RigidTransform(X_PB)
         self.pattern = pattern
         self.causal = bool(causal)
         self._measurement = measurement
@@ -606,7 +606,7 @@ class Lidar(LeafSystem):
 
     def _calc_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of S at the time of the output."""
-        return self._calc_carrier_pose(context) @ self.X_PS
+        return self._calc_carrier_pose(context) @ self.X_PB
 
     def _calc_carrier_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of P at the time of the output."""
@@ -626,10 +626,10 @@ class Lidar(LeafSystem):
         """
         sweep = _value(self._sweep, context)
         if sweep is not None:
-            sweep = sweep.of_frame(self.X_PS)
+            sweep = sweep.of_frame(self.X_PB)
             return sweep.p_WPset, sweep.R_WPset
         X_WP = self._calc_carrier_pose(context)
-        X_WS = X_WP @ self.X_PS
+        X_WS = X_WP @ self.X_PB
         motion = self._calc_motions(context).get(self.parent_frame_id)
         if motion is not None:
             R_WW0, way_P = motion.at(self._times)

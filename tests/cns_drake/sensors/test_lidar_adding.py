@@ -232,7 +232,7 @@ def test_it_is_added_to_a_body_or_a_frame():
     assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
     # The LiDAR keeps the pose of the call.
     X_PS.set_translation([9.0, 0.0, 0.0])
-    assert [one.X_PS.translation()[0] for one in lidars] == [0.5, 1.5, 0.5]
+    assert [one.X_PB.translation()[0] for one in lidars] == [0.5, 1.5, 0.5]
     np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)
 
 

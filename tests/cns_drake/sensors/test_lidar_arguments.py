@@ -65,7 +65,7 @@ class Site:
     [
         ({"body": "wall"}, TypeError, r"plant.GetBodyByName\('wall'\)"),
         ({"body": 3}, TypeError, "body: 3 is not a RigidBody"),
-        ({"pose": [0, 0, 1]}, TypeError, "X_PS: .* is not a RigidTransform"),
+        ({"pose": [0, 0, 1]}, TypeError, "X_PB: .* is not a RigidTransform"),
         ({"pattern": 16}, TypeError, "pattern: 16 is neither a BeamPattern"),
         ({"pattern": "vlp-61"}, ValueError, "unknown preset 'vlp-61'"),
         (

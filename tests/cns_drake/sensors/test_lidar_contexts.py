@@ -21,7 +21,7 @@ from cns_drake.sensors.lidar.lidar import Lidar
 AHEAD = np.eye(3)[:1]
 METHODS = {
     "CastRays": lambda lidar, context: lidar.CastRays(
-        context, lidar.X_PS.translation(), AHEAD
+        context, lidar.X_PB.translation(), AHEAD
     ).ranges[0],
     "EvalGeometryIds": lambda lidar, context: lidar.EvalGeometryIds(context),
     "EvalInstances": lambda lidar, context: lidar.EvalInstances(context),
