@@ -9,6 +9,7 @@ import re
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
 from cns_drake.base.number_rows import other_separator, to_number
+from cns_drake.base.value_lists import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
@@ -104,14 +105,16 @@ def read_records(
 
     Raises:
         InputError: the file cannot be read as CSV (see
-            `cns_drake.base.csv_files.read_rows`), a column is missing, or a row
-            has more or fewer cells than there are columns.
+            `cns_drake.base.csv_files.read_rows`), a column is missing or there
+            twice, or a row has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
     names = [
         now if (now := _FORMER_COLUMNS.get(name, name)) not in names else name
         for name in names
     ]
+    for column in filter(None, repeated(names)):
+        raise InputError(f"{path}: column '{column}' is there twice")
     for column in columns:
         if column not in names:
             raise InputError(f"{path}: no column '{column}'")

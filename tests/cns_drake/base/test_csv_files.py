@@ -33,6 +33,9 @@ def test_rows_with_the_numbers_of_their_lines(tmp_path):
 
 
 def test_a_column_of_an_earlier_version_has_its_name_of_now(tmp_path):
+    # Columns without a name are not read.
+    path = write(tmp_path, b"a,b,,\n1,2,,\n")
+    assert read_records(path, ("b",)) == [(2, {"a": "1", "b": "2", "": ""})]
     path = write(tmp_path, b"radius_told,b\n1,2\n")
     assert read_records(path, ("gate", "b")) == [(2, {"gate": "1", "b": "2"})]
     path = write(tmp_path, b"recall_at_100_precision\n0.5\n")
@@ -51,6 +54,8 @@ def test_a_column_of_an_earlier_version_has_its_name_of_now(tmp_path):
         (b"", "no column 'b'"),
         (b"a,b\n1,2\n3\n", "line 3: 1 cells instead of 2"),
         (b"a,b\n1,2,3\n", "line 2: 3 cells instead of 2"),
+        (b"a,b,a\n1,2,3\n", "column 'a' is there twice"),
+        (b'b,"c ",c\n1,2,3\n', "column 'c' is there twice"),
         (b"a,b\n1,\xff\n", "not UTF-8"),
         (b"a,b\n1," + b"7" * 200_000, "not CSV: field larger"),
         (b"a;b\n1;2\n", "separated by semicolons instead of commas"),
