@@ -18,10 +18,17 @@ from cns_drake.studies.experiment import (
     shipped_experiments,
 )
 from cns_drake.studies.study import TASKS
-from evaluation.localisation import localise
+from evaluation.localisation import localise, tracking
 from evaluation.recognition import place_outcome
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table import (
+    FROZEN_REDRAW,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
+from evaluation.study.tasks import map_scores
 
 PAGE = documents.read("docs/studies.md")
 
@@ -59,6 +66,8 @@ def test_all_fields_of_an_experiment_are_listed():
 
 def test_what_can_vary_exists():
     named = first_codes("### What can vary")
+    assert FROZEN_REDRAW.removeprefix("both.") in named
+    named = [name for name in named if not name.startswith("redraw.")]
     scenario = [name for name in named if "." in name]
     for name in scenario:
         section, field = name.split(".")
@@ -113,7 +122,9 @@ def test_metrics_are_those_of_the_tasks():
     }
     for name in ("place", "pose"):
         tasks[name] += inspect.getsource(place_outcome)
-    tasks["localise"] += inspect.getsource(localise)
+    for module in (localise, tracking):
+        tasks["localise"] += inspect.getsource(module)
+    tasks["map"] += inspect.getsource(map_scores)
     task = ""
     for row in documents.table(PAGE, "| task | metric | meaning |"):
         task = (codes(row[0]) or [task])[0]
