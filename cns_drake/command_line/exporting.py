@@ -118,7 +118,7 @@ def export(
     labels of your own change detector against them, run cns-eval map-update.
     map-sessions makes the same maps without labels, from recordings whose world
     is unknown, such as real drives. Before cns-eval map-update can score
-    labels, add your true labels, A/truth.npy and B/truth.npy.
+    labels, add the ground truth: A/truth.npy and B/truth.npy.
 
     With film, DRIVE is a shipped drive or a scenario file, and the command
     films the same stretch of it in each stage of its city. First, one shot per
@@ -161,10 +161,10 @@ def export(
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
             default, it begins where the road ahead is straightest.
-        traffic: Number of moving vehicles in the film. The same number of
-            walkers is added. By default as the scenario says; if the scenario
-            has no traffic, 60 vehicles and 60 walkers are added, provided that
-            the streets have room.
+        traffic: Number of moving vehicles in the film. As many pedestrians are
+            added. By default as the scenario says; if the scenario has no
+            traffic, 60 vehicles and 60 pedestrians are added, provided that the
+            streets have room.
     """
     values: dict[str, Any] = {
         "lidar": lidar,

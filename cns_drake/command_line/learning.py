@@ -52,20 +52,20 @@ def train(
         cities: Number of cities to train on; by default it follows from
             --minutes.
         steps: Number of training steps; by default it follows from --minutes.
-        seed: Seed of all random draws. Another seed gives other cities and
-            other weights.
+        seed: Seed of everything that is sampled. Another seed gives other
+            cities and other weights.
         without: Kind of variation to leave out of the training: changes of the
             city between drives (change); weather, and LiDAR returns with the
             losses and errors of a data sheet (returns); or wandering in the
             lane and lane changes (driver). Use it to measure what each kind
             contributes. May be repeated.
-        drawn_streets: Draw the streets at random as well, instead of using
-            those of the shipped maps. Use it to test the weights on shipped
-            maps without having trained on their streets.
+        drawn_streets: Sample the streets at random as well, instead of using
+            the streets of the shipped maps. Weights trained like this have not
+            seen the streets of the shipped maps, and can be tested there.
         graded: Train with exact overlaps: the more of a query's scan a place
-            shows, the higher it should rank. Without this option, every place
-            within 7.5 m of a query counts as right. With it, the training takes
-            about 1.5 times as long.
+            shows, the higher the place should rank. Without this option, every
+            place within 7.5 m of a query counts as right. Exact overlaps make
+            the training about 1.5 times as long.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -206,10 +206,10 @@ def import_city(
             [m], to save memory. By default none is left out.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or right if it does not say.
-        grow: Add a first stage in which this share of the buildings, drawn at
-            random, is missing or lower. A number from 0.01 to 0.9; by default
-            0.3. With --years, --plain or an OpenDRIVE file, no such stage is
-            added, and --grow is an error.
+        grow: Add a first stage in which a random sample of the buildings, of
+            this share, is missing or lower. A number from 0.01 to 0.9; by
+            default 0.3. With --years, --plain or an OpenDRIVE file, no such
+            stage is added, and --grow is an error.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Buildings along the roads of an OpenDRIVE
             file are added nevertheless.
@@ -431,8 +431,8 @@ def age(
     Args:
         source: Name of a shipped map, or folder of a map.
         output: Folder of the map to write; its name becomes the map's name.
-        seed: Seed of all random events. Another seed gives another history of
-            the city.
+        seed: Seed of all random events. Another seed gives another realisation
+            of the city's ageing.
         pictures: Draw pictures of the city from the air and of three streets.
     """
     maps, wanted = maps_and_years(source, years)

@@ -38,7 +38,7 @@ Traffic = Annotated[
         min=0,
         max=2000,
         metavar="N",
-        help="Number of moving vehicles. The same number of walkers is added. "
+        help="Number of moving vehicles. As many pedestrians are added. "
         "By default as the scenario says.",
     ),
 ]

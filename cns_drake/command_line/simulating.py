@@ -171,10 +171,10 @@ def simulate(
             snow=0.25,leaves=0.15 means 0.25 m of snow, and that 15 % of the
             leaves are left. Other switches are parked_cars, scaffolds, works,
             furniture and roadsides: the share that is changed or added, from 0
-            to 1. seed=N draws other random changes. May be repeated.
-        driver: How the car is driven. With real it wanders in its lane and
-            changes lanes, as drivers of published data sets do; with none it
-            keeps to the middle of the lane. By default as the scenario says.
+            to 1. seed=N samples other changes. May be repeated.
+        driver: How the car is driven. With real, the car wanders in its lane
+            and changes lanes, as in published data sets; with none, the car
+            stays in the middle of its lane. By default as the scenario says.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
             poor). The road shakes the car on its springs. With none the car is
             steady. By default as the scenario says.

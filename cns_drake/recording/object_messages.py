@@ -32,7 +32,7 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(NamedTuple):
-    """The motion of N vehicles and walkers at one time, in the world W.
+    """The motion of N vehicles and pedestrians at one time, in the world W.
 
     Attributes:
         instance: (N,) uint16 instance ids, as in points and structure tables.

@@ -113,7 +113,8 @@ class RideConfig(Section):
 
     Attributes:
         roughness: class of the road surface after ISO 8608, from `A` (new) to
-            `E` (very poor), which shakes the vehicle; `none` keeps it steady.
+            `E` (very poor), which shakes the vehicle; `none` keeps the vehicle
+            steady.
         seed: seed of the random bumps of the road. Drives with the same seed
             meet the same bumps.
         crossfall: sideways slope of the road, down to the car's right [m/m];
@@ -142,12 +143,12 @@ class DriverConfig(Section):
     """How the driver departs from the middle of the lanes.
 
     Attributes:
-        wander: standard deviation of the car's sideways distance from the
-            middle of its lane [m], where the road has room for it. The sideways
-            distance between the paths of two drives with this value has a
-            standard deviation that is 1.4 times as large.
+        wander: standard deviation of the car's lateral offset from the middle
+            of its lane [m], where the road has room for it. The lateral offset
+            between the paths of two drives with this value has a standard
+            deviation that is 1.4 times as large.
         wander_length: distance along the road after which the autocorrelation
-            of this sideways distance has fallen to 1/e [m].
+            of this lateral offset has fallen to 1/e [m].
         lane_changes: average number of changes to a neighbouring lane per
             kilometre [1/km], where there is such a lane. The car returns after
             15 to 270 m.
@@ -196,14 +197,14 @@ REAL_DRIVER = DriverConfig(
 
 
 class TrafficConfig(Section):
-    """Vehicles and walkers that move while a drive is recorded.
+    """Vehicles and pedestrians that move while a drive is recorded.
 
     Attributes:
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
             that drive along the map's roads.
-        walkers: number of people who walk on the map's sidewalks and crossings.
+        walkers: number of pedestrians on the map's sidewalks and crossings.
         seed: seed of the random kinds, starting places and routes of vehicles
-            and walkers.
+            and pedestrians.
         fcd: file of a SUMO trace (floating-car data) to replay instead of
             planned traffic; `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush
@@ -249,7 +250,7 @@ class TransientConfig(Section):
     effect of each depends only on the seed and on the names of structures.
 
     Attributes:
-        seed: seed of all random draws.
+        seed: seed of all random numbers.
         parked_cars: share of the parked cars that are changed. Of the changed
             cars, three in ten have left, two in ten stand elsewhere in their
             bay, and another car has replaced the rest.
@@ -311,13 +312,13 @@ class Scenario(Section):
             `world` needs it, because an SDF world has no roads.
         u_turns: whether the car turns round where the waypoints lead straight
             back.
-        aside: distance by which the car drives to the right of the middle of
-            its lane [m]; negative values are to the left. It applies between
-            junctions, as far as the road has room.
+        aside: lateral offset of the car from the centreline of its lane,
+            positive to the right [m]. The offset applies between junctions, as
+            far as the road has room.
         speeds: limits of speed and acceleration.
         driver: how the driver leaves the middle of the lane.
         ride: how an uneven road shakes the car.
-        traffic: vehicles and walkers that move.
+        traffic: vehicles and pedestrians that move.
         transient: temporary changes to the city, such as other parked cars, or
             snow.
         lidars: LiDARs by name. The frame and the topic of a LiDAR have its
@@ -327,7 +328,7 @@ class Scenario(Section):
             camera.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
-        odometry: how often the true motion of the vehicle is recorded.
+        odometry: how often the vehicle's ground-truth motion is recorded.
         frames: number of frames to record, from the start. A frame is a scan of
             the first LiDAR. By default the whole drive.
         seed: seed of the random noise of all LiDARs and the IMU.
@@ -508,7 +509,7 @@ class Scenario(Section):
 
     @property
     def fastest_rate(self) -> int:
-        """Turns per second of the fastest LiDAR."""
+        """Revolutions per second of the fastest LiDAR."""
         return _fastest(self.lidars)
 
     @property

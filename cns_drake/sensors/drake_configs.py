@@ -65,8 +65,9 @@ class LidarConfig:
         X_PB: pose of the sensor B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
         preset: name of the unit, from the table of presets.
-        rate: turns per second, at most 1000; by default that of the data sheet.
-        columns: columns in a turn; by default those of the preset.
+        rate: revolutions per second, at most 1000; by default that of the data
+            sheet.
+        columns: columns in a revolution; by default those of the preset.
         min_range: nearest range [m]; by default that of the preset.
         max_range: farthest range [m]; by default that of the preset.
         resolution: step of the coordinates; 0 for exact values [m].
@@ -75,13 +76,13 @@ class LidarConfig:
         faint_dropout: additional loss of faint returns: a return of intensity I
             is also lost with this probability times (1 - I).
         motion_distortion: whether beams are cast at their own firing times.
-        causal: whether a scan covers the turn that ends at its time, so that a
-            controller can use it at once.
+        causal: whether a scan covers the revolution that ends at its time, so
+            that a controller can use it at once.
         capture_offset: time of the first published scan [s]; the others follow
-            turn by turn. So several LiDARs can take turns.
+            one revolution after another. So several LiDARs can take turns.
         output_delay: time from a scan's capture to its publication [s], less
-            than a turn. The message keeps the time of the capture. The ports of
-            the `Lidar` are not delayed.
+            than a revolution. The message keeps the time of the capture. The
+            ports of the `Lidar` are not delayed.
         returns: `ideal` or `calibrated`.
         echoes: which echoes of a beam calibrated returns report.
         unit_seed: seed of the errors that this individual unit has, in

@@ -164,7 +164,7 @@ def _in_the_way(scenario: Scenario) -> Sequence[str]:
 def plan_scenario_traffic(
     scenario: Scenario, trajectory: Trajectory, world: World | None = None
 ) -> traffic_plan.TrafficPlan:
-    """Returns the motion of all vehicles and walkers of a scenario.
+    """Returns the motion of all vehicles and pedestrians of a scenario.
 
     Args:
         scenario: scenario with traffic.

@@ -57,8 +57,8 @@ def add_mcap_recorder(
 
     A sensor with an entry in `rates` is recorded at this rate, and an IMU that
     was added with a rate at its own rate. All other sensors are recorded once
-    per `period`. Without `period`, each LiDAR is recorded once per turn, and
-    all other sensors once per turn of the first LiDAR.
+    per `period`. Without `period`, each LiDAR is recorded once per revolution,
+    and all other sensors once per revolution of the first LiDAR.
 
     Args:
         builder: builder of a diagram with the sensors.
@@ -82,9 +82,9 @@ def add_mcap_recorder(
     Raises:
         InputError: the folder contains a finished recording or other files.
         ValueError: `rates` names an unknown sensor, neither a period nor a
-            LiDAR is given, a LiDAR is causal (its scan covers the turn before
-            its time stamp), or names of sensors are not unique or cannot be
-            parts of ROS 2 topics.
+            LiDAR is given, a LiDAR is causal (its scan covers the revolution
+            before its time stamp), or names of sensors are not unique or cannot
+            be parts of ROS 2 topics.
 
     Example:
         from cns_drake import add_mcap_recorder

@@ -45,7 +45,7 @@ LOSS_FIELDS = tuple(Losses.model_fields)
 # Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
 _DATABASE_FIELDS = ("distractors", "lateral")
-# Sections whose random draws depend on the seed of the condition.
+# Sections whose random numbers depend on the seed of the condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
 # Name of a map's first stage.
@@ -76,7 +76,7 @@ class DrawnRoute(Section):
 
     Attributes:
         length: smallest length of the route [m].
-        seed: seed of the random draw.
+        seed: seed of the random route.
     """
 
     length: float = Field(gt=0.0, le=100_000.0)
@@ -401,8 +401,8 @@ class PairMaker:
             drive = drive.with_fields(left, f"{self.source}: {side}")
             self._check_map(side, drive, left)
         for name in set(_SEEDED) & set(left):
-            # Sections without random draws get no seed, so that equal ones stay
-            # equal.
+            # Sections without random numbers get no seed, so that equal ones
+            # stay equal.
             plain = type(getattr(drive, name))()
             if getattr(drive, name).replaced(seed=plain.seed) == plain:
                 drive = drive.replaced(**{name: plain})

@@ -137,12 +137,12 @@ class MadeMap(Section):
             experiment.
         sha256: SHA-256 digest of the imported file, so that everyone imports
             the same one.
-        grow: share of the imported buildings, drawn at random, that are missing
-            or lower in the first stage.
+        grow: share of the imported buildings, sampled at random, that are
+            missing or lower in the first stage.
         plain: whether to leave out the windows, roofs and kerbs that the file
-            does not contain. By default they are drawn at random, as by
+            does not contain. By default they are sampled at random, as by
             `cns-drake import`.
-        seed: seed of all random draws.
+        seed: seed of all random numbers.
     """
 
     name: Name
@@ -216,7 +216,7 @@ class Experiment(Section):
         methods: methods to run: a list of names or Python files, or settings by
             the name of the method. A list of values makes a setting a factor.
             By default all shipped methods.
-        seeds: seeds of all random draws. Each condition is measured with each
+        seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
             or fields of a protocol of your own. Its field `base` then names the

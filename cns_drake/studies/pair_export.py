@@ -55,7 +55,7 @@ _MATCH_RADIUS = 25.0
 _LOCATIONS = ("oxford", "university", "residential", "business")
 # Number of nearest places that this evaluation asks for.
 _ASKED = 25
-# Clouds are thinned to this first, so that far walls keep points [m].
+# Clouds are downsampled to this first, so that far walls keep points [m].
 _VOXEL = 0.3
 _GROUND = np.array(sorted(CLASS_IDS[name] for name in GROUND_CLASSES))
 # Expected time to export a drive [s].

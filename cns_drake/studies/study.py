@@ -517,7 +517,7 @@ class Study:
                         label = condition.factors.get(CAUSE, "a condition")
                         noted.setdefault(f"{label} left out: {error}")
                         break
-                    # A condition without random draws is measured once.
+                    # A condition without random numbers is measured once.
                     key = f"{condition.factors} {compared.fingerprint()}"
                     if key not in known:
                         known.add(key)

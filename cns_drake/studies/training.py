@@ -4,8 +4,8 @@ In a batch, scans of one drive are queries for places of another drive through
 the same city. Queries and places are compared as the method does. The loss is
 the cross entropy between a softmax over all places of the batch and the weights
 of the right places. These weights grow with the exact overlap of two scans, or
-fall with their distance, so that the best place ranks first and less similar
-ones after it.
+fall with their distance, so that the most similar place ranks first and less
+similar ones after it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -59,9 +59,9 @@ _WRONG_FROM = 11.0
 _ALONG = 35.0
 # Standard deviation of the Gaussian by which weights fall with distance [m].
 _DEVIATION = 4.0
-# A query counts if its best place has at least this overlap.
+# A query counts if its most similar place has at least this overlap.
 _LEAST_OVERLAP = 0.2
-# Right places have at least this share of the best place's overlap.
+# Right places have at least this share of the greatest overlap.
 _NEAR_BEST = 0.9
 # Their weights are this power of the share.
 _WEIGHT_POWER = 16
@@ -372,7 +372,7 @@ def train(
 
     Returns:
         The weights; and (steps, 2), for each step the loss and the share of
-        queries whose best place is right.
+        queries whose top-ranked place is right.
 
     Raises:
         InputError: no city has two drives that meet, the state is damaged or
@@ -415,7 +415,8 @@ def train(
 
         Returns:
             The new `values`, `first` and `second`; the loss of the batch before
-            the step; and the share of its queries whose best place was right.
+            the step; and the share of its queries whose top-ranked place was
+            right.
         """
         (value, right), slope = jax.value_and_grad(loss, has_aux=True)(
             values, images, weights, counts
@@ -520,11 +521,11 @@ class TrainingPlan:
     Attributes:
         cities: number of cities.
         steps: number of batches.
-        seed: seed of all random draws.
+        seed: seed of all random numbers.
         change: whether drives see different stages and temporary changes.
         returns: whether some drives have calibrated returns and weather.
         driver: whether drivers wander and change lanes.
-        drawn_streets: whether the streets of the cities are drawn at random.
+        drawn_streets: whether the streets of the cities are sampled at random.
         graded: whether exact overlaps decide which places are right, instead of
             distances.
     """
@@ -635,7 +636,7 @@ def make_weights(
 
 
 def _draw_curve(curve: np.ndarray, stem: Path) -> None:
-    """Draws the loss, and the share of right best places, over the steps."""
+    """Draws the loss, and the share of right answers, over the steps."""
     from matplotlib.figure import Figure
 
     from evaluation.results.drawing import save

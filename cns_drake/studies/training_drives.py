@@ -1,8 +1,8 @@
-"""Drives for training: cities, stages and effects, all drawn at random.
+"""Drives for training: cities, stages and effects, all sampled at random.
 
-A city has the streets of a map, or streets drawn at random. Everything else is
-drawn anew, including two younger stages. Several drives follow the same route
-and differ as real visits do: in stage, effects, LiDAR and driver.
+A city has the streets of a map, or streets sampled at random. Everything else
+is drawn anew, including two younger stages. Several drives follow the same
+route and differ as real visits do: in stage, effects, LiDAR and driver.
 """
 
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ class SampledCity:
 
     Attributes:
         map_name: the shipped map whose streets the city has, or `DRAWN_STREETS`
-            for streets drawn at random.
+            for streets sampled at random.
         seed: seed of the training.
         number: number of the city in the training.
         num_drives: number of drives along one route.

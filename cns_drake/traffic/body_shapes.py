@@ -1,4 +1,4 @@
-"""Bodies of vehicles and walkers, made of simple shapes and meshes."""
+"""Bodies of vehicles and pedestrians, made of simple shapes and meshes."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Traffic in a diagram: a system that moves vehicles and walkers."""
+"""Traffic in a diagram: a system that moves vehicles and pedestrians."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -160,7 +160,7 @@ class TrafficBody(NamedTuple):
 
 
 class TrafficMotion(LeafSystem):
-    """A system that moves vehicles and walkers; it has no state.
+    """A system that moves vehicles and pedestrians; it has no state.
 
     .. pydrake_system::
 
@@ -181,8 +181,8 @@ class TrafficMotion(LeafSystem):
     - `body_spatial_velocities`: list of the velocities V_WL of all limbs,
       expressed in W. A LiDAR computes from them where the limbs are at each
       moment of a revolution.
-    - `moving_instances`: (N,) instance ids of the vehicles and walkers that are
-      faster than `MOVING_SPEED`.
+    - `moving_instances`: (N,) instance ids of the vehicles and pedestrians that
+      are faster than `MOVING_SPEED`.
     - `objects`: a `RecordedObjects`, for recorders.
     """
 
@@ -331,8 +331,8 @@ def make_traffic(
 ) -> TrafficMotion:
     """Adds traffic to a SceneGraph; returns the system that moves it.
 
-    Traffic consists of vehicles and walkers. The system is not yet part of a
-    diagram; `cns_drake.add_traffic` also adds it to one.
+    Traffic consists of vehicles and pedestrians. The system is not yet part of
+    a diagram; `cns_drake.add_traffic` also adds it to one.
 
     Args:
         scene_graph: SceneGraph to which the geometry is added, under a source
@@ -375,7 +375,7 @@ def add_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds moving vehicles and walkers to a diagram.
+    """Adds moving vehicles and pedestrians to a diagram.
 
     Args:
         builder: builder of a diagram with `scene_graph`.

@@ -376,8 +376,8 @@ _FIRST = 200
 # Number of steps for which traffic moves on after an ego car that follows
 # others has arrived.
 _AFTER = 20
-# Share of vehicles and walkers that are planned in addition, because some will
-# be left out.
+# Share of vehicles and pedestrians that are planned in addition, because some
+# will be left out.
 _SPARE_SHARE = 0.06
 # Greatest number of plans that are tried.
 _TRIES = 4
@@ -481,7 +481,7 @@ class Tracks:
 
 @dataclass(frozen=True)
 class TrafficPlan:
-    """The planned motion of vehicles and walkers.
+    """The planned motion of vehicles and pedestrians.
 
     Attributes:
         kinds: kind of each of the N vehicles.
@@ -543,12 +543,12 @@ def plan_traffic(
     """Plans the traffic of a drive, with the requested numbers if possible.
 
     Equal arguments give an equal plan. The plan has no collisions, but may have
-    fewer vehicles and walkers than requested.
+    fewer vehicles and pedestrians than requested.
 
     Args:
         graph: lanes and crossings.
         walkways: sidewalks on which walkers walk, and crossings.
-        vehicles, walkers: requested numbers of vehicles and walkers.
+        vehicles, walkers: requested numbers of vehicles and pedestrians.
         seed: seed of the random kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
             vehicles, the longest time that the drive may take.
@@ -609,7 +609,7 @@ class Trial:
     """One simulation of traffic, which finds bodies that would collide."""
 
     def __init__(self, task: _Task, rng: np.random.Generator):
-        """Places vehicles and walkers for the first time."""
+        """Places vehicles and pedestrians for the first time."""
         number = min(
             _with_spare(task.vehicles),
             max(task.vehicles, motion.room_for_vehicles(task.graph)),
@@ -650,8 +650,8 @@ class Trial:
     def run(self, steps: range) -> None:
         """Simulates the given time steps.
 
-        The motion of vehicles and walkers is stored, and also which pairs of
-        bodies overlap, the ego car included.
+        The motion of vehicles and pedestrians is stored, and also which pairs
+        of bodies overlap, the ego car included.
         """
         traffic, crowd = self._traffic, self._crowd
         cars = traffic.cars
@@ -714,7 +714,7 @@ class Trial:
         return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
 
     def left_out(self) -> int:
-        """Returns how many requested vehicles and walkers are left out.
+        """Returns how many requested vehicles and pedestrians are left out.
 
         Those that would overlap with another one are left out.
         """

@@ -98,14 +98,15 @@ def tcr(
         source: Drive or map before the change.
         target: Drive or map after the change.
         control: Third drive, on A's route in B's stage or on B's route in A's
-            stage. With it, the command prints how large TCR_sym is if only the
+            stage. The command then also prints how large TCR_sym is if only the
             routes differ and nothing has changed.
         paths: Compare how the two drives were driven, instead of what changed.
             Every 5 m along A, the command measures how B differs from A:
-            sideways offset, lane, heading and height. It also prints which
-            share of the time each car stands, and its speeds. For comparison,
-            it shows the same numbers for two pairs of real drives: two drives
-            of Boreas, 28 days apart, and KAIST 01 and 02 of MulRan.
+            lateral offset, lane, heading and height. The command also prints
+            which share of the time each car stands, and its speeds. For
+            comparison, the command shows the same numbers for two pairs of real
+            drives: two drives of Boreas, 28 days apart, and KAIST 01 and 02 of
+            MulRan.
     """
     if paths:
         commands.check_only_with(context, "paths", _WITH_PATHS)
@@ -214,7 +215,7 @@ def pr(
         mode: Which queries count: all queries (all), or only queries that have
             a match in the database (filtered).
         across_maps: Allow two drives through maps of different names, such as
-            two cities drawn along the same streets.
+            two cities generated along the same streets.
         truth: What makes a place a match of a query. With radius, the place
             lies within --radius. With overlap:PART, such as overlap:0.5, the
             place's scan shows at least this share of what the query's scan
@@ -224,13 +225,14 @@ def pr(
         exact_overlaps: File with exact overlaps, as cns-drake export
             --format overlap-table writes it. Without it, overlaps are estimated
             from the scans. Needs --truth overlap:PART.
-        turn_queries: Whether to turn each query by a random yaw, as if the car
-            had another heading. By default as --protocol says.
+        turn_queries: Whether to give each query a random yaw, as if the car had
+            another heading. By default as --protocol says.
         tilt_queries: Tilt each query by a random roll and pitch of up to this
             angle [deg]. By default as --protocol says.
-        hide_sector: Hide a random sector of this angle from each query [deg],
+        hide_sector: Occlude a random sector of this angle in each query [deg],
             as a truck beside the car would.
-        seed: Seed of the random turns, tilts and hidden sectors of the queries.
+        seed: Seed of the random yaws, tilts and occluded sectors of the
+            queries.
         output: Folder to write results.csv and queries.csv to, in the same form
             as those of a study; created if it does not exist.
         scores: CSV file to write, with a score for each pair of a query and a
@@ -447,8 +449,8 @@ def compare(
             results are compared with each other only if they used the same
             protocol.
         verified: Compare the results with geometric verification, in whose rows
-            the column gate is 1. By default the results without it are
-            compared.
+            the column gate is 1. By default, the results
+            without geometric verification are compared.
         rankings: Compare only the order of the methods in the tables. Each
             table is ranked over its own conditions. The tables may therefore
             have different conditions, such as simulated and real drives.

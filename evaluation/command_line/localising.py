@@ -54,20 +54,22 @@ def localise(
     """Localise scans in a map.
 
     Each scan of QUERY is aligned to MAP from an initial guess of its pose: the
-    true pose, moved by --start in a random direction and turned by --start-turn
-    about a random axis. With --track, the estimated pose of the previous scan
-    is used instead. The results are pose errors and success rates.
+    ground-truth pose, moved by --start in a random direction and rotated by
+    --start-turn about a random axis. With --track, the estimated pose of the
+    previous scan is used instead. The results are pose errors and success
+    rates.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
-    scans are merged at their true poses. If QUERY is a point cloud, it is one
-    scan, whose true pose is the origin of the map.
+    odometry, CNS) or point clouds (.pcd .ply .npy .bin). The scans of a drive
+    as MAP are merged at their ground-truth poses. A point cloud as QUERY is one
+    scan, whose ground-truth pose is the origin of the map.
 
     With --estimate, the command measures the errors of poses that another
-    program estimated, and nothing else: MAP is then the drive with the true
-    poses, and there is no QUERY. It prints two errors, as evo and KITTI define
-    them. ATE is the root mean square of the distances from the true trajectory
-    after rigid alignment. Drift is the error of the motion over 100 m of path.
+    program estimated, and nothing else: MAP is then the drive with the ground
+    truth, and there is no QUERY. The command prints two errors, as evo and
+    KITTI define them. ATE is the root mean square of the distances from the
+    ground truth after rigid alignment. Drift is the error of the motion over
+    100 m of path.
 
     Args:
         place: Drive or point cloud to use as the map.
@@ -75,12 +77,11 @@ def localise(
         method: Registration method: icp, plane-icp, gicp, vgicp,
             robust-plane-icp, robust-gicp or kiss-matcher; or a Python file with
             a function of your own.
-        start: Distance of the initial guess from the true position [m]. A
-            larger distance makes the task harder.
-        start_turn: Angle by which the initial guess is turned away from the
-            true orientation [deg].
+        start: Distance of the initial guess from the ground truth [m]. A larger
+            distance makes the task harder.
+        start_turn: Angle between the initial guess and the ground truth [deg].
         seed: Seed of the random directions in which the initial guesses are
-            moved and turned.
+            moved and rotated.
         query_spacing: Distance that the car drives between two queries [m]; by
             default 10. Not with --track.
         track: Track the whole drive instead of localising single scans: the

@@ -28,15 +28,16 @@ def map_update(
 ) -> None:
     """Compute scores for labels of what changed between two maps.
 
-    The command compares labels with the true labels: your own (--labels-a and
-    --labels-b) or, without these options, those of a shipped change detector,
-    the baseline. DIR is a folder that cns-drake export --format map-truth
-    wrote, or a folder with the same files for real drives: A/map.ply,
-    A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the scans and
-    poses in this folder. Points whose true label is 255 are ignored.
+    The command compares labels with the ground truth: your own labels
+    (--labels-a and --labels-b) or, without these options, those of a shipped
+    change detector, the baseline. DIR is a folder that cns-drake export
+    --format map-truth wrote, or a folder with the same files for real drives:
+    A/map.ply, A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the
+    scans and poses in this folder. Points whose label in the ground truth is
+    255 are ignored.
 
     Args:
-        folder: Folder with the maps and their true labels.
+        folder: Folder with the maps and their ground truth.
         baseline: Shipped change detector to score, instead of labels of your
             own. By default free-space, if you give no labels.
         labels_a: File with your labels of A's map: 0 unobserved, 1 kept, 2

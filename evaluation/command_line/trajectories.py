@@ -43,7 +43,7 @@ def measure_estimate(
     """Prints the errors of an estimated trajectory.
 
     Args:
-        truth: drive with the true trajectory.
+        truth: drive with the ground-truth trajectory.
         estimate: TUM file.
         frame: frame whose poses the file contains.
         time_offset: time to add to the times of the estimate [s].

@@ -41,7 +41,7 @@ from evaluation.methods.method import run_module, with_named_faults
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
-# Least number of points of a map, and of a thinned scan that is aligned.
+# Least number of points of a map, and of a downsampled scan that is aligned.
 FEWEST_POINTS = 10
 # An alignment ends when a step is below these [m, rad].
 _STILL = (1e-4, 1e-5)
@@ -64,8 +64,8 @@ class Settings:
     """Settings of the shipped estimators.
 
     Attributes:
-        voxel: side of the voxels to which the map is thinned [m].
-        scan_voxel: side of the voxels to which a scan is thinned [m].
+        voxel: side of the voxels to which the map is downsampled [m].
+        scan_voxel: side of the voxels to which a scan is downsampled [m].
         width: greatest distance between corresponding points [m]. With VGICP,
             a point corresponds to the Gaussian of its own voxel if the mean of
             this Gaussian is not farther away.
@@ -135,7 +135,7 @@ class LocalisationMap:
 
     Attributes:
         name: name of the drive or file from which it was made.
-        surface: the thinned points in W, with normals and covariances.
+        surface: the downsampled points in W, with normals and covariances.
     """
 
     name: str
@@ -265,8 +265,8 @@ class Estimate:
     iterations: int = 0
 
 
-# A function that takes a map, a thinned scan (N, 3) in S, the scan as measured,
-# and the start X_WS.
+# A function that takes a map, a downsampled scan (N, 3) in S, the scan as
+# measured, and the start X_WS.
 Estimator = Callable[
     [LocalisationMap, np.ndarray, np.ndarray, np.ndarray], Estimate
 ]

@@ -1,4 +1,4 @@
-"""Maps of whole drives: the points of all scans, thinned to voxels.
+"""Maps of whole drives: the points of all scans, downsampled to voxels.
 
 The grid of the voxels is fixed in the world, because its position influences a
 coarse voxel map. In x and y, the borders of voxels are multiples of the voxel

@@ -66,8 +66,8 @@ class LayeredOverlapConfig(MethodConfig):
     """Settings of layered overlap.
 
     All values were chosen by trials on development worlds. The reported results
-    come from other worlds. The method finds the best place in four successive
-    searches, from coarse to fine maps.
+    come from other worlds. The method finds the top-ranked place in four
+    successive searches, from coarse to fine maps.
 
     Attributes:
         cell: side of a cell of the finest maps [m]. These maps have 256 x 256
@@ -156,8 +156,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     The first three searches compare coarse maps. For each place, they find the
     pose at which the greatest number of cells is filled in both scans. They
     rank the places by how many standard deviations this number of common cells
-    lies above the number that is expected by chance. The last
-    search improves the poses of the best places by hill climbing on fine maps.
+    lies above the number that is expected by chance. The last search improves
+    the poses of the top-ranked places by hill climbing on fine maps.
 
     The score is the weighted number of common cells on the fine maps, divided
     by the geometric mean of the two scans' weighted numbers of filled cells.

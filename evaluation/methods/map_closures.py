@@ -40,7 +40,7 @@ class MapClosuresConfig(MethodConfig):
         place: which of the merged scans stands for a place, `middle` or
             `first`.
         density_map_resolution: length of a pixel, and of the voxels to which
-            local maps are thinned [m].
+            local maps are downsampled [m].
         density_threshold: density below which a pixel is empty, as a fraction
             of the greatest density.
         hamming_distance_threshold: number of bits by which matching keypoints
@@ -78,8 +78,9 @@ class MapClosuresDatabase:
 class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     """MapClosures, by its own package.
 
-    Descriptors are thinned local maps (N, 3). A local map of 200 scans covers
-    about 50 m of path in front and behind, at 10 m/s and 20 scans per second.
+    Descriptors are downsampled local maps (N, 3). A local map of 200 scans
+    covers about 50 m of path in front and behind, at 10 m/s and 20 scans per
+    second.
     """
 
     Config = MapClosuresConfig

@@ -80,7 +80,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         batch_size: number of clouds for one call of `describe_batch`.
         skips_places: whether scores may be NaN (no candidate) even if every
             place is compared (`exhaustive`). If false, such a NaN is an error.
-        rerank_best: number of best places that a second stage, `rerank`,
+        rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
         config: the parameters in use.
 
@@ -203,14 +203,15 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         places: Sequence[np.ndarray],
         scores: np.ndarray,
     ) -> np.ndarray:
-        """Returns new scores for the best places, from a second stage.
+        """Returns new scores for the top-ranked places, from a second stage.
 
-        The second stage compares points. Only the best places remain
+        The second stage compares points. Only the top-ranked places remain
         candidates.
 
         Args:
             query: cloud of the query.
-            places: clouds of the K best places; K is at most `rerank_best`.
+            places: clouds of the K top-ranked places; K is at most
+                `rerank_best`.
             scores: (K,) scores of these places by `score`, decreasing.
 
         Returns:

@@ -48,8 +48,8 @@ class ProbeConfig(MethodConfig):
     `sensor_height` has no effect: heights are measured in the LiDAR's frame.
 
     Attributes:
-        voxel_size: side of the voxels to which each cloud is first thinned [m].
-            The first point of each voxel stays.
+        voxel_size: side of the voxels to which each cloud is first downsampled
+            [m]. The first point of each voxel stays.
         rings: number of equal cells of range, up to `max_range`.
         sectors: number of equal cells of azimuth in a turn.
         max_range: largest range of a point that is used [m].

@@ -8,7 +8,7 @@ authors' programs; no weights are shipped.
 
 Clouds are prepared as in PointNetVLAD's program (Uy and Lee, CVPR 2018), which
 made the networks' training data. Points near the greatest plane are removed.
-The rest is thinned to 4096 points, centred, and scaled so that the mean
+The rest is downsampled to 4096 points, centred, and scaled so that the mean
 distance from the centre is 1/2. Points outside of [-1, 1] are replaced by other
 points. As in that program, x points backwards. Deliberate differences:
 
@@ -46,7 +46,7 @@ _GROUND_WITHIN = 0.5
 _TRIALS = 200
 # Number of points that vote for a plane.
 _VOTERS = 2000
-# Least side of the voxels for thinning [m].
+# Least side of the voxels for downsampling [m].
 _LEAST_VOXEL = 0.001
 # Difference between the sides that are tried [m].
 _VOXEL_STEP = 0.025

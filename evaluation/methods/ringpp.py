@@ -51,7 +51,7 @@ class RingPlusPlusConfig(MethodConfig):
             square.
         crop: which points of the map are used: `square` uses all of them,
             `round` only those within `half_width` of its centre. If the LiDAR
-            is turned, a square contains other points than before, but a circle
+            is rotated, a square contains other points than before, but a circle
             contains the same points.
         min_height: smallest height above the ground of a point that is used
             [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
@@ -171,7 +171,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         return RingDatabase(
             places=places,
             is_empty=np.array([len(place.filled) == 0 for place in places]),
-            # Successive queries have many of their best places in common.
+            # Successive queries have many of their top-ranked places in common.
             reference=functools.lru_cache(_REFERENCES_KEPT)(reference),
         )
 

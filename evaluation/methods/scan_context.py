@@ -10,14 +10,14 @@ The polar context looks different from the next lane. The augmented variant
 therefore stores each place of the database three times: as seen, and as if seen
 from 2 m to either side.
 
-The defaults are those of the authors' T-RO program. On the same thinned scans,
-scores agree with those of this program to 1e-15 for all variants except
-`augmented-cart`, which the program lacks. With `variant: polar`, `min_points:
-1` and `far_points: dropped`, scores agree with the authors' C++ program to
-3e-4, the precision of its heights. Deliberate differences:
+The defaults are those of the authors' T-RO program. On the same downsampled
+scans, scores agree with those of this program to 1e-15 for all variants except
+`augmented-cart`, which the program lacks. With `variant: polar`,
+`min_points: 1` and `far_points: dropped`, scores agree with the authors' C++
+program to 3e-4, the precision of its heights. Deliberate differences:
 
-- The voxels for thinning start at the sensor. The T-RO program leaves this to
-  MATLAB, the C++ program to its caller.
+- The voxels for downsampling start at the sensor. The T-RO program leaves this
+  to MATLAB, the C++ program to its caller.
 - The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
 - A function of the T-RO program wrongly adds up the shifts that it tries; the
   code here follows a corrected copy of this function.
@@ -57,8 +57,8 @@ class ScanContextConfig(MethodConfig):
             `augmented-polar`, as seen from `lateral_shift` to the left and to
             the right; for `augmented-cart`, as seen by a car in the opposite
             direction. The default is the one that [T] calls A-PC.
-        voxel_size: side of the voxels to which each cloud is first thinned [m];
-            [T] 0.5.
+        voxel_size: side of the voxels to which each cloud is first downsampled
+            [m]; [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.
         sectors: number of sectors of the polar context; [T], [C] 60.
         max_range: range up to which the polar context has rings [m]; [T], [C]
@@ -238,7 +238,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         return X_PQ
 
     def _prepare(self, points: np.ndarray) -> np.ndarray:
-        """Returns the thinned points, with z from the ground."""
+        """Returns the downsampled points, with z from the ground."""
         lift = [0.0, 0.0, self.config.sensor_height]
         return thin(points, self.config.voxel_size) + lift
 

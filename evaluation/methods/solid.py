@@ -32,9 +32,9 @@ class SolidConfig(MethodConfig):
     `cns` LiDAR.
 
     Attributes:
-        voxel_size: side of the voxels to which each cloud is first thinned [m];
-            [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field of
-            view like that of `cns`.)
+        voxel_size: side of the voxels to which each cloud is first downsampled
+            [m]; [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field
+            of view like that of `cns`.)
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
             LiDAR with a field of view like that of `cns`.
@@ -212,7 +212,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         return yaw_pose(-2.0 * math.pi * shift / num_cells)
 
     def _prepare(self, points: np.ndarray) -> np.ndarray:
-        """Returns the thinned points within range.
+        """Returns the downsampled points within range.
 
         As in the authors' Python program, the voxels begin half a voxel below
         the least coordinates.

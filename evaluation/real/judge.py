@@ -7,7 +7,7 @@ less than 30 m from its first scan, even of several passes or drives, or of all
 scans in a folder without poses. The AUC of the classifier is 1 if it tells all
 patches apart, and 0.5 for guessing. As a control, the classifier tells the
 first half of the simulated places from the second half. All AUCs are means over
-random draws of patches; single draws differ by up to 0.04.
+random samples of patches; single draws differ by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If
@@ -417,12 +417,12 @@ def judge_draws(
 ) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
-    The result is that of `aucs_by_group`, averaged over several random draws of
-    patches.
+    The result is that of `aucs_by_group`, averaged over several random samples
+    of patches.
 
     Args:
         real, simulated: scans by place, see `places_of`.
-        draws: number of random draws of patches.
+        draws: number of random samples of patches.
     """
     results = []
     for seed in track(range(draws), "judging", draws, "draws"):

@@ -47,8 +47,8 @@ _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
 _NAME = "real"
 # More places than all drives have.
 _ALL = 10**9
-# Number of random draws of patches for the judge; their AUCs differ by up to
-# 0.04.
+# Number of random samples of patches for the classifier; their AUCs differ by
+# up to 0.04.
 _DRAWS = 1
 
 

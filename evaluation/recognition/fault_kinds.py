@@ -58,9 +58,9 @@ class PairEvidence:
             the query and its right place are aligned: the share of the query's
             points or of the place's, whichever is less. NaN if `fits` is NaN
             for every method.
-        fits: method -> (Q,) the same share for the query and its wrong best
-            place; NaN if the best place is right, or at most twice the
-            protocol's radius away.
+        fits: method -> (Q,) the same share for the query and its wrong
+            top-ranked place; NaN if the top-ranked place is right, or at most
+            twice the protocol's radius away.
         unchanged: (Q,) `overlaps` of the control, which is the same comparison
             without a change of the city; None without a control.
     """
@@ -97,7 +97,7 @@ class PairEvidence:
 
 
 def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
-    """Returns, for each query, why its best place is wrong.
+    """Returns, for each query, why its top-ranked place is wrong.
 
     The right place is the match whose scan shows most of the query's scan.
 

@@ -1,11 +1,11 @@
 """Recall, precision-recall curve, AUC and F1 of place recognition.
 
-The definitions were derived from the paper's numbers. Only the best place of
-each query counts:
+The definitions were derived from the paper's numbers. Only the top-ranked place
+of each query counts:
 
-- TP: accepted, and the best place is a true match,
-- FP: accepted, and the best place is not a true match, whether or not the query
-  has a match,
+- TP: accepted, and the top-ranked place is a true match,
+- FP: accepted, and the top-ranked place is not a true match, whether or not the
+  query has a match,
 - FN: rejected, although the query has a match.
 
 A rejected query without a match is neither TP, FP nor FN. A query without a
@@ -13,14 +13,14 @@ candidate is never accepted. In mode `all` every query counts; in mode
 `filtered` only queries that have a match (there, the greatest F1 follows from
 R@1).
 
-A query with a match and a wrong best place is FN while it is rejected, and FP
-once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for every
-method that has a best place for all queries. The strict AUC, `auc_strict`, is
-the area under the curve with recall = TP / N instead, where N is the number of
-queries with a match.
+A query with a match and a wrong top-ranked place is FN while it is rejected,
+and FP once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for
+every method that has a top-ranked place for all queries. The strict AUC,
+`auc_strict`, is the area under the curve with recall = TP / N instead, where N
+is the number of queries with a match.
 
 In both modes, R@N is the share of the queries with a match that have a match
-among their N best places.
+among their N top-ranked places.
 """
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -493,8 +493,8 @@ class PlaceRecognitionMetrics:
             places.
         num_queries: number of queries.
         num_with_match: N, the number of queries with a match.
-        num_right: number of queries whose best place is right. R@1 = num_right
-            / N.
+        num_right: number of queries whose top-ranked place is right. R@1 =
+            num_right / N.
         auc_interval: 95 % interval of `auc`, by bootstrap over blocks of the
             route.
         recall_at_1_interval: 95 % interval of R@1, by the same bootstrap.
@@ -530,7 +530,7 @@ class PlaceRecognitionMetrics:
 
     @property
     def recall_at_1(self) -> float:
-        """R@1: share of right best places among the queries with a match."""
+        """R@1: share of right answers among the queries with a match."""
         return float(self.recall_at_n[0])
 
 

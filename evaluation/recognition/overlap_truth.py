@@ -176,7 +176,7 @@ def best_overlaps(
 
 
 def sampled(points: np.ndarray) -> np.ndarray:
-    """Returns at most 8192 of N points, drawn at random."""
+    """Returns at most 8192 of N points, sampled at random."""
     if len(points) <= _NUM_POINTS:
         return points
     rng = np.random.default_rng(len(points))

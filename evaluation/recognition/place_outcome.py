@@ -36,16 +36,16 @@ from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.scoring import ranked_places
 
-# The reason for a wrong best place to which no other one applies.
+# The reason for a wrong top-ranked place to which no other one applies.
 ELSEWHERE = "elsewhere"
-# Reasons for wrong best places, in order of precedence.
+# Reasons for wrong top-ranked places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", ELSEWHERE)
 # Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
 # `elsewhere`.
 NEARLY = 2.0
 # Further radii of a match for which AUC is computed [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
-# Number of best places that are kept for each query.
+# Number of top-ranked places that are kept for each query.
 NUM_BEST = 5
 _HALF = 0.5
 
@@ -55,7 +55,8 @@ class PlaceOutcome:
     """The answers of a method to the queries of a drive, and their truth.
 
     All numbers, tables and pages of place recognition are made from it. It
-    holds the best places of each query instead of the scores of all places.
+    holds the top-ranked places of each query instead of the scores of all
+    places.
 
     Attributes:
         method: name of the method; if it has settings, with them.
@@ -70,8 +71,8 @@ class PlaceOutcome:
             value is -1 for a frame, infinite for a rank, and NaN for other
             numbers.
         place_frames: (D,) frame of each place in its drive.
-        best_places: (Q, K) int32, the best places of each query, best first; -1
-            where there are fewer candidates.
+        best_places: (Q, K) int32, the top-ranked places of each query, best
+            first; -1 where there are fewer candidates.
         best_scores: (Q, K) their scores; NaN where there are fewer.
         matches: (M, 2) int32, each pair of a query and a place that is a true
             match.
@@ -195,7 +196,7 @@ class PlaceOutcome:
 
     @property
     def pose_errors(self) -> PoseErrors:
-        """Errors of the poses at the best places."""
+        """Errors of the poses at the top-ranked places."""
         return PoseErrors(
             self.columns["translation_error"],
             self.columns["rotation_error_deg"],
@@ -327,22 +328,25 @@ def faults(
     distances: np.ndarray,
     radius: float,
 ) -> np.ndarray:
-    """Returns, for each query, why its best place is wrong.
+    """Returns, for each query, why its top-ranked place is wrong.
 
-    The best place is the one that the method ranks first.
+    The top-ranked place is the one that the method ranks first.
 
     Args:
         outcomes: outcomes of Q queries.
-        match_frames: (Q,) frame of the best place; -1 without a candidate.
-        distances: (Q,) distance to the best place [m]; NaN in another city.
+        match_frames: (Q,) frame of the top-ranked place; -1 without a
+            candidate.
+        distances: (Q,) distance to the top-ranked place [m]; NaN in another
+            city.
         radius: radius of a match [m].
 
     Returns:
-        (Q,) "" if the best place is a match, and otherwise the first reason
-        that applies: `no_place` if the query has no match; `no_candidate` if
-        the method finds no place, or rejects all places; `other_city` if the
-        best place is in another city; `too_far` if the best place is at most
-        twice the radius away; `elsewhere` if no other reason applies.
+        (Q,) "" if the top-ranked place is a match, and otherwise the first
+        reason that applies: `no_place` if the query has no match;
+        `no_candidate` if the method finds no place, or rejects all places;
+        `other_city` if the top-ranked place is in another city; `too_far` if
+        the top-ranked place is at most twice the radius away; `elsewhere` if no
+        other reason applies.
     """
     wrong = [
         ~outcomes.has_match,

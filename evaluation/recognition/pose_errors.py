@@ -20,7 +20,7 @@ SUCCESS_ROTATION_DEG = 5.0
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Errors of the pose of each of Q queries relative to its best place.
+    """Errors of the pose of each of Q queries relative to its top-ranked place.
 
     Attributes:
         translation: (Q,) distance to the true position [m]; NaN without a
@@ -112,9 +112,9 @@ def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
 def is_accepted(outcomes: QueryOutcomes) -> np.ndarray:
     """Returns which queries are accepted matches, (Q,) bool.
 
-    These are the queries whose best place is a match, and whose score reaches
-    the threshold with the greatest F1. This F1 counts all queries, also those
-    without a match.
+    These are the queries whose top-ranked place is a match, and whose score
+    reaches the threshold with the greatest F1. This F1 counts all queries, also
+    those without a match.
     """
     curve = pr_curve(outcomes)
     if not len(curve.thresholds):

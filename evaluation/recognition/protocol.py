@@ -335,7 +335,7 @@ PAPER_PROTOCOL = RetrievalProtocol(place="first")
 
 # The protocol of all studies. Turned queries deprive methods of help from crops
 # along the sensor's axes, voxel grids and streets at right angles. The random
-# draws must not change any more.
+# numbers must not change any more.
 FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 
 PROTOCOLS = {

@@ -19,9 +19,9 @@ _NAMED: Options = {
             typer.Option(
                 "--protocol",
                 help="How the scans of the query drive become queries. fair "
-                "turns and tilts them at random, so that no method profits "
-                "from equal headings. paper follows the CNS paper. recorded "
-                "leaves the scans as they are.",
+                "gives each scan a random yaw and tilt, so that no method "
+                "profits from equal headings. paper follows the CNS paper. "
+                "recorded leaves the scans as they are.",
             ),
         ],
         "fair",
@@ -89,9 +89,10 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Reject top-ranked places that are farther from the query "
-                "than --radius, according to the method's own pose estimate. "
-                "It has no effect on methods that estimate no pose.",
+                help="Geometric verification: reject top-ranked places that "
+                "are farther from the query than --radius, according to the "
+                "method's own pose estimate. The option has no effect on "
+                "methods that estimate no pose.",
             ),
         ],
         False,

@@ -10,11 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
-    """Whether the best place of each of Q queries is right, and its score.
+    """Whether the top-ranked places of Q queries are right, and their scores.
 
     Attributes:
-        best_scores: (Q,) score of the best place; NaN without a candidate.
-        is_right: (Q,) bool, whether the best place is a true match.
+        best_scores: (Q,) score of the top-ranked place; NaN without a
+            candidate.
+        is_right: (Q,) bool, whether the top-ranked place is a true match.
         has_match: (Q,) bool, whether the database holds a true match.
         first_right_ranks: (Q,) rank of the best true match, 1 or greater;
             infinite if no candidate is a true match.

@@ -35,7 +35,8 @@ class Retrieval:
             no candidates.
         distances: (Q, D) float64 distances between query and place [m].
         matches: (Q, D) bool, whether a place is a true match of a query.
-        pose_errors: errors of the estimated pose at each query's best place.
+        pose_errors: errors of the estimated pose at each query's top-ranked
+            place.
         is_known: (Q, D) bool, whether a place is allowed as an answer to a
             query; with `exclude_recent`, places that the drive has passed just
             before are not.
@@ -63,7 +64,7 @@ class Retrieval:
 
     @property
     def best_places(self) -> np.ndarray:
-        """(Q,) best place of each query; -1 if it has no candidate.
+        """(Q,) top-ranked place of each query; -1 if it has no candidate.
 
         Of several places with the best score, the first one counts.
         """
@@ -73,13 +74,13 @@ class Retrieval:
 
     @property
     def best_frames(self) -> np.ndarray:
-        """(Q,) frame of each query's best place; -1 without a candidate."""
+        """(Q,) frame of each top-ranked place; -1 without a candidate."""
         best = self.best_places
         return np.where(best < 0, -1, self.database_frames[best])
 
     @property
     def best_distances(self) -> np.ndarray:
-        """(Q,) distance of each query to its best place [m].
+        """(Q,) distance of each query to its top-ranked place [m].
 
         It is NaN for a query without a candidate.
         """

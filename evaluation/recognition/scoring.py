@@ -127,7 +127,7 @@ def score_places(
         place_clouds: clouds of the D places, for a second stage.
         is_known: (D,) bool, which places may be candidates. If this excludes a
             place, the query is compared with every place, because a search for
-            a few best places might return only excluded ones.
+            a few top-ranked places might return only excluded ones.
         gate_radius: radius of geometric verification [m] (see `gated`); None
             for none.
         exhaustive: whether to compare also with places that a search would skip

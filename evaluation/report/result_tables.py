@@ -474,7 +474,7 @@ class _Faults(NamedTuple):
 
     @property
     def wrong(self) -> int:
-        """Number of wrong best places of queries that have a match."""
+        """Number of wrong top-ranked places of queries that have a match."""
         return self.kinds.total() - self.kinds["no_place"]
 
     @property
@@ -610,7 +610,7 @@ class DriveTrack:
 
 
 class _Queries(NamedTuple):
-    """The queries of a result and their best places: frame, time and pose."""
+    """Queries and their top-ranked places: frame, time and pose."""
 
     result: PlaceOutcome
     query: list[np.ndarray]
@@ -668,9 +668,9 @@ def query_table(
     Args:
         results: results of methods on pairs of drives.
         tracks: drive -> its frames, for all drives in the results.
-        evidence: names of database and query drive -> evidence on why best
-            places are wrong. The columns with reasons are empty for a pair
-            without evidence.
+        evidence: names of database and query drive -> evidence on why
+            top-ranked places are wrong. The columns with reasons are empty for
+            a pair without evidence.
     """
 
     def queries(one: PlaceOutcome) -> _Queries:

@@ -1,4 +1,4 @@
-"""Finds evidence on why best places are wrong, in the scans of two drives."""
+"""Finds evidence, in two drives' scans, on why top-ranked places are wrong."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def find_evidence(
     results: Sequence[PlaceOutcome],
     protocol: RetrievalProtocol,
 ) -> PairEvidence:
-    """Returns evidence on why the best places of queries are wrong.
+    """Returns evidence on why the top-ranked places of queries are wrong.
 
     The scan of each query is compared with those of its matches and of its
-    wrong best places.
+    wrong top-ranked places.
 
     Args:
         database: drive of the places.
@@ -154,9 +154,9 @@ def find_evidence(
 
 
 def _wrong_places(result: PlaceOutcome) -> np.ndarray:
-    """Returns the wrong best place of each query, (Q,).
+    """Returns the wrong top-ranked place of each query, (Q,).
 
-    It is -1 if the best place is right or less than two radii away.
+    It is -1 if the top-ranked place is right or less than two radii away.
     """
     outcomes = result.outcomes
     is_far = result.columns["distance"] > NEARLY * result.radius

@@ -199,7 +199,7 @@ class StagesReport:
           measured.
         - `metrics.csv`: the metrics of other benchmarks.
         - `differences.csv`: the differences between methods.
-        - `why.csv`: the reasons for wrong best places.
+        - `why.csv`: the reasons for wrong top-ranked places.
         - `query_details.csv`, `query_details_unchanged.csv`: each query of the
           pairs of drives, and of their controls.
 
@@ -354,7 +354,7 @@ class _CityReport:
         }
 
     def _evidence(self, pair: Recordings) -> Part:
-        """Returns the file with evidence on why best places are wrong."""
+        """Returns the file with evidence on why top-ranked places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
 
     def _explaining(self, pair: Recordings) -> Job:

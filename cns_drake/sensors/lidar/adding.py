@@ -84,9 +84,9 @@ def add_lidar(
             world. A frame on a body stands for the whole body. A FrameId stands
             for its own geometry only: a SceneGraph does not know of welds.
         motion_distortion: whether the LiDAR and all other bodies of its plant
-            keep moving during a turn (see `Lidar`). Bodies of other plants and
-            frames of other sources stay where they are at the time of the
-            output.
+            keep moving during a revolution (see `Lidar`). Bodies of other
+            plants and frames of other sources stay where they are at the time
+            of the output.
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
@@ -109,7 +109,8 @@ def add_lidar(
             `body_spatial_velocities`, if you connect this port yourself; with
             `motion_distortion`, all bodies of the plant.
         num_threads: number of threads that share its rays.
-        causal: whether a scan is the turn that ends at the time of the output.
+        causal: whether a scan is the revolution that ends at the time of the
+            output.
 
     Returns:
         The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W` and
@@ -292,16 +293,17 @@ def add_described_lidar(
         name: name of the system.
         seed: seed of noise and returns.
         weather: weather of calibrated returns.
-        period: duration of a turn [s]; by default it follows from the rate in
-            the description.
+        period: duration of a revolution [s]; by default it follows from the
+            rate in the description.
         unseen: see `add_lidar`, as for all further arguments.
         motion_distortion: whether the bodies of its plant keep moving during a
-            turn; a drive connects a `Sweep` instead.
+            revolution; a drive connects a `Sweep` instead.
         structures: table of the structures.
         anchored_frames: frames that never move.
-        moving_bodies: frames that move during a turn.
+        moving_bodies: frames that move during a revolution.
         num_threads: number of threads that share its rays.
-        causal: whether a scan is the turn that ends at the time of the output.
+        causal: whether a scan is the revolution that ends at the time of the
+            output.
     """
     return add_lidar(
         builder,
@@ -348,7 +350,7 @@ def add_lidar_view(
         lidar: the LiDAR.
         meshcat: server that shows the points.
         period: time between two shown scans [s]; by default the duration of a
-            turn.
+            revolution.
         color: colour of the points.
         point_size: size of a point [m].
 

@@ -64,7 +64,7 @@ class LidarSection(Mount):
         faint_dropout: additional loss of faint returns: a return of intensity I
             (from 0 to 1) is lost with a probability of this value times (1 -
             I). Only with ideal returns.
-        motion_distortion: whether the motion of the LiDAR during a turn
+        motion_distortion: whether the motion of the LiDAR during a revolution
             distorts the scan, as in real units. Each column is then measured
             from the pose of the LiDAR at its own firing time, `stamp + t`, and
             expressed in the LiDAR's frame at that time. Otherwise the whole
@@ -74,12 +74,12 @@ class LidarSection(Mount):
         echoes: which echoes of a beam are reported, with calibrated returns.
             `dual` reports the strongest and the last one. Fog has an echo only
             in beams without any other.
-        unit_seed: seed of the individual unit, with calibrated returns. It
+        unit_seed: seed of the individual unit, with calibrated returns, which
             decides the errors in the ranges, angles and gains of the unit's
             lasers. Use the same seed in all drives with the same unit.
-        rate: turns per second [Hz]. The rate of the fastest LiDAR of the drive
-            must be a multiple of it. If the lasers of a unit fire at a fixed
-            rate, a slower turn has more columns.
+        rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
+            drive must be a multiple of this rate. If the lasers of a unit fire
+            at a fixed rate, a slower revolution has more columns.
         layout: driver or program whose format the recorded points have.
     """
 
@@ -181,7 +181,7 @@ def make_pattern(
 
     Args:
         config: description of the LiDAR.
-        period: duration of a turn [s]; by default 1 / `config.rate`.
+        period: duration of a revolution [s]; by default 1 / `config.rate`.
     """
     pattern = make_beam_pattern(
         config.preset,

@@ -114,26 +114,26 @@ class Lidar(LeafSystem):
     the world frame; `positions_W` is `point_cloud_W` without the colours.
     `X_WS` is the pose of S at the time of the output.
 
-    A scan is one turn of the LiDAR. The turn starts at the time of the output.
-    With a causal LiDAR, the turn ends at this time instead, so that a
-    controller may use the scan at once. By default all beams are cast from the
-    pose of S at the time of the output, which follows from the pose of P in the
-    SceneGraph (a deskewed scan).
+    A scan is one revolution of the LiDAR. The revolution starts at the time of
+    the output. With a causal LiDAR, the revolution ends at this time instead,
+    so that a controller may use the scan at once. By default all beams are cast
+    from the pose of S at the time of the output, which follows from the pose of
+    P in the SceneGraph (a deskewed scan).
 
     If the port `sweep` is connected, the poses of P come from a `Sweep` and not
     from the SceneGraph: one pose for the whole turn or, with motion distortion,
     one for each column at its firing time. With motion distortion, a point is
     expressed in S at its firing time t, as a real unit reports it: X_WS(start
-    of the turn + t) transforms it to the world. During the turn, all other
-    moving geometry stays where it is at the time of the output.
+    of the revolution + t) transforms it to the world. During the revolution,
+    all other moving geometry stays where it is at the time of the output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
-    bodies of a plant move during the turn, with the velocities that they have
-    at the time of the output. The port `body_spatial_velocities` supplies these
-    velocities as a MultibodyPlant does: a list of V_WB over the plant's bodies,
-    expressed in the world. Each beam is cast at its own firing time, with S and
-    the geometry at their poses of that time, and its point is expressed in S at
-    that time.
+    bodies of a plant move during the revolution, with the velocities that they
+    have at the time of the output. The port `body_spatial_velocities` supplies
+    these velocities as a MultibodyPlant does: a list of V_WB over the plant's
+    bodies, expressed in the world. Each beam is cast at its own firing time,
+    with S and the geometry at their poses of that time, and its point is
+    expressed in S at that time.
 
     The field `instance` of a point is the number of the structure that was hit.
     A structure is a model, or all geometries whose names are equal up to the
@@ -156,7 +156,7 @@ class Lidar(LeafSystem):
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
         X_PB: the pose of the LiDAR in P, named as in Drake's RgbdSensor.
-        pattern: the beams of a turn.
+        pattern: the beams of a revolution.
 
     Example:
         from cns_drake import Lidar, make_beam_pattern
@@ -202,8 +202,8 @@ class Lidar(LeafSystem):
                 all static geometry is rebuilt.
             num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
-            causal: whether a scan is the turn that ends at the time of the
-                output; by default the turn starts at that time.
+            causal: whether a scan is the revolution that ends at the time of
+                the output; by default the revolution starts at that time.
 
         Raises:
             TypeError: the role is no role of geometry, `unseen` has an element
@@ -239,7 +239,7 @@ class Lidar(LeafSystem):
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
         self._first = _ready(pattern.beams(0), returns)
-        # When each column fires, as a fraction of the turn.
+        # When each column fires, as a fraction of the revolution.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
         declare = self.DeclareAbstractInputPort
@@ -516,7 +516,7 @@ class Lidar(LeafSystem):
         return moving_groups.Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
-        """Returns moving frame -> its motion during the turn."""
+        """Returns moving frame -> its motion during the revolution."""
         if self._velocities is None:
             return {}
         V_WBs = self._velocities.Eval(context)
@@ -620,7 +620,7 @@ class Lidar(LeafSystem):
         )
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Returns positions (K, 3) and rotations (K, 3, 3) of S in a turn.
+        """Returns S's positions (K, 3) and rotations (K, 3, 3) in a revolution.
 
         K is the number of columns with motion distortion, otherwise 1.
         """
@@ -761,7 +761,7 @@ class SeenGeometry:
                 poses.
             records: all geometry with the LiDAR's role; if None, it is listed
                 here.
-            motions: motions of frames that move during the turn.
+            motions: motions of frames that move during the revolution.
             known: frame poses that are read instead of querying the SceneGraph.
             seen: the ball within which beams can hit geometry.
             p_WS: the position of the sensor in the world, (3,) [m].
@@ -877,7 +877,8 @@ class BeamTable(NamedTuple):
         p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if that is
             the origin of S.
         ring: (num_beams,) uint16 number of each beam's laser.
-        t_ns: (num_beams,) uint32 firing time since the start of the turn [ns].
+        t_ns: (num_beams,) uint32 firing time since the start of the revolution
+            [ns].
         place: (num_beams,) position of each beam in the order in which rays are
             cast.
     """
@@ -890,13 +891,13 @@ class BeamTable(NamedTuple):
 
 
 class _Turn:
-    """The beams of a turn, ready for casting and assembling.
+    """The beams of a revolution, ready for casting and assembling.
 
     Attributes:
         beams: the beams in firing order.
         d_Sset_cast: (N, 3) directions in the order of casting.
-        calibrated: the turn of a unit with calibrated returns; None for ideal
-            returns.
+        calibrated: the revolution of a unit with calibrated returns; None for
+            ideal returns.
         table: constants for assembling points.
     """
 
@@ -919,7 +920,7 @@ class _Turn:
 
 @lru_cache(maxsize=4)
 def _ready(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
-    """Returns a turn; LiDARs with equal beams and returns share it.
+    """Returns a revolution; LiDARs with equal beams and returns share it.
 
     Sharing saves memory, because Drake's bindings may keep a dropped Diagram
     with its LiDARs.

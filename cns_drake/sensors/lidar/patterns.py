@@ -42,12 +42,12 @@ _BAND_RAD = 0.03
 _MOST_RING = 2**16 - 1
 # Greatest value of the field `t` of a point [ns].
 _LATEST_NS = 2**32 - 1
-# Turns per second of the two wedge prisms of the Mid series: 7294 and -4664 per
-# minute, the defaults of HELIOS++ for such optics. Together they repeat after
-# 30 s.
+# Revolutions per second of the two wedge prisms of the Mid series: 7294 and
+# -4664 per minute, the defaults of HELIOS++ for such optics. Together they
+# repeat after 30 s.
 _PRISMS_HZ = (7294.0 / 60.0, -4664.0 / 60.0)
-# Turns per second about z of a Mid-360's beams: each of four lines ten times
-# in 0.1 s, where the user manual speaks of 40 lines.
+# Revolutions per second about z of a Mid-360's beams: each of four lines ten
+# times in 0.1 s, where the user manual speaks of 40 lines.
 _TURNS_HZ = 100.0
 # Ups and downs per second: not a simple fraction of the turns, so that the
 # pattern repeats only after a long time.
@@ -56,15 +56,15 @@ _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    """The N beams of one turn, in the order in which they fire.
+    """The N beams of one revolution, in the order in which they fire.
 
     Attributes:
         d_Sset: (N, 3) float64 unit directions, expressed in the sensor frame
             S (x forward, y left, z up).
         ring: (N,) uint16, number of each beam's laser.
         column: (N,) int, index of each beam's firing time in `column_t_ns`.
-        column_t_ns: (C,) uint32 firing times since the start of the turn [ns],
-            increasing.
+        column_t_ns: (C,) uint32 firing times since the start of the revolution
+            [ns], increasing.
         packet_order: (N,) indices of the beams in the order in which rays are
             cast. Consecutive rays have nearly the same direction and mostly hit
             the same geometry, which makes packets of rays fast.
@@ -97,7 +97,7 @@ class Beams:
 
     @cached_property
     def t_ns(self) -> np.ndarray:
-        """(N,) uint32 firing times since the start of the turn [ns]."""
+        """(N,) uint32 firing times since the start of the revolution [ns]."""
         return self.column_t_ns[self.column]
 
     @cached_property
@@ -120,7 +120,7 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
     Args:
         d_Sset: (N, 3) unit directions, expressed in the sensor frame S.
         ring: (N,) number of each beam's laser.
-        t_ns: (N,) firing times since the start of the turn [ns], not
+        t_ns: (N,) firing times since the start of the revolution [ns], not
             decreasing.
     """
     elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
@@ -135,14 +135,15 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
 class BeamPattern(ABC):
     """The directions and firing times of a LiDAR's beams.
 
-    A turn is the time that the LiDAR takes for one scan. Firing times within a
-    turn are the same in all turns; directions can differ between turns.
+    A revolution is the time that the LiDAR takes for one scan. Firing times
+    within a revolution are the same in all revolutions; directions can differ
+    between revolutions.
 
     Attributes:
         min_range: nearest measured range [m].
         max_range: farthest measured range [m].
-        period: duration of one turn [s].
-        repeats: whether all turns have the same directions.
+        period: duration of one revolution [s].
+        repeats: whether all revolutions have the same directions.
 
     Example:
         from cns_drake import make_beam_pattern
@@ -158,10 +159,10 @@ class BeamPattern(ABC):
 
     @abstractmethod
     def beams(self, frame: int) -> Beams:
-        """Returns the beams of one turn.
+        """Returns the beams of one revolution.
 
         Args:
-            frame: number of the turn.
+            frame: number of the revolution.
         """
 
     def check(self) -> None:
@@ -180,12 +181,12 @@ class BeamPattern(ABC):
 
     @property
     def num_beams(self) -> int:
-        """The number of beams of a turn."""
+        """The number of beams of a revolution."""
         return len(self.beams(0).column)
 
     @property
     def column_t_ns(self) -> np.ndarray:
-        """(C,) uint32 firing times since the start of a turn [ns]."""
+        """(C,) uint32 firing times since the start of a revolution [ns]."""
         return self.beams(0).column_t_ns
 
     def within(
@@ -261,7 +262,7 @@ def _limit(
     kept &= elevation <= elevations_deg[1] + 1e-9
     place = np.cumsum(kept) - 1
     order = beams.packet_order[kept[beams.packet_order]]
-    # All firing times stay, so that all turns have the same.
+    # All firing times stay, so that all revolutions have the same.
     return Beams(
         beams.d_Sset[kept],
         beams.ring[kept],
@@ -275,19 +276,19 @@ def _limit(
 class SpinningPattern(BeamPattern):
     """The beam pattern of a spinning LiDAR with one or more rings.
 
-    In the sensor frame S (x forward, y left, z up) the turn starts at the rear
-    and goes clockwise seen from above, as Ouster's and Velodyne's units turn:
-    column k of n points at azimuth pi - 2 pi k / n. With azimuth limits it goes
-    from the first limit to the last, including both, and fires only in that
-    part of the turn. Ring 0 is the highest beam. Beams are ordered as they
-    fire: column by column, and from ring 0 downwards in each.
+    In the sensor frame S (x forward, y left, z up) the revolution starts at the
+    rear and goes clockwise seen from above, as Ouster's and Velodyne's units
+    turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits
+    it goes from the first limit to the last, including both, and fires only in
+    that part of the revolution. Ring 0 is the highest beam. Beams are ordered
+    as they fire: column by column, and from ring 0 downwards in each.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].
-        num_columns: number of columns in a turn.
+        num_columns: number of columns in a revolution.
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
-        period: duration of one turn [s].
+        period: duration of one revolution [s].
         azimuths_rad: first and last azimuth [rad]; None for the whole turn.
 
     Raises:
@@ -338,7 +339,7 @@ class SpinningPattern(BeamPattern):
 
     @property
     def num_beams(self) -> int:
-        """The number of beams of a turn."""
+        """The number of beams of a revolution."""
         return self.num_rings * self.num_columns
 
     @property
@@ -387,7 +388,7 @@ def _spin(pattern: SpinningPattern) -> Beams:
 
 
 class DirectionPattern(BeamPattern):
-    """A pattern of beams in given directions, the same in every turn.
+    """A pattern of beams in given directions, the same in every revolution.
 
     Example:
         from cns_drake import DirectionPattern
@@ -415,16 +416,17 @@ class DirectionPattern(BeamPattern):
                 except zero.
             min_range: nearest range that is measured [m].
             max_range: farthest range that is measured [m].
-            period: duration of one turn [s].
-            times: (N,) firing time of each beam since the start of the turn
-                [s]; by default all fire at once.
+            period: duration of one revolution [s].
+            times: (N,) firing time of each beam since the start of the
+                revolution [s]; by default all fire at once.
             rings: (N,) number of each beam's emitter; by default there is one
                 emitter.
 
         Raises:
             ValueError: there is no beam, a direction is zero or not a number, a
-                time is not within the turn or beyond 4.29 s, a ring is beyond
-                65535, a limit is impossible, or the numbers of beams differ.
+                time is not within the revolution or beyond 4.29 s, a ring is
+                beyond 65535, a limit is impossible, or the numbers of beams
+                differ.
         """
         self.min_range, self.max_range = min_range, max_range
         self.period = period
@@ -521,7 +523,7 @@ _GAP_CELLS = 48
 
 
 class BeamCoverage:
-    """The directions that the beams of a turn cover.
+    """The directions that the beams of a revolution cover.
 
     A beam covers all directions that differ from its own by at most 1.5 deg in
     elevation and in azimuth and lie inside the field of view.
@@ -549,7 +551,7 @@ class BeamCoverage:
         self._is_covered = (near & field).astype(bool)
 
     def covers(self, d_Sset: np.ndarray) -> np.ndarray:
-        """Returns which directions the beams of the turn cover, (N,) bool.
+        """Returns which directions a revolution's beams cover, (N,) bool.
 
         Args:
             d_Sset: (N, 3) unit directions, expressed in S.

@@ -66,7 +66,7 @@ class LidarPreset(NamedTuple):
 
 
 _UNITS = parse_yaml(Path(__file__).with_name("presets.yaml").read_bytes())
-# Units that fire at a fixed rate: a slower turn has more columns.
+# Units that fire at a fixed rate: a slower revolution has more columns.
 _STEADY = {n for n, unit in _UNITS.items() if unit.pop("fires_steadily", False)}
 LIDAR_PRESETS: dict[str, LidarPreset] = {
     name: LidarPreset.of(**unit) for name, unit in _UNITS.items()
@@ -98,10 +98,10 @@ def make_beam_pattern(
 
     Args:
         preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
-        period: duration of a turn [s]; by default that of the data sheet.
-        num_columns: columns in a turn; by default those of the data sheet. If
-            the lasers of a unit fire at a fixed rate, the period determines
-            this number.
+        period: duration of a revolution [s]; by default that of the data sheet.
+        num_columns: columns in a revolution; by default those of the data
+            sheet. If the lasers of a unit fire at a fixed rate, the period
+            determines this number.
         min_range: nearest range that is measured [m]; by default that of the
             data sheet.
         max_range: farthest range that is measured [m]; by default that of the

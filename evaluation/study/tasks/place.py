@@ -35,7 +35,7 @@ Outcomes = Sequence[PlaceOutcome]
 class PoseTask(Task):
     """Measures the errors of pose estimates.
 
-    A method estimates the pose of each query relative to its best place.
+    A method estimates the pose of each query relative to its top-ranked place.
     """
 
     name = "pose"
