@@ -11,6 +11,8 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
+from cns_drake.base.number_rows import to_number
+from cns_drake.base.value_lists import repeated
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
@@ -233,6 +235,9 @@ def _columns(cells: list[str], where: str) -> list[int]:
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
         wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]
+        for name in repeated(names):
+            if name in wanted:
+                raise InputError(f"{where}: column '{name}' is there twice")
         return [names.index(name) for name in wanted]
     if not all(_is_number(cell) for cell in cells):
         raise InputError(
@@ -246,7 +251,4 @@ def _columns(cells: list[str], where: str) -> list[int]:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except ValueError:
-        return False
+    return math.isfinite(to_number(text))
