@@ -448,9 +448,8 @@ def compare(
             own for results that were measured with changed options. By default,
             results are compared with each other only if they used the same
             protocol.
-        verified: Compare the results with geometric verification, in whose rows
-            the column gate is 1. By default, the results
-            without geometric verification are compared.
+        verified: Compare the results with geometric verification. By default,
+            the results without geometric verification are compared.
         rankings: Compare only the order of the methods in the tables. Each
             table is ranked over its own conditions. The tables may therefore
             have different conditions, such as simulated and real drives.
