@@ -94,7 +94,7 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
             )
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
-    experiment = load_experiment(vary, list(unused.items()))
+    experiment = load_experiment(vary, list(unused.items()), on_note=note)
     study = Study(experiment, output.absolute(), vary, cluster, note)
     members = study.drives()
     write_scenarios(members, output / "scenarios")

@@ -304,6 +304,7 @@ def room(size, beams=(200, 60), window=None):
     return points if window is None else points[~window(points)]
 
 
+@pytest.mark.slow
 def test_free_space_sees_past_what_is_gone(tmp_path):
     """A's map: a wall at 10 m, a box at 5 m, things at 30 m and overhead.
 
