@@ -49,7 +49,7 @@ def run_drive(
         returns: `ideal` or `calibrated`, the model of the LiDARs' returns; by
             default as the scenario says.
         weather: weather; by default that of the scenario.
-        traffic: number of vehicles, and also of walkers; by default as the
+        traffic: number of vehicles, and also of pedestrians; by default as the
             scenario says.
         transient: switch -> value in the section `transient`; by default as the
             scenario says.

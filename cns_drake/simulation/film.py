@@ -58,7 +58,7 @@ _TRAFFIC = 60
 
 
 def with_some_traffic(scenario: Scenario) -> Scenario:
-    """Adds 60 vehicles and 60 walkers to a scenario without traffic.
+    """Adds 60 vehicles and 60 pedestrians to a scenario without traffic.
 
     A scenario that already has traffic, or whose streets have no room for so
     many, is returned unchanged.

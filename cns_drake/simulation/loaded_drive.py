@@ -59,7 +59,7 @@ class LoadedDrive:
         trajectory: motion of the vehicle.
         world: world of the stage, with the vehicle and the objects of the
             traffic. Its SceneGraph passes to the first Diagram.
-        traffic: motion of all other vehicles and of walkers; None without
+        traffic: motion of all other vehicles and of pedestrians; None without
             traffic.
     """
 
@@ -174,7 +174,8 @@ def plan_scenario_traffic(
 
     Raises:
         InputError: the map has no roads or sidewalks, or no room for so many
-            vehicles or walkers, or a SUMO trace cannot be replayed on this map.
+            vehicles or pedestrians, or a SUMO trace cannot be replayed on this
+            map.
 
     Example:
         from cns_drake import load_scenario, plan_drive, plan_scenario_traffic

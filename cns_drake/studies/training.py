@@ -66,9 +66,9 @@ _NEAR_BEST = 0.9
 # Their weights are this power of the share.
 _WEIGHT_POWER = 16
 _TEMPERATURE = 0.05
-# Share of the images with a hidden sector.
+# Share of the images with an occluded sector.
 _HIDDEN_SHARE = 0.4
-# Least and greatest angle of a hidden sector.
+# Least and greatest angle of an occluded sector.
 _HIDDEN_DEG = (30.0, 120.0)
 # Share of the images with lost pixels.
 _LOST_SHARE = 0.3
@@ -251,7 +251,7 @@ class Sampler:
 
 
 def _augment(images: np.ndarray, rng: np.random.Generator) -> None:
-    """Augments images in place: random turns, hidden sectors, lost pixels."""
+    """Augments images in place: random yaws, occluded sectors, lost pixels."""
     is_mirrored = rng.random() < 0.5
     for number, image in enumerate(images):
         if is_mirrored:
@@ -650,6 +650,8 @@ def _draw_curve(curve: np.ndarray, stem: Path) -> None:
     right.plot(steps, kept[:, 1])
     loss.set(ylabel="loss", ylim=(0.0, None))
     right.set(
-        xlabel="step", ylabel="right best places in a batch", ylim=(0.0, 1.0)
+        xlabel="step",
+        ylabel="right top-ranked places in a batch",
+        ylim=(0.0, 1.0),
     )
     save(figure, stem, ("png",))

@@ -164,10 +164,10 @@ def _two_wheeler(
 
 
 def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
-    """Returns the five limbs of a walker, which consist of ten capsules.
+    """Returns the five limbs of a pedestrian, which consist of ten capsules.
 
-    The body's frame is on the ground, with x in the walker's heading. An arm
-    swings together with the leg on the other side.
+    The body's frame is on the ground, with x in the pedestrian's heading. An
+    arm swings together with the leg on the other side.
     """
     h = float(rng.uniform(0.92, 1.06))
     coat, trousers = (

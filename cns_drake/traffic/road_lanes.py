@@ -29,13 +29,13 @@ _MOST_JUNCTIONS = 4
 # Roads with more lanes have signals at their junctions, as in the city
 # generator.
 _LANES_WITHOUT_SIGNAL = 2
-# Distance of walkers from kerbs and walls [m].
+# Distance of pedestrians from kerbs and walls [m].
 _MARGIN = 0.45
-# Half the width in which walkers walk on a crossing [m].
+# Half the width in which pedestrians walk on a crossing [m].
 _CROSSING_HALF_WIDTH = 0.8
-# Least half width in which walkers walk along a road [m].
+# Least half width in which pedestrians walk along a road [m].
 _LEAST_HALF_WIDTH = 0.3
-# Distance from the kerb at which walkers wait [m].
+# Distance from the kerb at which pedestrians wait [m].
 _BEFORE_KERB = 1.4
 # Least length of a walkway from the walked strip to that place [m].
 _SHORTEST_SPUR = 1.5
@@ -265,7 +265,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                     ahead = kerb[:2] - start[:2]
                     distance = math.dist(kerb[:2], start[:2])
                     if distance > _BEFORE_KERB + _SHORTEST_SPUR:
-                        # On a wide sidewalk, walkers wait at the kerb.
+                        # On a wide sidewalk, pedestrians wait at the kerb.
                         part = 1.0 - _BEFORE_KERB / distance
                         stop = np.append(start[:2] + part * ahead, start[2])
                         node = number

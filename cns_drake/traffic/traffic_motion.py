@@ -37,7 +37,7 @@ _AWAY = np.array([0.0, 0.0, -10_000.0])
 
 
 class BodyStates(NamedTuple):
-    """The states of N bodies at one time: first vehicles, then walkers.
+    """The states of N bodies at one time: first vehicles, then pedestrians.
 
     Attributes:
         p_WB: (N, 3) centre of the base of each body's box, on the ground [m].
@@ -45,7 +45,7 @@ class BodyStates(NamedTuple):
         yaw, pitch: (N,) yaw and pitch [rad].
         yaw_rate: (N,) yaw rate [rad/s].
         present: (N,) bool, whether the body exists at this time.
-        swing: (N,) position of a walker in its gait, from -1 to 1.
+        swing: (N,) position of a pedestrian in its gait, from -1 to 1.
     """
 
     p_WB: np.ndarray
@@ -142,7 +142,7 @@ class LimbTable:
 
 
 class TrafficBody(NamedTuple):
-    """A vehicle or a walker that is registered with a SceneGraph.
+    """A vehicle or a pedestrian that is registered with a SceneGraph.
 
     Attributes:
         instance: instance id.
@@ -172,8 +172,8 @@ class TrafficMotion(LeafSystem):
         - moving_instances
         - objects
 
-    A limb L is a rigid part of a vehicle or walker. All outputs depend only on
-    time; all except the first are abstract:
+    A limb L is a rigid part of a vehicle or pedestrian. All outputs depend only
+    on time; all except the first are abstract:
 
     - `geometry_pose`: the poses X_WL of all limbs, for the SceneGraph in which
       they are registered.
@@ -197,7 +197,7 @@ class TrafficMotion(LeafSystem):
 
         Args:
             plan: planned motion.
-            bodies: the vehicles of the plan, and then its walkers.
+            bodies: the vehicles of the plan, and then its pedestrians.
             source_id: geometry source of the bodies.
             turn: time over which the output `body_spatial_velocities` is
                 averaged [s]: the duration of a LiDAR's turn.

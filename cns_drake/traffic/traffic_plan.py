@@ -369,7 +369,7 @@ def _leads(streets: Streets, piece: int, other: int) -> bool:
     return other in streets.after[first : first + row["after_count"]]
 
 
-# A walker's box, which contains swinging limbs [m].
+# A pedestrian's box, which contains swinging limbs [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # Number of steps for which traffic has moved when the drive begins.
 _FIRST = 200
@@ -488,8 +488,8 @@ class TrafficPlan:
         vehicles: tracks of the vehicles, with five coordinates each: x, y, z of
             the middle of the vehicle's box on the ground [m], yaw and pitch
             [rad].
-        walkers: tracks of the walkers, with five coordinates each: x, y, z on
-            the ground [m], yaw and phase of the gait [rad].
+        walkers: tracks of the pedestrians, with five coordinates each: x, y, z
+            on the ground [m], yaw and phase of the gait [rad].
         left_out: number of requested bodies that are left out because they
             would collide.
         positions: (K,) distances of the ego car along its path at times
@@ -547,7 +547,7 @@ def plan_traffic(
 
     Args:
         graph: lanes and crossings.
-        walkways: sidewalks on which walkers walk, and crossings.
+        walkways: sidewalks on which pedestrians walk, and crossings.
         vehicles, walkers: requested numbers of vehicles and pedestrians.
         seed: seed of the random kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
@@ -637,7 +637,7 @@ class Trial:
         # The columns are those of `TrafficPlan`.
         self._vehicles = np.zeros((num_steps, len(found), 5))
         self._walkers = np.zeros((num_steps, num_walkers, 5))
-        # Ego car, vehicles, walkers.
+        # Ego car, vehicles, pedestrians.
         self._half_sizes = _APART / 2 + np.array(
             [
                 task.ego_box.half_size,
@@ -704,7 +704,7 @@ class Trial:
         return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
 
     def _kept(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the vehicles and the walkers that overlap no other body."""
+        """Returns the vehicles and pedestrians that overlap no other body."""
         kept = np.ones(len(self._half_sizes), bool)
         kept[whom_to_leave_out(self._overlaps, 1)] = False
         vehicles, walkers = (

@@ -1,7 +1,7 @@
 """Errors of an estimated trajectory, such as the result of a LiDAR odometry.
 
-Two figures are in common use. X_i are true poses, Y_i the estimated poses at
-the same times, p_i and q_i their positions:
+Two figures are in common use. X_i are ground-truth poses, Y_i the estimated
+poses at the same times, p_i and q_i their positions:
 
 - ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
   over all i. R and t are the rigid motion that minimises this error; the scale
@@ -46,7 +46,8 @@ class TrajectoryErrors:
     """Errors of N estimated poses.
 
     Attributes:
-        offsets: (N,) distances to the true positions after the alignment [m].
+        offsets: (N,) distances to the ground-truth positions after the
+            alignment [m].
         drift: (K,) errors of position over 100 m [m]; empty if the path is
             shorter.
         drift_deg: (K,) errors of orientation over 100 m [deg].
@@ -134,7 +135,7 @@ def trajectory_errors(
     of the estimate does not matter.
 
     Args:
-        drive: drive with the true poses.
+        drive: drive with the ground-truth poses.
         estimate: poses of the frame in any world.
         frame: the frame whose poses are estimated: the LiDAR's or the
             vehicle's.
@@ -178,7 +179,7 @@ def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     The estimated positions are first moved and turned so that they fit best.
 
     Args:
-        p: (N, 3) true positions [m].
+        p: (N, 3) ground-truth positions [m].
         q: (N, 3) estimated positions, in any frame [m].
     """
     p, q = p - p.mean(axis=0), q - q.mean(axis=0)
@@ -198,7 +199,7 @@ def segment_errors(
     A segment begins at every tenth pose.
 
     Args:
-        X: (N, 4, 4) true poses.
+        X: (N, 4, 4) ground-truth poses.
         Y: (N, 4, 4) estimated poses, in any world.
 
     Returns:

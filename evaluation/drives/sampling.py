@@ -32,13 +32,13 @@ _MOST_BENT = 1.1
 class QuerySensor:
     """A turned sensor Q that replaces the recorded sensor S in a query.
 
-    Q and S are at the same position. A sector of azimuths can be hidden from Q:
+    Q and S are at the same position. A sector of azimuths can be occluded in Q:
     the points in this sector are removed from the scan.
 
     Attributes:
         X_SQ: (4, 4) a rotation; None if Q is not turned.
-        hidden_from: azimuth in S at which the hidden sector begins [rad].
-        hidden_angle: angle of the hidden sector [rad]; 0 for none.
+        hidden_from: azimuth in S at which the occluded sector begins [rad].
+        hidden_angle: angle of the occluded sector [rad]; 0 for none.
     """
 
     X_SQ: np.ndarray | None = None
@@ -54,7 +54,7 @@ class QuerySensor:
         tilt_deg: float,
         hidden_deg: float,
     ) -> QuerySensor:
-        """Returns a query's sensor, turned, tilted and partly hidden at random.
+        """Returns a query's sensor with random yaw, tilt and occluded sector.
 
         The result depends on the frame's number but not on the drive, so that
         queries at the same frames of two drives are turned alike.
@@ -64,7 +64,7 @@ class QuerySensor:
             frame: frame of the query.
             turns: whether the query gets a random yaw.
             tilt_deg: greatest roll, and greatest pitch [deg].
-            hidden_deg: angle of the hidden sector [deg].
+            hidden_deg: angle of the occluded sector [deg].
         """
         rng = np.random.default_rng([seed, frame])
         yaw, hidden_from = rng.uniform(0.0, 2.0 * math.pi, 2)
@@ -77,7 +77,7 @@ class QuerySensor:
         return cls(X_SQ, float(hidden_from), math.radians(hidden_deg))
 
     def without_hidden(self, scan: np.ndarray) -> np.ndarray:
-        """Returns the points of a scan in S outside the hidden sector."""
+        """Returns the points of a scan in S outside the occluded sector."""
         if self.hidden_angle == 0.0:
             return scan
         azimuth = np.arctan2(scan["y"], scan["x"]).astype(np.float64)
@@ -167,8 +167,8 @@ def gather(
             [m].
         fields: names of further fields of the points, besides x, y and z.
         num_before: how many of the scans come before the frame.
-        sensor: turn and hidden sector that are applied to the sensor; None for
-            the sensor as recorded.
+        sensor: turn and occluded sector that are applied to the sensor; None
+            for the sensor as recorded.
 
     Returns:
         (N, 3) float64 points in the sensor's frame at that frame. If fields are

@@ -197,7 +197,7 @@ def make_map(
 ) -> LocalisationMap:
     """Returns the localisation map of a drive or of a cloud in W.
 
-    A drive's scans are placed at their true poses.
+    A drive's scans are placed at their ground-truth poses.
 
     Args:
         source: the drive, or the cloud's file.

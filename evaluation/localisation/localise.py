@@ -67,8 +67,8 @@ _WAITING = 4
 # One row per query: its frame and time; the start's offset in W [m], and its
 # turn as a rotation vector in S; errors of the result; scores; standard
 # deviations of the result from its covariance [m]; the share of the scan that,
-# at the true pose, has no point of the map within a voxel, NaN if the scan has
-# too few points to be aligned; number of steps, and CPU time [s].
+# at the ground-truth pose, has no point of the map within a voxel, NaN if the
+# scan has too few points to be aligned; number of steps, and CPU time [s].
 QUERY = np.dtype(
     [
         ("frame", "<i8"),
@@ -108,7 +108,8 @@ class Starts:
     """How the random initial poses of scans are drawn.
 
     Attributes:
-        radius: distance of each initial position from the true position [m].
+        radius: distance of each initial position from the ground-truth position
+            [m].
         turn_deg: angle between each initial and true orientation [deg].
         seed: seed of the random directions in which initial poses are moved and
             turned.
@@ -265,13 +266,13 @@ class Localiser:
         turn: np.ndarray,
         X_WS0: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Localises one scan and compares the result with the truth.
+        """Localises one scan and compares the result with the ground truth.
 
         Args:
             frame: number of the scan.
             stamp_ns: time of the scan [ns].
             scan: structured array, in S.
-            X_WS: (4, 4) true pose.
+            X_WS: (4, 4) ground-truth pose.
             R_WT: (3, 3) axes of the path: along, to the left, and up.
             offset: (3,) vector from the true to the initial position, in W [m].
             turn: (3,) rotation vector from the true to the initial orientation,

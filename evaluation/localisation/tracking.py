@@ -50,7 +50,7 @@ def drifting_steps(
     of mean 0 and standard deviation `drift`.
 
     Args:
-        X_WS: (N, 4, 4) true poses of the LiDAR.
+        X_WS: (N, 4, 4) ground-truth poses of the LiDAR.
         way: (N,) length of the path up to each pose [m].
         drift: standard deviation of both errors; 0 for none. For example, 0.01
             means 1 % of each length and 0.01 deg/m of heading.

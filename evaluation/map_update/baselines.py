@@ -1,4 +1,4 @@
-"""Baselines that label the points of two maps without knowing the truth.
+"""Baselines that label the points of two maps without knowing the ground truth.
 
 - `distance`: a point is kept if the other map has a point within 0.5 m;
 otherwise it is gone or new. No point is unobserved.

@@ -1,9 +1,10 @@
-"""Scores of labels of two maps against the truth.
+"""Scores of labels of two maps against the ground truth.
 
 All scores count points, not voxels. The IoU of a class compares the points that
-have this class by truth with those that have it by prediction, over both maps
-together. The class `unobserved` includes points that B is the first to see. A
-class that does not occur in the truth is left out of the mean, `miou`.
+have this class in the ground truth with those that have it by prediction, over
+both maps together. The class `unobserved` includes points that B is the first
+to see. A class that does not occur in the ground truth is left out of the mean,
+`miou`.
 
 Precision and recall of gone (in A) and new (in B) exist in three forms. By
 points, a predicted point is right if it has changed itself. Within 0.2 m and
@@ -15,8 +16,8 @@ The predictions also give an updated map: A without the points that are
 predicted gone, plus the points of B that are predicted new or newly seen. Its
 completeness is the share of B's map within 0.2 m of the updated map. Its
 accuracy is the share of the updated map within 0.2 m of B's map, over points
-that B's drive observed by truth. Its Chamfer distance is the mean of the mean
-distances in both directions.
+that B's drive observed in the ground truth. Its Chamfer distance is the mean of
+the mean distances in both directions.
 """
 
 from __future__ import annotations
@@ -67,16 +68,18 @@ def score(
 
     Args:
         pair: the two maps.
-        truth: their true labels.
+        truth: their labels in the ground truth.
         predicted: their predicted labels.
         names: number of a class of points -> its name, for scores by class.
 
     Raises:
-        InputError: the truth leaves out every point.
+        InputError: the ground truth leaves out every point.
     """
     counted = [labels != Label.IGNORED for labels in truth]
     if not any(rows.any() for rows in counted):
-        raise InputError(f"{pair.A.folder.parent}: no point has a true label")
+        raise InputError(
+            f"{pair.A.folder.parent}: no point has a label in the ground truth"
+        )
     both = _Labelled(pair, truth, predicted, counted)
     still = both.only([~session.moves for session in pair])
     result: dict = _of_points(both)
@@ -114,7 +117,8 @@ class _Labelled(NamedTuple):
 def _of_points(both: _Labelled) -> dict[str, float]:
     """Returns IoUs, precisions and recalls by points.
 
-    The IoU is NaN for a class that occurs neither by truth nor by prediction.
+    The IoU is NaN for a class that occurs neither in the ground truth nor by
+    prediction.
     """
     code = np.zeros(256, np.int64)
     for k, labels in enumerate(_CLASSES.values()):
@@ -238,7 +242,8 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
     observed = stays & counted[0] & (truth.A != Label.UNOBSERVED)
     updated = np.concatenate([pair.A.points[stays], pair.B.points[comes]])
     # Points that B adds lie on B's map: their distance is 0. Points without a
-    # true label are not scored, but a scored point can lie near to them.
+    # ground-truth label are not scored, but a scored point can lie near to
+    # them.
     own = np.concatenate(
         [
             nearest(pair.A.points[observed], pair.B.points),

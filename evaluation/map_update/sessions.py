@@ -62,7 +62,7 @@ class Label(IntEnum):
     Points of the older map A are kept (1), gone (2) or unobserved (0: the drive
     of B did not look there). Points of the newer map B are kept (1), new (3) or
     newly seen (4: the drive of A did not look there). IGNORED (255) occurs only
-    in true labels of your own; scores leave out such points.
+    in ground-truth labels of your own; scores leave out such points.
     """
 
     UNOBSERVED = 0
@@ -396,7 +396,7 @@ def read_pair(folder: Path) -> Pair:
 
 
 def read_truth(pair: Pair) -> list[np.ndarray]:
-    """Returns the true labels of both maps, (N,) and (M,) uint8.
+    """Returns the ground-truth labels of both maps, (N,) and (M,) uint8.
 
     Raises:
         InputError: see `read_labels`.

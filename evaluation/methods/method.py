@@ -107,16 +107,16 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @abc.abstractmethod
     def describe(self, points: np.ndarray) -> Descriptor:
-        """Returns the description of a query's cloud."""
+        """Returns the descriptor of a query's cloud."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Returns the description of a place; by default like a query's."""
+        """Returns the descriptor of a place; by default like a query's."""
         return self.describe(points)
 
     def describe_batch(
         self, clouds: Sequence[np.ndarray], *, of_places: bool
     ) -> list[Descriptor]:
-        """Returns the descriptions of several clouds.
+        """Returns the descriptors of several clouds.
 
         Override this function if your method describes several clouds faster
         than one by one.
@@ -164,7 +164,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Returns how similar a query is to every place of a database.
 
         Args:
-            query: description of the query, made by `describe`.
+            query: descriptor of the query, made by `describe`.
             database: database of D places, made by `build_database`.
             exhaustive: whether to compare also with places that a search would
                 skip only to save time.
@@ -187,7 +187,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         of single scans. By default, only the present query is used.
 
         Args:
-            queries: descriptions of a drive's queries, from the first to the
+            queries: descriptors of a drive's queries, from the first to the
                 present one.
             database: see `score`.
             exhaustive: see `score`.

@@ -29,7 +29,7 @@ _APART = 1e5
 
 @dataclass(frozen=True)
 class DescribedScans:
-    """Places or queries of a drive, with a method's descriptions.
+    """Places or queries of a drive, with a method's descriptors.
 
     Attributes:
         frames: (K,) frame numbers in the drive.
@@ -65,7 +65,7 @@ def joined_scans(
     """Returns the places or queries of several drives as one list.
 
     Args:
-        every: scans of each drive, with a method's descriptions.
+        every: scans of each drive, with a method's descriptors.
         worlds: number of the world of each drive. Different worlds are moved so
             far apart that their scans never match.
         most: number of scans to keep, from the start of the list; None for all.
@@ -86,7 +86,7 @@ def joined_scans(
 
 @dataclass(frozen=True)
 class DescribedDrive:
-    """A method's descriptions of a drive.
+    """A method's descriptors of a drive.
 
     Attributes:
         name: name of the drive.
@@ -124,11 +124,11 @@ def describe_drive(
             to the protocol's range, in the sensor's frame. If the drive has
             only queries, the scan is changed as the protocol says: turned,
             tilted or without a sector.
-        further: requests for further descriptions: each is a method, the roles
+        further: requests for further descriptors: each is a method, the roles
             to describe, and a protocol.
 
     Returns:
-        One description for each method, followed by one for each entry of
+        One descriptor for each method, followed by one for each entry of
         `further`.
 
     Raises:
@@ -226,7 +226,7 @@ def _frames(
 
 
 class _Describing:
-    """Collects the descriptions of one drive by one method."""
+    """Collects the descriptors of one drive by one method."""
 
     def __init__(
         self,

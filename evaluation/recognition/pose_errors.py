@@ -23,8 +23,8 @@ class PoseErrors:
     """Errors of the pose of each of Q queries relative to its top-ranked place.
 
     Attributes:
-        translation: (Q,) distance to the true position [m]; NaN without a
-            candidate or a pose.
+        translation: (Q,) distance to the ground-truth position [m]; NaN without
+            a candidate or a pose.
         rotation_deg: (Q,) angle to the true orientation [deg]; NaN without a
             candidate or a pose.
     """
@@ -72,8 +72,8 @@ def pose_error(
     Args:
         X_PQ: (4, 4) estimated pose of the query's sensor in the frame of the
             place's sensor.
-        X_WP: (4, 4) true pose of the place's sensor in the world.
-        X_WQ: (4, 4) true pose of the query's sensor in the world.
+        X_WP: (4, 4) ground-truth pose of the place's sensor in the world.
+        X_WQ: (4, 4) ground-truth pose of the query's sensor in the world.
     """
     X_error = poses.inverse(X_WQ) @ X_WP @ X_PQ
     # Sine and cosine together give exact small and large angles.

@@ -263,7 +263,7 @@ class RetrievalProtocol:
         return replace(self, place=other.place, **other._asked)
 
     def described(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns name -> value of the options that affect descriptions.
+        """Returns name -> value of the options that affect descriptors.
 
         Args:
             queries: whether the drive has queries, and not only places.
@@ -302,7 +302,7 @@ class RetrievalProtocol:
                 f" {self.exclude_recent:g} s before"
             )
         if self.turn_queries:
-            parts.append("each query turned by a random yaw")
+            parts.append("each query with a random yaw")
         if self.tilt_queries:
             parts.append(
                 "each query tilted by a random roll and pitch of up to"
@@ -310,7 +310,7 @@ class RetrievalProtocol:
             )
         if self.hide_sector:
             parts.append(
-                f"a random sector of {self.hide_sector:g} deg hidden from each"
+                f"a random sector of {self.hide_sector:g} deg occluded in each"
                 " query"
             )
         if self._changes_queries:

@@ -71,7 +71,7 @@ def gated(
 
     Args:
         method: method that made the scores.
-        query: description of the query by the method.
+        query: descriptor of the query by the method.
         database: database of the D places, made by the method.
         scores: (D,) scores by the method; NaN for a place that is no candidate.
         radii: radii of a match [m].

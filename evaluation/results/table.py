@@ -516,7 +516,7 @@ def _answered(
         (
             "score",
             is_place & right & np.isnan(columns["score"]),
-            "empty, but the best place is right",
+            "empty, but the top-ranked place is right",
         ),
         (
             "first_right_rank",

@@ -449,7 +449,9 @@ class DirectionPattern(BeamPattern):
         if not (np.isfinite(length) & (length > 0.0)).all():
             raise ValueError("a direction is zero or not a number")
         if not ((t >= 0.0) & (t < period)).all():
-            raise ValueError(f"a time is not within the turn of {period} s")
+            raise ValueError(
+                f"a time is not within the revolution of {period} s"
+            )
         order = np.argsort(t, kind="stable")
         t_ns = np.round(t[order] * 1e9)
         self._beams = make_beams((d_Sset / length)[order], ring[order], t_ns)

@@ -208,7 +208,7 @@ def test_beams_in_any_directions():
         ([[1, 0, 0]], {"times": [0, 1]}, "1 directions, 2 times"),
         ([[0, 0, 0]], {}, "zero"),
         ([[np.nan, 0, 0]], {}, "zero or not a number"),
-        ([[1, 0, 0]], {"times": [0.1]}, "not within the turn of 0.1 s"),
+        ([[1, 0, 0]], {"times": [0.1]}, "not within the revolution of 0.1 s"),
         ([[1, 0, 0]], {"rings": [65536]}, "a ring: 65536 is not a whole"),
         ([[1, 0, 0]], {"rings": [-1]}, "a ring: -1 is not"),
         ([[1, 0, 0]], {"rings": [0.5]}, "a ring: 0.5 is not"),

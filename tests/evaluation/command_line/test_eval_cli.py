@@ -144,7 +144,7 @@ def test_queries_are_turned(capsys, towns):
     assert found[1] == found[3]
     assert found[1]["pose"] != found[2]["pose"] != found[0]["pose"]
     _, out, _ = run(capsys, *both, *options)
-    assert "each query turned by a random yaw" in out
+    assert "each query with a random yaw" in out
     for option, value in (
         ("--tilt-queries", "91"),
         ("--tilt-queries", "nan"),
