@@ -239,7 +239,7 @@ def test_protocols_have_names():
     assert RetrievalProtocol(hide_sector=30.0).name == "own"
     check_one_protocol([FAIR_PROTOCOL.of(btc), FAIR_PROTOCOL])
     for other in (replace(FAIR_PROTOCOL, radius=3.0), PAPER_PROTOCOL):
-        with pytest.raises(InputError, match=r"turned .* in one table"):
+        with pytest.raises(InputError, match=r"random yaw, .* in one table"):
             check_one_protocol([FAIR_PROTOCOL, other])
 
 
