@@ -87,8 +87,8 @@ Columns = Annotated[
         metavar="N",
         min=3,  # x, y, z
         help="Number of float32 values per point in .bin files, of which the "
-        "first three are x, y and z. By default it is guessed from the values; "
-        "give it if the guess is wrong.",
+        "first three are x, y and z. By default the number is guessed from the "
+        "values; give the number if the guess is wrong.",
     ),
 ]
 

@@ -136,8 +136,8 @@ def export(
             for cns-eval pr --exact-overlaps); map-truth (two maps with labels
             of what changed), map-sessions (two maps without labels); or film.
         output: Folder to write; created if it does not exist. With mcap and
-            film it is a file. The name of a film ends in .webp, or in .mp4,
-            which needs ffmpeg. The folder of two maps must not exist yet.
+            film, the output is a file. The name of a film ends in .webp, or in
+            .mp4, which needs ffmpeg. The folder of two maps must not exist yet.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in this other stage get SemanticKITTI's labels of
             moving objects (252 to 259), as if these structures had moved. Only
@@ -148,9 +148,9 @@ def export(
         spacing: Distance that the car drives between two clouds of the training
             data, or between two scans of a map [m]; by default 10, or 1 for
             maps. A smaller distance makes a denser map.
-        held_out: Drive to keep for evaluation only. It is left out of the
-            training data even if you also name it as a training drive. May be
-            repeated. Only with --format pointnetvlad or overlap.
+        held_out: Drive to keep for evaluation only. This drive is left out of
+            the training data even if you also name it as a training drive. May
+            be repeated. Only with --format pointnetvlad or overlap.
         scans: Number of consecutive scans that are merged into each cloud (a
             submap). Only with --format pointnetvlad.
         max_range: Leave out points of training data that are farther than this

@@ -46,12 +46,13 @@ def train(
         output: File for the weights. The training curve goes to FILE.png.
             FILE.npz.training keeps the state, so that the same command resumes
             an interrupted training.
-        minutes: Approximate computing time on one core in minutes. It only sets
-            the numbers of cities and steps: the training does not stop when
-            this time is over.
-        cities: Number of cities to train on; by default it follows from
+        minutes: Approximate computing time on one core in minutes. This time
+            only sets the numbers of cities and steps: the training does not
+            stop when this time is over.
+        cities: Number of cities to train on; by default the number follows from
             --minutes.
-        steps: Number of training steps; by default it follows from --minutes.
+        steps: Number of training steps; by default the number follows from
+            --minutes.
         seed: Seed of everything that is sampled. Another seed gives other
             cities and other weights.
         without: Kind of variation to leave out of the training: changes of the

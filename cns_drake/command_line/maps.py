@@ -201,11 +201,11 @@ def import_city(
             streets, and, for an OpenDRIVE file without buildings, all its
             buildings.
         along: CSV file with the path of a drive of your own, x and y in the map
-            [m]. It replaces the two proposed drives.
+            [m]. This drive replaces the two proposed drives.
         within: Leave out structures that are farther than this from the drives
             [m], to save memory. By default none is left out.
         drive_on: Side of the street on which cars drive; by default as the file
-            says, or right if it does not say.
+            says, or right if the file does not say.
         grow: Add a first stage in which a random sample of the buildings, of
             this share, is missing or lower. A number from 0.01 to 0.9; by
             default 0.3. With --years, --plain or an OpenDRIVE file, no such

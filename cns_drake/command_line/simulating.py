@@ -50,15 +50,15 @@ Rain = Annotated[
     float,
     typer.Option(
         metavar="MM_H",
-        help="Rain rate [mm/h]. It switches on calibrated returns.",
+        help="Rain rate [mm/h]. Rain switches on calibrated returns.",
     ),
 ]
 Snowfall = Annotated[
     float,
     typer.Option(
         metavar="MM_H",
-        help="Snowfall rate, as melted water [mm/h]. It switches on calibrated "
-        "returns.",
+        help="Snowfall rate, as melted water [mm/h]. Snowfall switches on "
+        "calibrated returns.",
     ),
 ]
 
@@ -181,8 +181,8 @@ def simulate(
         imu_rate: Samples of the IMU per second [Hz]; by default as the scenario
             says.
         camera: Add a camera that looks ahead. Give its width and height in
-            pixels and its images per second, such as 640x480@2. It also records
-            images of the depth and of the classes.
+            pixels and its images per second, such as 640x480@2. The camera also
+            records images of the depth and of the classes.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive

@@ -291,8 +291,9 @@ class TransientConfig(Section):
 class Scenario(Section):
     """A vehicle with sensors that follows a route through a stage.
 
-    The vehicle drives in a stage of a map, or in any SDF world. It follows
-    either lanes of the map's roads (`route`) or given points (`waypoints`).
+    The vehicle drives in a stage of a map, or in any SDF world. The vehicle
+    follows either lanes of the map's roads (`route`) or given points
+    (`waypoints`).
 
     Attributes:
         name: name of the drive and its files, from letters, digits and
@@ -301,8 +302,8 @@ class Scenario(Section):
             the values of this base drive.
         map: name of a shipped map, or a folder with the same layout.
         stage: stage of the map, such as `"01"`.
-        world: SDF file of a world to drive in, instead of `map` and `stage`. It
-            needs `waypoints`.
+        world: SDF file of a world to drive in, instead of `map` and `stage`. A
+            `world` needs `waypoints`.
         without: names of structures to leave out of the world; the names are in
             the map's `structures.csv`.
         title: one line for readers that says what the drive shows.

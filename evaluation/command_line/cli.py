@@ -385,9 +385,9 @@ def report(
     """Evaluate all recordings in a folder and write a report.
 
     The command compares the drives of each map in place recognition and
-    structural change. It writes results.csv and queries.csv, as cns-drake study
-    stages does, figures and report.html. To resume after an interruption, run
-    the same command again.
+    structural change. The folder then contains results.csv and queries.csv, as
+    after cns-drake study stages, figures and report.html. To resume after an
+    interruption, run the same command again.
 
     Args:
         recordings: Folder that contains the recordings.

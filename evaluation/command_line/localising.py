@@ -92,7 +92,8 @@ def localise(
             wrong by about 1 %, and the heading drifts by about 0.01 deg per
             metre.
         estimate: File with the trajectory of MAP as another program estimated
-            it. It is a TUM file: time [s], x y z and a quaternion x y z w.
+            it. The file has the TUM format: time [s], x y z and a quaternion x
+            y z w.
         frame: Frame whose poses --estimate contains: the LiDAR's (lidar) or the
             vehicle's (base_link).
         time_offset: Time to add to the times of --estimate [s], if its clock

@@ -41,7 +41,7 @@ def map_update(
         baseline: Shipped change detector to score, instead of labels of your
             own. By default free-space, if you give no labels.
         labels_a: File with your labels of A's map: 0 unobserved, 1 kept, 2
-            gone. It is a .npy file, or a .ply file with a property
+            gone. The file is a .npy file, or a .ply file with a property
             `prediction`. Needs --labels-b.
         labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
             The formats are those of --labels-a, which is needed as well.

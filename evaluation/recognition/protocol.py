@@ -159,7 +159,7 @@ class RetrievalProtocol:
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
 
-        They differ from the recorded poses if the protocol turns or tilts
+        These poses differ from the recorded ones if the protocol turns or tilts
         queries.
 
         Args:

@@ -471,9 +471,9 @@ def make_flash_pattern(
 ) -> DirectionPattern:
     """Returns the pattern of a solid-state LiDAR with a grid of pixels.
 
-    All pixels fire at once. They are evenly spaced in azimuth and elevation.
-    The centres of the outermost pixels lie half a pixel inside the edge of the
-    field of view. Ring 0 is the uppermost row.
+    All pixels fire at once. The beams are evenly spaced in azimuth and
+    elevation. The centres of the outermost pixels lie half a pixel inside the
+    edge of the field of view. Ring 0 is the uppermost row.
 
     Args:
         width: number of pixels in a row.
