@@ -9,6 +9,7 @@ import re
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
 from cns_drake.base.number_rows import other_separator, to_number
+from cns_drake.base.terminal import note
 from cns_drake.base.value_lists import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.
@@ -101,7 +102,7 @@ def read_records(
     Returns:
         For each row, its line number and a dictionary column -> cell. If an
         earlier version of this program wrote the file, renamed columns appear
-        under their present names.
+        under their present names, and a note on stderr says so.
 
     Raises:
         InputError: the file cannot be read as CSV (see
@@ -109,10 +110,10 @@ def read_records(
             twice, or a row has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
-    names = [
-        now if (now := _FORMER_COLUMNS.get(name, name)) not in names else name
-        for name in names
-    ]
+    for former, now in _FORMER_COLUMNS.items():
+        if former in names and now not in names:
+            note(f"{path}: the column {former} is named {now} now")
+            names = [now if name == former else name for name in names]
     for column in filter(None, repeated(names)):
         raise InputError(f"{path}: column '{column}' is there twice")
     for column in columns:
