@@ -26,7 +26,7 @@ Scheduler = Annotated[
     typer.Option(
         metavar="ADDRESS",
         help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, to run "
-        "the jobs on several machines. They must all see the output folder "
+        "the jobs on several machines. All machines must see the output folder "
         "under the same path. By default the environment variable "
         "DASK_SCHEDULER_ADDRESS, if it is set.",
     ),
@@ -64,7 +64,8 @@ Tables = Annotated[
     typer.Option(
         "--tables",
         help="Write wide tables, too (.csv, .md and .tex): survival, tcr, "
-        "place_recognition, poses and others. They are views of the results.",
+        "place_recognition, poses and others. These tables show the same "
+        "results.",
     ),
 ]
 

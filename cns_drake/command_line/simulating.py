@@ -261,9 +261,9 @@ def scan(
         output: File for the scan; its name ends in .pcd, .bin or .npy.
         seed: Seed of the random noise and weather. Another seed gives other
             random errors with the same statistics.
-        model_path: Folder in which to look for model:// files of the world. It
-            is searched before the folders of GZ_SIM_RESOURCE_PATH and SDF_PATH.
-            May be repeated.
+        model_path: Folder in which to look for model:// files of the world,
+            before the folders of GZ_SIM_RESOURCE_PATH and SDF_PATH. May be
+            repeated.
     """
     with uninterrupted():
         import numpy as np

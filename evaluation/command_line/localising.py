@@ -99,9 +99,9 @@ def localise(
         time_offset: Time to add to the times of --estimate [s], if its clock
             differs from that of the drive.
         output: Folder to write results.csv and queries.csv to, in the same form
-            as those of a study; created if it does not exist. It also gets
-            localisation.csv, with all that is known of each query. If you give
-            --track, it also gets a picture.
+            as those of a study; created if it does not exist. The folder also
+            gets localisation.csv, with all that is known of each query. If you
+            give --track, it also gets a picture.
     """
     import math
 

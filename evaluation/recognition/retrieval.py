@@ -26,7 +26,7 @@ from evaluation.recognition.sequences import along_the_way
 
 @dataclass(frozen=True)
 class Retrieval:
-    """The scores of all queries against all places, and the truth.
+    """The scores of all queries against all places, and the ground truth.
 
     Attributes:
         query_frames: (Q,) frame of each query in its drive.

@@ -191,8 +191,8 @@ class StagesReport:
           the same as those of the experiment `stages`.
         - `figures`: a folder with figures. Figures that exist are kept.
 
-        If they are asked for, wide tables follow. They are views of the same
-        results:
+        Wide tables follow if they are asked for. The wide tables are views of
+        the same results:
 
         - Tables, each as .csv (with all numbers), .md and .tex: `survival`,
           `tcr`, `place_recognition`, `poses`, and `costs` if costs were
