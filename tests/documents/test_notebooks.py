@@ -64,7 +64,7 @@ def test_something_does_not_survive_and_something_does():
     kept = {
         line.partition(":")[0]: int(re.search(r"(\d+)%", line)[1])
         for line in text.splitlines()
-        if line.endswith("kept")
+        if line.endswith("retained")
     }
     assert len(kept) == 5
     assert kept["solid"] < 50
