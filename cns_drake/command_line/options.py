@@ -38,8 +38,8 @@ Traffic = Annotated[
         min=0,
         max=2000,
         metavar="N",
-        help="Number of moving vehicles. As many pedestrians are added. "
-        "By default as the scenario says.",
+        help="Number of moving vehicles. The same number of pedestrians is "
+        "added. By default as the scenario says.",
     ),
 ]
 Recording = Annotated[
