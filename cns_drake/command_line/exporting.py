@@ -161,10 +161,10 @@ def export(
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
             default, it begins where the road ahead is straightest.
-        traffic: Number of moving vehicles in the film. As many pedestrians are
-            added. By default as the scenario says; if the scenario has no
-            traffic, 60 vehicles and 60 pedestrians are added, provided that the
-            streets have room.
+        traffic: Number of moving vehicles in the film. The same number of
+            pedestrians is added. By default as the scenario says; if the
+            scenario has no traffic, 60 vehicles and 60 pedestrians are added,
+            provided that the streets have room.
     """
     values: dict[str, Any] = {
         "lidar": lidar,
