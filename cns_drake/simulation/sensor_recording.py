@@ -1,7 +1,6 @@
 """Recording the sensors of any diagram."""
 
 from collections.abc import Collection, Mapping
-import math
 from pathlib import Path
 
 from pydrake.math import RigidTransform
@@ -29,6 +28,7 @@ from cns_drake.sensors.carriers import check_free
 from cns_drake.sensors.imu.imu import Imu
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry.odometry import OdometrySensor
+from cns_drake.sensors.sensor_config import HIGHEST_RATE
 
 
 def add_mcap_recorder(
@@ -66,7 +66,7 @@ def add_mcap_recorder(
         period: time between two messages of a sensor without a rate [s]. It can
             be left out if there is a LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
-            per second.
+            per second, at most 1000.
         lidars: LiDARs to record; each needs a different name.
         cameras: name -> camera to record.
         imu: IMU to record, if any.
@@ -199,10 +199,10 @@ def _periods(
             raise ValueError(
                 f"rates: no sensor '{name}'; there are: {', '.join(periods)}"
             )
-        if not 0.0 < rate < math.inf:
+        if isinstance(rate, bool) or not 0.0 < rate <= HIGHEST_RATE:
             raise ValueError(
                 f"rates: {name}: {rate} is not a positive number of messages "
-                "a second"
+                f"a second, at most {HIGHEST_RATE}"
             )
         periods[name] = 1.0 / rate
     return periods

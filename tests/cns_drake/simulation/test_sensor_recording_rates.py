@@ -1,5 +1,7 @@
 """Sensors of any diagram, recorded at rates of their own."""
 
+import math
+
 from helpers.allan import allan_deviation
 import numpy as np
 from pydrake.geometry import HalfSpace
@@ -150,8 +152,9 @@ def test_what_makes_no_sense_is_refused(tmp_path):
         falling.add_imu(rate=0)
     with pytest.raises(ValueError, match=r"no sensor 'gps'; .*slow, fast, imu"):
         falling.record(tmp_path / "one", 0.1, rates={"gps": 1.0})
-    with pytest.raises(ValueError, match="fast: -1 is not a positive number"):
-        Falling().record(tmp_path / "two", 0.1, rates={"fast": -1})
+    for rate in (-1, 0.0, math.nan, True, 1000.1):
+        with pytest.raises(ValueError, match=f"fast: {rate} is not a positive"):
+            Falling().record(tmp_path / "two", 0.1, rates={"fast": rate})
     with pytest.raises(ValueError, match="needs one"):
         add_mcap_recorder(DiagramBuilder(), tmp_path / "three")
     causal = Falling()
