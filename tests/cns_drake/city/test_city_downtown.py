@@ -12,7 +12,7 @@ from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG, kerb_height
 from cns_drake.roads.street_areas import RoadSurface
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 RAMPS = (
     "north_street_ramp",

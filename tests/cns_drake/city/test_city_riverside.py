@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Point, box
 
 from cns_drake.city.ground.streets import GROUND_TAG
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 WATER = -2.8
 # The river from bank to bank; its quays are at y = -131 and -197.
