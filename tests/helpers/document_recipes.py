@@ -365,6 +365,7 @@ RECIPES = {
         changes=(("--output", "--method solid --method btc --output"),),
         after=("named poses",),
         makes=("real/results.csv", "real/queries.csv"),
+        all_methods=True,
     ),
     "help: real": Recipe(
         "cns-eval real real_scans",

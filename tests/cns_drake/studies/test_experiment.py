@@ -436,8 +436,8 @@ FAULTS = [
         "cases.c.query.a.b: another factor changes it, too",
     ),
     ("cases: {c: {query: {a: {b: 3}, a.b: 4}}}", "cases.c.query.a.b: another"),
-    ("seeds: true", "seeds.0: "),
-    ("levels: true\ncases: {a: {query: {x: 1}}}", "levels.0: "),
+    ("seeds: true", "seeds: True is no number"),
+    ("levels: true\ncases: {a: {query: {x: 1}}}", "levels: True is no number"),
     (
         "maps: [town, {name: town, age: town, years: 2, seed: 1}]",
         "maps: 'town' is there twice",
