@@ -171,7 +171,8 @@ def simulate(
             snow=0.25,leaves=0.15 means 0.25 m of snow, and that 15 % of the
             leaves are left. Other switches are parked_cars, scaffolds, works,
             furniture and roadsides: the share that is changed or added, from 0
-            to 1. seed=N samples other changes. May be repeated.
+            to 1. height_limit=METRES lowers buildings and plants. seed=N
+            samples other changes. May be repeated.
         driver: How the car is driven. With real, the car wanders in its lane
             and changes lanes, as in published data sets; with none, the car
             stays in the middle of its lane. By default as the scenario says.

@@ -243,7 +243,9 @@ class TrafficConfig(Section):
 
 
 class TransientConfig(Section):
-    """Temporary changes to a city, such as snow, that no stage contains.
+    """Changes to a city that no stage contains, such as snow.
+
+    Most are temporary; `height_limit` shows the city before it grew.
 
     `roadsides` is applied first, so all other switches also change the objects
     that `roadsides` adds. Apart from that, the switches are independent: the
@@ -271,6 +273,10 @@ class TransientConfig(Section):
             drive, that get hedges, garden walls, bushes, young trees, garages
             or parked cars. Only the cars depend on the seed; all else is the
             same in every drive.
+        height_limit: greatest height of buildings and plants above their lowest
+            point [m]. Buildings that are at least 2.5 m (a storey) higher are
+            cut off at this height, and get a flat roof; higher plants are
+            scaled down. Default: no limit.
     """
 
     seed: int = Field(default=1, ge=0)
@@ -281,6 +287,9 @@ class TransientConfig(Section):
     works: float = Field(default=0.0, ge=0.0, le=1.0)
     furniture: float = Field(default=0.0, ge=0.0, le=1.0)
     roadsides: float = field_off_by_default(0.0, ge=0.0, le=1.0)
+    height_limit: float | None = field_off_by_default(
+        None, gt=2.0, allow_inf_nan=False
+    )
 
     @property
     def is_off(self) -> bool:

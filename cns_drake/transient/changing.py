@@ -24,6 +24,7 @@ from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient import putting_up
+from cns_drake.transient.height_limit import limit_heights
 from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
 from cns_drake.transient.world_structures import (
     GROUND_CLASSES,
@@ -526,6 +527,11 @@ def change_world(
         # New objects along roadsides are changed like all others.
         putting_up.fill_roadsides(around, config.roadsides)
         rest = config.replaced(roadsides=0.0)
+        return change_world(around.editing.finish(), rest, drive, kept_free)
+    if config.height_limit is not None:
+        # Scaffolds and snow need the new roofs, and leaves the new plants.
+        limit_heights(around, config.height_limit)
+        rest = config.replaced(height_limit=None)
         return change_world(around.editing.finish(), rest, drive, kept_free)
     if config.parked_cars > 0.0:
         change_parked_cars(around, config.parked_cars)

@@ -15,8 +15,9 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import FOLDER, structures
+from cns_drake.city.geometry import FOLDER, Mesh, structures
 from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene.materials import OF_CLASSES
 from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
@@ -33,6 +34,10 @@ from cns_drake.transient.world_structures import (
 
 # Snow farther from the drive than this would hardly be visible to a LiDAR [m].
 _NEAR = 120.0
+# Colour of parts of models without one.
+_GREY = (0.5, 0.5, 0.5)
+# Points up to this far above a structure's lowest one belong to its foot [m].
+_FOOT = 0.05
 
 
 class _Named(Protocol):
@@ -75,6 +80,14 @@ class SceneEditing:
         """
         self._world = world
         self._source = world.plant.get_source_id()
+        inspector = world.scene_graph.model_inspector()
+        # Names of all geometries, of which Drake allows each only once.
+        self._names = {
+            inspector.GetName(number)
+            for number in inspector.GetAllGeometryIds()
+        }
+        # Name of a structure -> part that was renamed -> its former name.
+        self._renamed: defaultdict[str, dict[str, str]] = defaultdict(dict)
         # Name -> class and reflectivity of structures that were added.
         self._added: dict[str, tuple[str, float | None]] = {}
         # Name of a structure -> new part of it -> material.
@@ -130,7 +143,7 @@ class SceneEditing:
             self._register(
                 f"{name}/{part.name}",
                 X_new @ part.X_WG,
-                self._shape(part),
+                self.shape(part),
                 *self._properties(part),
             )
         self.remove(thing, cause)
@@ -146,7 +159,7 @@ class SceneEditing:
         self._register(
             f"{structure}/{name}",
             RigidTransform(p_W) @ part.X_WG,
-            self._shape(part),
+            self.shape(part),
             *_properties(look),
         )
         self._note_material(structure, name, look.material)
@@ -174,8 +187,8 @@ class SceneEditing:
             self._register(
                 f"{name}/{part.name}",
                 X_WS @ RigidTransform(RollPitchYaw(*part.rpy), part.xyz),
-                _model_shape(part.shape),
-                *_properties(Look(part.rgb or (0.5, 0.5, 0.5))),
+                _model_shape(part.shape, model.meshes),
+                *_properties(Look(part.rgb or _GREY)),
             )
             self._note_material(name, part.name, part.material)
         self._added[name] = (semantic_class, None)
@@ -187,6 +200,86 @@ class SceneEditing:
         if material is not None:
             self._materials[structure][part] = material
 
+    def shape(self, part: LoadedPart) -> geometry.Shape:
+        """Returns the Drake shape of a part."""
+        inspector = self._world.scene_graph.model_inspector()
+        return inspector.GetShape(part.geometry.geometry_id)
+
+    def shrink(self, thing: LoadedStructure, share: float, cause: str) -> None:
+        """Scales a structure down about the middle of its foot.
+
+        Args:
+            thing: the structure.
+            share: scale factor of all lengths, from 0 to 1.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+        """
+        p_WPs = thing.p_WPs
+        feet = p_WPs[p_WPs[:, 2] <= thing.bottom + _FOOT]
+        x, y = (feet[:, :2].min(axis=0) + feet[:, :2].max(axis=0)) / 2
+        p_WS = np.array([x, y, thing.bottom])
+        for part in thing.parts:
+            X_WG = RigidTransform(
+                part.X_WG.rotation(),
+                p_WS + share * (part.X_WG.translation() - p_WS),
+            )
+            self._replace_part(part, X_WG, _scaled(self.shape(part), share))
+        self.blame(thing.name, cause)
+
+    def rebuild(
+        self,
+        thing: LoadedStructure,
+        before: structures.Model,
+        after: structures.Model,
+        X_WS: RigidTransform,
+        cause: str,
+    ) -> None:
+        """Changes a structure in the way in which a model of it changed.
+
+        Parts that both models contain stay as they are. A changed part keeps
+        its colour and its material.
+
+        Args:
+            thing: the structure.
+            before: a model with the parts of the structure, in the same order.
+            after: the changed model. A part with the name of one in `before`
+                takes its place; all others are new.
+            X_WS: pose of the frame S of both models in W.
+            cause: field of the scenario's section `transient` that asks for the
+                change.
+        """
+        loaded = dict(zip(before.parts, thing.parts, strict=True))
+        old = {part.name: one for part, one in loaded.items()}
+        kept = loaded.keys() & set(after.parts)
+        materials = structures.Structure(
+            thing.name, thing.semantic_class, after, (0.0, 0.0, 0.0)
+        ).materials
+        taken = {one.name for one in thing.parts}
+        replaced = {part.name for part in after.parts}
+        for part in after.parts:
+            if part in kept:
+                continue
+            X_WG = X_WS @ RigidTransform(RollPitchYaw(*part.rpy), part.xyz)
+            shape = _model_shape(part.shape, after.meshes)
+            if part.name in old:
+                self._replace_part(old[part.name], X_WG, shape)
+                continue
+            name = part.name
+            while name in taken:
+                name += "_"
+            look = Look(part.rgb or _GREY)
+            self._register(
+                f"{thing.name}/{name}", X_WG, shape, *_properties(look)
+            )
+            material = materials[part.name]
+            # The structure may have another usual material than its class.
+            if material != OF_CLASSES[thing.semantic_class]:
+                self._note_material(thing.name, name, material)
+        for name, one in old.items():
+            if name not in replaced:
+                self._remove_part(one)
+        self.blame(thing.name, cause)
+
     def keep_triangles(self, part: LoadedPart, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
         surface = part.geometry.surface
@@ -194,23 +287,18 @@ class SceneEditing:
         triangles = surface.triangles[kept]
         # The mesh is unscaled, so that parts that shared a mesh share one
         # again.
-        shape = self._shape(part)
+        shape = self.shape(part)
         scale = np.ones(3)
         # Of the shapes with triangles, only boxes and cones have no scale.
         if isinstance(shape, geometry.Mesh | geometry.Convex):
             scale = np.array(shape.scale3())
-        # The old part is removed first, since the new one may have its name.
-        properties = [type(one)(one) for one in self._properties(part)]
-        self._remove_part(part)
-        if len(triangles):
-            if np.prod(scale) < 0.0:
-                triangles = triangles[:, ::-1]
-            self._register(
-                f"{part.geometry.structure}/{part.name}",
-                part.X_WG,
-                _memory_mesh(surface.p_GVset / scale, triangles, scale),
-                *properties,
-            )
+        if len(triangles) == 0:
+            self._remove_part(part)
+            return
+        if np.prod(scale) < 0.0:
+            triangles = triangles[:, ::-1]
+        mesh = _memory_mesh(surface.p_GVset / scale, triangles, scale)
+        self._replace_part(part, part.X_WG, mesh)
 
     def add_triangles(
         self,
@@ -300,7 +388,11 @@ class SceneEditing:
             for cause in self._causes.get(entry.name, ())
             if cause not in entry.causes
         ]
-        materials = self._materials.get(entry.name, {})
+        materials = dict(self._materials.get(entry.name, {}))
+        known = {**entry.materials, **materials}
+        for new_name, name in self._renamed.get(entry.name, {}).items():
+            if name in known:
+                materials[new_name] = known[name]
         if not (new or materials):
             return entry
         return replace(
@@ -308,10 +400,6 @@ class SceneEditing:
             causes=(*entry.causes, *new),
             materials={**entry.materials, **materials},
         )
-
-    def _shape(self, part: LoadedPart) -> geometry.Shape:
-        inspector = self._world.scene_graph.model_inspector()
-        return inspector.GetShape(part.geometry.geometry_id)
 
     def _properties(
         self, part: LoadedPart
@@ -329,6 +417,14 @@ class SceneEditing:
         shape: geometry.Shape,
         *properties: geometry.GeometryProperties,
     ) -> None:
+        structure, _, part = name.partition("/")
+        # Parts of several links, which have frames of their own, may share a
+        # name; here, all are fixed to the world.
+        while name in self._names:
+            name += "_"
+        self._names.add(name)
+        if (new_name := name.partition("/")[2]) != part:
+            self._renamed[structure][new_name] = part
         scene_graph = self._world.scene_graph
         number = scene_graph.RegisterGeometry(
             self._source,
@@ -338,7 +434,18 @@ class SceneEditing:
         for one in properties:
             scene_graph.AssignRole(self._source, number, one)
 
+    def _replace_part(
+        self, part: LoadedPart, X_WG: RigidTransform, shape: geometry.Shape
+    ) -> None:
+        """Gives a part another pose and shape; its look stays the same."""
+        # The old part is removed first, since the new one may have its name.
+        properties = [type(one)(one) for one in self._properties(part)]
+        self._remove_part(part)
+        name = f"{part.geometry.structure}/{part.name}"
+        self._register(name, X_WG, shape, *properties)
+
     def _remove_part(self, part: LoadedPart) -> None:
+        self._names.discard(part.geometry.name)
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
@@ -450,12 +557,44 @@ def _properties(look: Look) -> tuple[geometry.GeometryProperties, ...]:
     return seen, shown
 
 
-def _model_shape(shape: structures.Shape) -> geometry.Shape:
-    """Returns a Drake shape that equals a shape of the city generator."""
+def _model_shape(
+    shape: structures.Shape, meshes: Mapping[str, Mesh]
+) -> geometry.Shape:
+    """Returns a Drake shape that equals a shape of the city generator.
+
+    `meshes` maps names to the meshes of its model.
+    """
     if isinstance(shape, structures.BoxShape):
         return geometry.Box(*shape.size)
     if isinstance(shape, structures.CylinderShape):
         return geometry.Cylinder(shape.radius, shape.length)
     if isinstance(shape, structures.SphereShape):
         return geometry.Sphere(shape.radius)
-    return geometry.Mesh(str(FOLDER / f"{shape.mesh}.obj"), shape.scale)
+    shared = FOLDER / f"{shape.mesh}.obj"
+    if shared.is_file():
+        return geometry.Mesh(str(shared), shape.scale)
+    mesh = meshes[shape.mesh]
+    return _memory_mesh(mesh.vertices, mesh.triangles(), shape.scale)
+
+
+def _scaled(shape: geometry.Shape, share: float) -> geometry.Shape:
+    """Returns a shape scaled about its origin by the factor `share`.
+
+    A half space is returned as it is.
+    """
+    if isinstance(shape, geometry.Mesh | geometry.Convex):
+        scale = share * np.array(shape.scale3())
+        return type(shape)(shape.source(), scale)
+    if isinstance(shape, geometry.Box):
+        return geometry.Box(*(share * np.array(shape.size())))
+    if isinstance(shape, geometry.Sphere):
+        return geometry.Sphere(share * shape.radius())
+    if isinstance(shape, geometry.Ellipsoid):
+        axes = (shape.a(), shape.b(), shape.c())
+        return geometry.Ellipsoid(*(share * length for length in axes))
+    if isinstance(shape, geometry.Cylinder | geometry.Capsule):
+        return type(shape)(share * shape.radius(), share * shape.length())
+    if isinstance(shape, geometry.MeshcatCone):
+        sizes = (shape.height(), shape.a(), shape.b())
+        return geometry.MeshcatCone(*(share * length for length in sizes))
+    return shape

@@ -5,6 +5,7 @@ street front looks the same. The building gets a new roof.
 """
 
 from collections.abc import Sequence
+import math
 
 import numpy as np
 import shapely
@@ -34,7 +35,7 @@ _LEAST_ROOF = 4.0
 # [m].
 _BETWEEN = 0.0005
 # A part that rises less than this above the height is no storey [m].
-_STOREY = 2.5
+STOREY = 2.5
 _PARAPET = 0.9
 _PARAPET_WIDTH = 0.3
 # The band that closes the walls starts this far below the roof [m].
@@ -58,7 +59,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
         name: beginning of the names of new meshes.
         seed: seed of the random roof equipment.
     """
-    if top_of(model) < height + _STOREY:
+    if top_of(model) < height + STOREY:
         return model
     placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
     ground = box(*model.footprint.bounds)
@@ -93,11 +94,17 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 
 def top_of(model: Model) -> float:
-    """Returns the height of a building's top, without roof equipment [m]."""
+    """Returns the height of a building's top, without roof equipment [m].
+
+    The height is -inf if the model contains nothing else.
+    """
     return max(
-        float(part_mesh(part, model.meshes).vertices[:, 2].max())
-        for part in model.parts
-        if not _is_shared(part)
+        (
+            float(part_mesh(part, model.meshes).vertices[:, 2].max())
+            for part in model.parts
+            if not _is_shared(part)
+        ),
+        default=-math.inf,
     )
 
 

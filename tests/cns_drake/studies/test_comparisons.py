@@ -32,6 +32,7 @@ RECORDED = RetrievalProtocol()
 # What a cause of the ladder may change, apart from the drive's name.
 CHANGED = {
     "construction": ("database", {"stage"}),
+    "raised": ("database", {"transient"}),
     **dict.fromkeys(
         ("parked_cars", "leaves", "snow", "scaffolds", "works", "furniture"),
         ("query", {"transient"}),

@@ -267,11 +267,18 @@ def test_furniture_goes_at_most_2_m(changed):
     assert same(places(before), places(after), but=("lamp", "sign", "new"))
 
 
-def test_points_that_no_changed_thing_could_hide_are_identical(sdf):
+@pytest.mark.parametrize(
+    "switches",
+    [
+        {"parked_cars": 0.5, "leaves": 0.5, "furniture": 0.5},
+        {"height_limit": 5.0},
+    ],
+)
+def test_points_that_no_changed_thing_could_hide_are_identical(sdf, switches):
     """Beams that meet no changed object before or after have equal points."""
     pattern = make_beam_pattern("vlp-16")
     X_WS = X_WT @ RigidTransform(RollPitchYaw(0, 0, 1.0), [20.0, 0.0, 1.6])
-    config = TransientConfig(parked_cars=0.5, leaves=0.5, furniture=0.5)
+    config = TransientConfig(**switches)
     old_world = load_world(sdf)
     new_world = change_world(load_world(sdf), config, DRIVE, LANES)
     causes = {e.instance for e in new_world.structures if e.causes}

@@ -1,0 +1,113 @@
+"""Makes the buildings and plants of a world lower, as before they grew."""
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Mesh as DrakeMesh
+from pydrake.math import RigidTransform
+from shapely.geometry import box
+
+from cns_drake.city.geometry import FOLDER, Mesh, MeshShape, Model, Part
+from cns_drake.city.growth.lowering import STOREY, lowered, top_of
+from cns_drake.scene.surfaces import tessellate
+from cns_drake.transient.scene_editing import SceneEditing, Surroundings
+from cns_drake.transient.world_structures import (
+    LoadedPart,
+    LoadedStructure,
+    draws,
+)
+
+_CAUSE = "height_limit"
+
+
+def limit_heights(around: Surroundings, limit: float) -> None:
+    """Lowers all buildings and plants that are higher than a limit.
+
+    A building is cut off at the limit, and gets a flat roof with new equipment;
+    it stays as it is if less than a storey lies above the limit. A plant is
+    scaled down to the limit.
+
+    Args:
+        around: surroundings of the drive, which are changed.
+        limit: greatest height above the lowest point of a structure [m].
+    """
+    editing = around.editing
+    plants = [
+        plant
+        for plant in around.of_classes({"vegetation"})
+        if plant.top - plant.bottom > limit
+    ]
+    for plant in plants:
+        editing.shrink(plant, limit / (plant.top - plant.bottom), _CAUSE)
+    num_lowered = num_uncut = 0
+    for building in around.of_classes({"building"}):
+        if building.top - building.bottom < limit + STOREY:
+            continue
+        model, X_WS = _as_model(building, editing)
+        rng = draws(around.seed, _CAUSE, building.name)
+        low = lowered(model, limit, building.name, int(rng.integers(2**31)))
+        if low is not model:
+            editing.rebuild(building, model, low, X_WS, _CAUSE)
+            num_lowered += 1
+        elif top_of(model) >= limit + STOREY:
+            num_uncut += 1
+    if num_uncut:
+        editing.note(
+            "height_limit: higher buildings that stay, because their walls"
+            f" enclose no area at {limit:g} m: {num_uncut}"
+        )
+    elif not plants and not num_lowered:
+        editing.note(
+            f"height_limit: no building and no plant is higher than {limit:g} m"
+        )
+
+
+def _as_model(
+    building: LoadedStructure, editing: SceneEditing
+) -> tuple[Model, RigidTransform]:
+    """Returns a model with the parts of a building, and the pose X_WS.
+
+    The frame S is parallel to W, with its origin at the height of the
+    building's lowest point. The parts have the same order; their names are
+    their numbers.
+    """
+    x, y = np.round(building.p_WPs[:, :2].mean(axis=0))
+    p_WS = np.array([x, y, building.bottom])
+    parts = []
+    meshes = {}
+    for number, part in enumerate(building.parts):
+        mesh = f"{_file_of(part, editing)}/{number}"
+        meshes[mesh] = _mesh_of(part, p_WS)
+        kind = part.material.kind
+        parts.append(
+            Part(
+                str(number),
+                MeshShape(mesh),
+                rgb=part.geometry.rgb,
+                material=kind if kind == "glass" else None,
+            )
+        )
+    low = (building.p_WPs - p_WS)[:, :2].min(axis=0)
+    high = (building.p_WPs - p_WS)[:, :2].max(axis=0)
+    return Model(tuple(parts), meshes, box(*low, *high)), RigidTransform(p_WS)
+
+
+def _file_of(part: LoadedPart, editing: SceneEditing) -> str:
+    """Returns the name of an object mesh of the generator, or an empty text.
+
+    It is the mesh of the part, such as `roof_vents`.
+    """
+    shape = editing.shape(part)
+    if isinstance(shape, DrakeMesh) and shape.source().is_path():
+        name = Path(shape.source().path()).stem
+        if (FOLDER / f"{name}.obj").is_file():
+            return name
+    return ""
+
+
+def _mesh_of(part: LoadedPart, p_WS: np.ndarray) -> Mesh:
+    """Returns the triangles of a part, in S [m]; round shapes become prisms."""
+    surface = tessellate(part.geometry.surface)
+    R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
+    vertices = surface.p_GVset @ R.T + p - p_WS
+    return Mesh(vertices, tuple(map(tuple, surface.triangles.tolist())))
