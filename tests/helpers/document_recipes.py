@@ -257,6 +257,7 @@ RECIPES = {
         "rko_lio output/odometry",
         after=("RKO-LIO settings", "odometry drive"),
         prints=("poses", "ATE"),
+        by_night=True,
     ),
     "help: list": Recipe("cns-drake list", prints=("metropolis_04",)),
     "help: simulate": Recipe(
