@@ -14,8 +14,8 @@ from typing import NamedTuple
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
-from evaluation.results.headlines import listed, told_apart
-from evaluation.results.summaries import Ranked, median_kept, ranking
+from evaluation.results.headlines import KEPT, listed, survival, told_apart
+from evaluation.results.summaries import Ranked, ranking
 from evaluation.results.table import (
     OWN,
     STAGE,
@@ -266,30 +266,12 @@ def _shown(
 
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
-    """Returns one or two sentences on the retained AUC of methods."""
+    """Returns sentences on what methods retain, and on which survive."""
     groups = tables.by_pair(survivals)
     known = [one for one in survivals if one.before]
     without = len(groups) - len(tables.by_pair(known))
-    shares: dict[str, list[float]] = {}
-    for one in known:
-        shares.setdefault(one.method, []).append(one.number("after", "kept"))
-    medians = {
-        method: share
-        for method in tables.in_table_order(shares)
-        if not math.isnan(share := median_kept(shares[method]))
-    }
-    parts = []
-    if medians:
-        listed = ", ".join(
-            f"{tables.title(method)} {percent(medians[method])}"
-            for method in sorted(medians, key=lambda m: -medians[m])
-        )
-        number = len(groups) - without
-        over = f"median of {number} pairs" if number > 1 else "one pair"
-        parts.append(
-            f"Retained AUC, relative to the AUC without change ({over}):"
-            f" {listed}."
-        )
+    text = survival([one.after[KEPT] for one in known if KEPT in one.after])
+    parts = [text] if text else []
     if without:
         which = f"For {without} of {len(groups)} pairs" if known else "Here"
         parts.append(

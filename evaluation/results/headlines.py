@@ -8,11 +8,21 @@ from collections.abc import Iterable, Mapping, Sequence
 import math
 
 from evaluation.recognition.metrics import compared_by_auc
-from evaluation.results.summaries import check_same_queries, drive_number
+from evaluation.results.summaries import (
+    LEAST_UNITS,
+    check_same_queries,
+    drive_number,
+    ranking,
+)
 from evaluation.results.table import Answers, QueryRows, Row
 from evaluation.results.table_forms import title
 
 SIGNIFICANT = 0.05
+# The metric by which a method survives a change: the share of its AUC strict
+# that it retains.
+KEPT = "kept_strict"
+# A method survives if the lower limit of this share is at least that.
+_SURVIVES = 0.9
 
 
 def listed(names: Iterable[str]) -> str:
@@ -56,6 +66,55 @@ def told_apart(
             other = pair[1 - pair.index(best)]
             found[not p < SIGNIFICANT].append(title(other))
     return found
+
+
+def survival(rows: Sequence[Row]) -> str:
+    """Returns what methods retain under a change, and which of them survive.
+
+    A method survives if it retains at least 90 % of its AUC strict, by the
+    lower limit of the 95 % t interval of `ranking`, whose units are cities.
+    Fewer than four cities do not show it.
+
+    Args:
+        rows: rows of the metric `kept_strict`, of changed conditions.
+
+    Returns:
+        One or two sentences; empty if no condition has results of all methods.
+    """
+    ranked, _ = ranking(rows)
+    if not ranked:
+        return ""
+    number = len({row.map for row in rows})
+    over = "mean over pairs"
+    decided = number >= LEAST_UNITS
+    if decided:
+        over += f", with a 95 % t interval over {number} cities"
+    shares = ", ".join(
+        f"{title(one.method)} {_share(one.value)}"
+        + decided
+        * f" ({_share(one.interval.low)} to {_share(one.interval.high)})"
+        for one in ranked
+    )
+    text = (
+        "Retained AUC strict, relative to the AUC strict without change"
+        f" ({over}): {shares}."
+    )
+    least = f"{100.0 * _SURVIVES:.0f} %"
+    if not decided:
+        return (
+            f"{text} Fewer than {LEAST_UNITS} cities do not show whether a"
+            f" method survives, that is, retains {least}."
+        )
+    found = [one.method for one in ranked if one.interval.low >= _SURVIVES]
+    which = listed(map(title, found)) if found else "none"
+    return (
+        f"{text} Methods that survive, because the lower limit is at least"
+        f" {least}: {which}."
+    )
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.0f} %"
 
 
 def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:

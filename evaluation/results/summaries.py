@@ -48,7 +48,7 @@ _SAMPLES = 1000
 # Least number of points that show a trend.
 LEAST_POINTS = 5
 # Least number of maps or conditions whose spread gives a mean an interval.
-_LEAST_UNITS = 4
+LEAST_UNITS = 4
 
 
 class Mean(NamedTuple):
@@ -501,7 +501,7 @@ def ranking(
     number = int(numbered.max()) + 1
     if number > 1:
         intervals = [UNKNOWN] * len(names)
-    if number >= _LEAST_UNITS:
+    if number >= LEAST_UNITS:
         is_in = numbered == np.arange(number)[:, None]
         squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
         spreads = np.sqrt(number / (number - 1) * squares) / len(common)

@@ -1,7 +1,9 @@
 import math
 
 from helpers.small_page import make_content
+import numpy as np
 import pytest
+from scipy import stats
 
 from evaluation.report.conclusions import (
     survival_numbers,
@@ -15,7 +17,7 @@ from evaluation.results.table import Row
 STAGES = {f"town_{number:02d}": f"{number:02d}" for number in range(4)}
 
 
-def make(method, database, before, after, interval=(0.25, 0.75)):
+def make(method, database, before, after, interval=(0.25, 0.75), town="town"):
     """The rows of a method on a pair; before is NaN without a control."""
     has_control = not math.isnan(before)
     share = after / before if before else math.nan
@@ -26,13 +28,17 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
             "auc_strict": 0.5 * after,
             "r1": before if has_control else after,
             "recall_at_full_precision": 0.125,
-            **({"kept": share, "kept_r1": 1.0} if has_control else {}),
+            **(
+                {"kept": share, "kept_r1": 1.0, "kept_strict": share}
+                if has_control
+                else {}
+            ),
         },
     }
     return [
         Row(
             "stages",
-            "town",
+            town,
             f"town_{database}",
             "town_03",
             1,
@@ -65,7 +71,7 @@ def of(rows):
 
 
 def test_numbers():
-    table = survival_numbers(of([*SOME[:9], *NO_CONTROL]))
+    table = survival_numbers(of([*SOME[:10], *NO_CONTROL]))
     rows = [dict(zip(table.header, row, strict=True)) for row in table.rows]
     names = "map,db,query,method,auc_unchanged,auc_changed,kept"
     assert ",".join(table.header).startswith(names)
@@ -97,16 +103,35 @@ def test_table_for_print():
 
 
 def test_summary():
-    assert survival_summary(of(SOME)) == (
-        "Retained AUC, relative to the AUC without change (median of 2"
-        " pairs): BTC 62 %, SOLiD 10 %."
+    assert survival_summary(of(SOME[:10])) == (
+        "Retained AUC strict, relative to the AUC strict without change (mean"
+        " over pairs): BTC 50 %. Fewer than 4 cities do not show whether a"
+        " method survives, that is, retains 90 %."
     )
-    assert survival_summary(of(SOME[:9])).endswith("(one pair): BTC 50 %.")
+    assert "BTC 62 %" in survival_summary(of(SOME[:20]))
     assert "For 1 of 3 pairs no control was" in (
         survival_summary(of([*SOME, *NO_CONTROL]))
     )
     assert survival_summary(of(NO_CONTROL)).startswith("Here no control was")
     assert survival_summary([]) == ""
+
+
+@pytest.mark.parametrize(("lowest", "survives"), [(0.97, True), (0.88, False)])
+def test_the_lower_limit_decides_what_survives(lowest, survives):
+    shares = [lowest, 0.98, 0.99, 1.0]
+    limits = stats.t.interval(0.95, 3, np.mean(shares), stats.sem(shares))
+    assert (limits[0] >= 0.9) == survives
+    rows = [
+        row
+        for town, share in zip("abcd", shares, strict=True)
+        for method, after in (("btc", 0.8 * share), ("solid", 0.4))
+        for row in make(method, "01", 0.8, after, town=town)
+    ]
+    text = survival_summary(of(rows))
+    low, high = (f"{100.0 * one:.0f} %" for one in limits)
+    assert f"BTC {100.0 * np.mean(shares):.0f} % ({low} to {high})" in text
+    assert "SOLiD 50 % (50 % to 50 %)" in text
+    assert text.endswith(f"at least 90 %: {'BTC' if survives else 'none'}.")
 
 
 def test_section_of_the_page(tmp_path, monkeypatch):

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.report.conclusions import Survival, survival_summary
 from evaluation.results import charts
 from evaluation.results import page as page_module
 from evaluation.results.drawing import save
@@ -192,19 +191,6 @@ def test_texts_and_charts_have_one_definition_of_what_is_kept():
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
     message = charts.draw(chart, Results.of(rows)).message
     assert shown(message).endswith("from 90 % (RING++) to 100 % (SOLiD)")
-    text = survival_summary(
-        [
-            Survival(
-                (town, "01", "02"),
-                name,
-                {"auc": None},
-                {"kept": row(after / before, {}, name, "kept")},
-            )
-            for name, pairs in both.items()
-            for town, (before, after) in zip("xyz", pairs, strict=True)
-        ]
-    )
-    assert text.endswith("(median of 3 pairs): SOLiD 100 %, RING++ 90 %.")
 
 
 @pytest.mark.parametrize("number", [1, 4, 5, 8])
