@@ -200,38 +200,6 @@ def survey_in_one_world(
     ], reports
 
 
-def compare_maps(
-    source: Surveyed,
-    target: Surveyed,
-    control: Surveyed | None = None,
-    alignment: AlignmentReport | None = None,
-    grids: Sequence[tuple[float, float, float]] = GRIDS,
-) -> ChangeReport:
-    """Returns the change between two maps A and B.
-
-    Args:
-        source: the map A.
-        target: the map B.
-        control: map of a third drive, which follows the route of A in the stage
-            of B, or the route of B in the stage of A. It is compared with the
-            map of the same stage. This comparison shows the effect of different
-            routes in an unchanged city. None for no control.
-        alignment: alignment of A and B, for the report.
-        grids: shifts of the voxel grid [m]. The change is also computed on each
-            shifted grid, for the report's `spread` of TCR_sym.
-
-    Raises:
-        InputError: A, B and the control are not in one world, or the control is
-            on neither route.
-    """
-    report = change_between(source, target)
-    if control is not None:
-        both = control, same_stage_partner(source, target, control)
-        report = report.beside(change_between(*both))
-    spread = spread_over_grids(source, target, report.change, grids)
-    return replace(report, spread=spread, alignment=alignment)
-
-
 def change_between(source: Surveyed, target: Surveyed) -> ChangeReport:
     """Returns the change between two maps, without its context.
 

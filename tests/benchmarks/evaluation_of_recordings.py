@@ -16,7 +16,7 @@ from evaluation.drives import open_drive
 from evaluation.drives.sampling import gather
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import make_method
-from evaluation.recognition.place_recognition import run
+from evaluation.recognition.retrieval import retrieve
 from evaluation.study.surveys import MappedDrive
 
 
@@ -80,7 +80,7 @@ def main() -> None:
     )
     measure(
         "place recognition of the pair",
-        lambda: run(
+        lambda: retrieve(
             open_drive(arguments.database),
             open_drive(arguments.query),
             method,

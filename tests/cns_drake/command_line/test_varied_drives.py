@@ -1,6 +1,7 @@
 """A study without recordings gives the results of recordings."""
 
 from helpers import studies
+from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_city import write_small_city
 import pytest
 from typer.testing import CliRunner
@@ -9,10 +10,9 @@ import yaml
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from cns_drake.studies import recording
-from evaluation.change.drive_change import compare_maps, survey
+from evaluation.change.drive_change import survey
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.place_recognition import run as recognise
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.results.table import Results
 from evaluation.study import engine
@@ -77,7 +77,7 @@ def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
         (found,) = here.where(metric="tcr_sym").rows
         assert found.value == pytest.approx(change.change.symmetric, abs=1e-9)
         for method in ("solid", "btc"):
-            alone = recognise(
+            alone = place_outcome(
                 open_drive(recorded / member),
                 open_drive(recorded / "town_02"),
                 make_method(method, {}),

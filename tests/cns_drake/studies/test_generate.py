@@ -9,6 +9,7 @@ from helpers import studies
 from helpers.bag_recordings import contents
 from helpers.eval_program import run_program
 from helpers.generation import Generation
+from helpers.measured_pairs import compare_maps
 from helpers.small_city import write_small_city
 from helpers.tiny_drive import (
     FRAMES,
@@ -29,7 +30,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import recording, redrawing
 from cns_drake.studies.recording import is_recorded, record_all
-from evaluation.change.drive_change import compare_maps, survey
+from evaluation.change.drive_change import survey
 from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow

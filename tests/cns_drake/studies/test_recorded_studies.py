@@ -2,6 +2,7 @@
 
 from helpers import studies
 from helpers.eval_program import write_towns
+from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_towns import drive
 import pytest
 
@@ -10,10 +11,9 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment
 from cns_drake.studies.study import run_study
-from evaluation.change.drive_change import compare_maps, survey
+from evaluation.change.drive_change import survey
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import Results
 from evaluation.study import engine
@@ -71,7 +71,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
     for stage, name in databases.items():
         here = {"both.stage": stage}
         found[stage] = values(results, **here, task="place", gate=False)
-        alone = run(
+        alone = place_outcome(
             open_drive(folder / name),
             open_drive(query),
             make_method("solid", {}),
@@ -117,7 +117,7 @@ def test_protocols_may_vary(folder, tmp_path):
         protocol={"base": "recorded", "radius": [5.0, 15.0]},
     )
     for radius in (5.0, 15.0):
-        alone = run(
+        alone = place_outcome(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),
@@ -240,7 +240,7 @@ def test_drives_are_read_anew_for_another_protocol(folder, tmp_path):
     fields = {"protocol": {"base": "recorded", "query_spacing": spacings}}
     found = measure(tmp_path, folder, tasks=["place"], **fields)
     for spacing in spacings:
-        alone = run(
+        alone = place_outcome(
             open_drive(folder / "metropolis_01"),
             open_drive(folder / "metropolis_04"),
             make_method("solid", {}),

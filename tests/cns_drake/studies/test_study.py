@@ -6,6 +6,7 @@ import shutil
 
 from helpers import studies
 from helpers.eval_program import run_program
+from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_map import write_town
 import numpy as np
 import pytest
@@ -19,10 +20,9 @@ from cns_drake.studies import redrawing
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
-from evaluation.change.drive_change import Surveyed, compare_maps
+from evaluation.change.drive_change import Surveyed
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import QueryRows, Results
 from evaluation.study import engine
@@ -148,7 +148,7 @@ def test_the_numbers_are_those_of_the_single_commands(
         change = compare_maps(mapped[stage], mapped["query"]).change
         assert found["tcr_sym"] == pytest.approx(change.symmetric, abs=1e-9)
         for ranges in (20, 40):
-            alone = run(
+            alone = place_outcome(
                 drives[stage],
                 drives["query"],
                 make_method("solid", {"ranges": str(ranges)}),
@@ -281,7 +281,7 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
         for k in ("01", "04")
     )
     for radius in (2.0, 9.0):
-        alone = run(
+        alone = place_outcome(
             database,
             query,
             make_method("solid", {}),

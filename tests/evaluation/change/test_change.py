@@ -1,12 +1,13 @@
 import dataclasses
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import compare_maps
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
-from evaluation.change.drive_change import Surveyed, compare_maps, survey
+from evaluation.change.drive_change import Surveyed, survey
 from evaluation.change.tcr import GRIDS
 from evaluation.maps.voxel_maps import CELL_SIZE, voxelise
 

@@ -3,13 +3,13 @@
 import json
 
 from helpers.eval_program import assert_refused, run
+from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition import place_recognition
 
 
 def test_two_draws_of_a_city(capsys, tmp_path):
@@ -19,9 +19,7 @@ def test_two_draws_of_a_city(capsys, tmp_path):
     both += ["--method", "solid", "--json"]
     assert_refused(capsys, both, "through town_c1", "through town")
     with pytest.raises(InputError, match="through town_c1"):
-        place_recognition.run(
-            *map(open_drive, both[1:3]), make_method("solid", {})
-        )
+        place_outcome(*map(open_drive, both[1:3]), make_method("solid", {}))
     status, out, err = run(capsys, *both, "--across-maps")
     assert (status, err) == (0, "")
     assert json.loads(out)["queries_with_match"] > 0

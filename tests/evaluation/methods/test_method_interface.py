@@ -1,13 +1,13 @@
 """Inputs of methods beyond the coordinates of one scan."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scan_folders import write_scores
 from evaluation.recognition.scoring import score_places
@@ -201,7 +201,7 @@ def test_scores_that_are_none(drives, scores):
     with pytest.raises(
         InputError, match=r"highest: score returned .* instead of 6"
     ):
-        run(*drives, Wrong())
+        place_outcome(*drives, Wrong())
 
 
 def test_rows_of_different_lengths_are_no_score_of_one_place():
@@ -236,7 +236,7 @@ def test_scores_that_are_nan_name_the_query(
     frame = retrieve(*drives, Highest()).query_frames[2]
     fault = f"highest: .*query at frame {frame}: {number} of 6 scores are NaN"
     with pytest.raises(InputError, match=fault):
-        run(*drives, SomeNan())
+        place_outcome(*drives, SomeNan())
     for name in ("db", "q"):
         (tmp_path / name).mkdir()
         for k in range(6):

@@ -5,13 +5,13 @@ import json
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import run as run_program
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scoring import (
@@ -165,9 +165,11 @@ def record(folder, xs):
 def test_a_pair_of_drives(tmp_path):
     database = record(tmp_path / "a", np.arange(0.0, 61.0, 5.0))
     query = record(tmp_path / "b", np.arange(1.0, 42.0, 10.0))
-    free = run(database, query, Line())
+    free = place_outcome(database, query, Line())
     assert free.by_mode["all"].recall_at_1 == 0.0
-    shut = run(database, query, Line(), protocol=RetrievalProtocol(gate=True))
+    shut = place_outcome(
+        database, query, Line(), protocol=RetrievalProtocol(gate=True)
+    )
     assert shut.by_mode["all"].recall_at_1 == 1.0
     # The best place of each query is the farthest one that counts: 4 m ahead;
     # one 9 m ahead is rejected.
@@ -181,7 +183,7 @@ def test_a_pair_of_drives(tmp_path):
     assert np.isnan(gated.scores[far]).all()
     # A wider radius accepts places 9 m ahead.
     wide = RetrievalProtocol(gate=True, radius=10.5)
-    outcome = run(database, query, Line(), wide)
+    outcome = place_outcome(database, query, Line(), wide)
     np.testing.assert_allclose(outcome.columns["distance"], 9.0)
 
 
@@ -224,5 +226,7 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
 def test_shipped_methods_take_part(name, towns):
     drive = open_drive(towns / "town_01")
     method = make_method(name, {})
-    shut = run(drive, drive, method, protocol=RetrievalProtocol(gate=True))
+    shut = place_outcome(
+        drive, drive, method, protocol=RetrievalProtocol(gate=True)
+    )
     assert shut.by_mode["all"].recall_at_1 == 1.0

@@ -6,6 +6,7 @@ import json
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused
 from helpers.eval_program import run as run_program
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
@@ -13,7 +14,6 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
@@ -159,10 +159,10 @@ def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
     protocol = RetrievalProtocol(
         overlap=float(overlaps[2, 2]), query_spacing=5.0
     )
-    limit = run(database, query, method, protocol, overlaps=overlaps)
+    limit = place_outcome(database, query, method, protocol, overlaps=overlaps)
     assert [2, 2] in limit.matches.tolist()
     with pytest.raises(InputError, match="no place of a shows 100% of"):
-        run(
+        place_outcome(
             database,
             query,
             method,

@@ -1,6 +1,7 @@
 """Pose errors against given turns and moves."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,7 +10,6 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.metrics import evaluate
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     pose_error,
@@ -133,16 +133,16 @@ def test_a_method_with_exact_poses(tmp_path):
     database = record(tmp_path / "a", [(10 * k, 0, k) for k in range(6)])
     query = record(tmp_path / "b", [(10 * k + 3, 2, -7 * k) for k in range(6)])
     method = Poses()
-    outcome = run(database, query, method)
+    outcome = place_outcome(database, query, method)
     assert outcome.pose.success == 1.0
     assert outcome.pose.translation_90 < 1e-3
     assert outcome.pose.rotation_90_deg < 1e-3
     method.offset = 1.999
-    outcome = run(database, query, method)
+    outcome = place_outcome(database, query, method)
     assert outcome.pose.translation_median == pytest.approx(1.999, abs=1e-3)
     assert outcome.pose.success == 1.0
     method.offset = 2.001
-    assert run(database, query, method).pose.success == 0.0
+    assert place_outcome(database, query, method).pose.success == 0.0
     assert outcome.to_json()["pose"]["success"] == 1.0
 
 
@@ -155,4 +155,4 @@ def test_what_is_no_pose_is_refused(tmp_path, value):
             return value
 
     with pytest.raises(InputError, match="poses: relative_pose returned"):
-        run(drive, drive, Wrong())
+        place_outcome(drive, drive, Wrong())

@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     PROTOCOL_COLUMNS,
@@ -93,9 +93,9 @@ def test_scans_are_merged_for_every_method(drives):
     retrieve(*drives, Counting(), PAPER_PROTOCOL)
     sizes = {6, 2}
     protocol = replace(PAPER_PROTOCOL, scans_per_place=3)
-    outcome = run(*drives, Counting(), protocol=protocol)
+    outcome = place_outcome(*drives, Counting(), protocol=protocol)
     assert outcome.protocol.scans_per_place == 3
-    assert run(*drives, Means()).protocol.scans_per_place == 1
+    assert place_outcome(*drives, Means()).protocol.scans_per_place == 1
 
 
 def test_a_drive_against_itself(tmp_path):
@@ -110,12 +110,14 @@ def test_a_drive_against_itself(tmp_path):
     assert not np.isnan(found.scores[age >= 0.5 - 1e-9]).any()
     near = found.distances <= 7.5
     np.testing.assert_array_equal(found.matches, near & (age >= 0.5 - 1e-9))
-    outcome = run(drive, drive, Means(), protocol=protocol)
+    outcome = place_outcome(drive, drive, Means(), protocol=protocol)
     # These are all queries of the way back except those just after the turn.
     assert outcome.by_mode["all"].num_with_match in (3, 4)
     assert outcome.by_mode["all"].recall_at_1 == 1.0
     with pytest.raises(InputError, match=r"loop: never within 7.5 m of where"):
-        run(drive, drive, Means(), protocol=RetrievalProtocol(exclude_recent=9))
+        place_outcome(
+            drive, drive, Means(), protocol=RetrievalProtocol(exclude_recent=9)
+        )
 
 
 def test_others_are_asked_all_they_know(drives):

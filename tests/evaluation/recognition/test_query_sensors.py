@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -18,7 +19,6 @@ from evaluation.methods import (
 )
 from evaluation.methods.btc import align
 from evaluation.recognition.description import describe_drive
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
@@ -70,7 +70,7 @@ def drives(tmp_path_factory):
 
 def test_poses_are_judged_against_the_turned_sensor(drives):
     plain, turned = (
-        run(*drives, Corresponding(), protocol=protocol)
+        place_outcome(*drives, Corresponding(), protocol=protocol)
         for protocol in (RetrievalProtocol(), TURNED)
     )
     for found in (plain, turned):

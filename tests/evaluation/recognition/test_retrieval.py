@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest
 
@@ -13,7 +14,6 @@ from evaluation.recognition.description import (
     describe_drive,
     joined_scans,
 )
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval, retrieve
@@ -214,7 +214,7 @@ def test_the_middle_or_the_first_scan_stands_for_a_place(tmp_path):
 def test_metrics_of_a_pair(tmp_path):
     database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
     query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
-    result = run(database, query, OddOneOut())
+    result = place_outcome(database, query, OddOneOut())
     values = result.to_json()
     # The query at 43 m has no match; that at 33 m has only the omitted place.
     assert values["queries"] == 5
@@ -235,13 +235,13 @@ def test_metrics_of_a_pair(tmp_path):
 def test_auc_over_the_radius(tmp_path):
     database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
     query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
-    result = run(database, query, OddOneOut())
+    result = place_outcome(database, query, OddOneOut())
     found = result.auc_over_radius()
     assert [*found] == [2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0]
     assert found[7.5] == result.by_mode["all"].auc
     for radius, auc in found.items():
         protocol = RetrievalProtocol(radius=radius)
-        other = run(database, query, OddOneOut(), protocol=protocol)
+        other = place_outcome(database, query, OddOneOut(), protocol=protocol)
         assert auc == other.by_mode["all"].auc
     assert len(set(found.values())) > 2
 
@@ -250,7 +250,7 @@ def test_database_far_from_every_query(tmp_path):
     database = record_line(tmp_path / "a", [0.0, 5.0])
     query = record_line(tmp_path / "b", [60.0, 70.0])
     with pytest.raises(InputError, match=r"b: no query lies within 7.5 m .*55"):
-        run(database, query, OddOneOut())
+        place_outcome(database, query, OddOneOut())
 
 
 def test_a_drive_that_saw_nothing(tmp_path):
@@ -265,7 +265,7 @@ def test_a_drive_that_saw_nothing(tmp_path):
 def test_different_worlds(tmp_path):
     database = record_line(tmp_path / "a", [0.0, 5.0])
     query = record_line(tmp_path / "b", [0.0, 5.0], world_frame="utm")
-    for compare in (retrieve, run):
+    for compare in (retrieve, place_outcome):
         with pytest.raises(InputError, match="frame 'utm'"):
             compare(database, query, OddOneOut())
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import measurements
 from evaluation.study.chosen_methods import MethodChoice
@@ -108,7 +108,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     )
     choices = [choice for choice in METHODS for _ in range(2)]
     for one, choice in zip(found, choices, strict=True):
-        alone = run(
+        alone = place_outcome(
             database,
             query,
             make_method(choice.name, dict(choice.settings)),

@@ -6,6 +6,7 @@ import json
 from helpers import dataset_folders, helipr_drive, studies
 from helpers.contradictions import add_images
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
+from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import numpy as np
 from PIL import Image
@@ -17,7 +18,6 @@ from cns_drake.base.jobs.running import run_jobs
 from evaluation.drives import open_drive
 from evaluation.methods import make_method, method
 from evaluation.paper import reference_for
-from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
@@ -341,7 +341,9 @@ def test_each_protocol_is_that_of_the_single_command(recordings, report):
     # BTC's places differ between the two, those of SOLiD do not.
     for name in ("btc", "solid"):
         for protocol in (FAIR_PROTOCOL, PAPER_PROTOCOL):
-            alone = run(*drives, make_method(name, {}), protocol=protocol)
+            alone = place_outcome(
+                *drives, make_method(name, {}), protocol=protocol
+            )
             assert found[name, protocol.name] == alone.by_mode["all"].auc
     assert ("layered-overlap", "paper") not in found
     for name in ("survival", "differences", "query_details_unchanged"):

@@ -1,0 +1,90 @@
+"""Numbers of a pair of drives from their definitions, without an engine.
+
+They are oracles for the engine's tables: each is a plain sequence of the steps
+that `docs/explanation/structure.md` names.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cns_drake.base.drives.drive import Drive
+from evaluation.change.drive_change import (
+    ChangeReport,
+    Surveyed,
+    change_between,
+    same_stage_partner,
+    spread_over_grids,
+)
+from evaluation.change.tcr import GRIDS
+from evaluation.methods.method import Method
+from evaluation.recognition.place_outcome import (
+    PlaceOutcome,
+    check_has_match,
+)
+from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.retrieval import retrieve
+
+
+def place_outcome(
+    database: Drive,
+    query: Drive,
+    method: Method,
+    protocol: RetrievalProtocol = RECORDED_PROTOCOL,
+    *,
+    across_maps: bool = False,
+    overlaps: np.ndarray | None = None,
+) -> PlaceOutcome:
+    """Returns the outcome of a method on a pair of drives.
+
+    Args:
+        database, query: the drives.
+        method: the method.
+        protocol: protocol of the comparison.
+        across_maps: whether the drives may be from maps with different names.
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; by default computed from the scans.
+    """
+    found = retrieve(
+        database,
+        query,
+        method,
+        protocol,
+        across_maps=across_maps,
+        overlaps=overlaps,
+    )
+    frames = found.query_frames
+    outcome = PlaceOutcome.of(
+        method.name,
+        method,
+        protocol,
+        found,
+        (query.name, query.stamps_ns[frames], query.X_WS[frames, :3, 3]),
+        [database.name] * len(found.database_frames),
+    )
+    check_has_match(outcome)
+    return outcome
+
+
+def compare_maps(
+    source: Surveyed,
+    target: Surveyed,
+    control: Surveyed | None = None,
+    grids: Sequence[tuple[float, float, float]] = GRIDS,
+) -> ChangeReport:
+    """Returns the change between two maps A and B.
+
+    Args:
+        source: the map A.
+        target: the map B.
+        control: map of a third drive, which follows the route of A in the stage
+            of B, or the route of B in the stage of A; None for no control.
+        grids: shifts of the voxel grid [m], for the report's `spread`.
+    """
+    report = change_between(source, target)
+    if control is not None:
+        both = control, same_stage_partner(source, target, control)
+        report = report.beside(change_between(*both))
+    spread = spread_over_grids(source, target, report.change, grids)
+    return replace(report, spread=spread)
