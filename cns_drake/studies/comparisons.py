@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from cns_drake.ageing.rates import LAST_YEAR
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -31,12 +32,14 @@ from cns_drake.studies.experiment import (
     CAUSE,
     LEVEL,
     NO_CAUSE,
+    SESSIONS,
     Changes,
     Condition,
     base_protocol,
     merged,
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
+from evaluation.recognition.keeping import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import LAST, OWN
 
@@ -44,7 +47,11 @@ from evaluation.results.table import LAST, OWN
 LOSS_FIELDS = tuple(Losses.model_fields)
 # Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
-_DATABASE_FIELDS = ("distractors", "lateral")
+_DATABASE_FIELDS = ("distractors", "lateral", SESSIONS, "keep")
+# Fields that all drives of a database share.
+_SHARED_FIELDS = (*_DATABASE_FIELDS, "rates")
+# Fields that put a drive into another frame of reference.
+_PLACE_FIELDS = ("map", "world")
 # Sections whose random numbers depend on the seed of the condition.
 _SEEDED = ("transient", "traffic", "ride", "driver")
 _RETURNS = ("ideal", "calibrated")
@@ -89,16 +96,19 @@ class MissingError(Exception):
 
 @dataclass(frozen=True)
 class Compared:
-    """The database drive and the query drive of one condition.
+    """The drives of the database and the query drive of one condition.
 
     Attributes:
-        database: the drive of the database.
+        database: the drive of the database; of several, the oldest one.
         query: the drive of the queries.
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
         asked: field -> value, for the fields of the protocol by which the
             condition turns, tilts or partly hides the queries.
+        beside: further drives of the database, from older to newer.
+        keep: which places of the database are kept, see
+            `evaluation.recognition.keeping.kept_places`.
     """
 
     database: Scenario
@@ -106,17 +116,30 @@ class Compared:
     protocol: RetrievalProtocol
     distractors: int = 0
     asked: Changes = field(default_factory=dict)
+    beside: tuple[Scenario, ...] = ()
+    keep: str | int = KEEP_ALL
+
+    @property
+    def drives(self) -> tuple[Scenario, ...]:
+        """The drives of the database, from older to newer, and the query."""
+        return self.database, *self.beside, self.query
 
     def fingerprint(self) -> str:
-        """Returns a hash of the database drive and the query drive.
+        """Returns a hash of the drives of the database and the query drive.
 
         Drives that differ only in their names have different hashes.
         """
+        several = {
+            "beside": [one.model_dump(mode="json") for one in self.beside],
+            "keep": self.keep,
+        }
+        is_one = not self.beside and self.keep == KEEP_ALL
         return fingerprint(
             {
                 "database": self.database.model_dump(mode="json"),
                 "query": self.query.model_dump(mode="json"),
                 "distractors": self.distractors,
+                **({} if is_one else several),
                 **self.asked,
             }
         )
@@ -208,27 +231,29 @@ class PairMaker:
         for one in chosen:
             for side, values in one.items():
                 fields[side] = merged(fields.get(side, {}), values)
-        built: dict[str, Scenario] = {}
         sides = {
             side: merged(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
         }
+        sessions = self._sessions(sides["database"])
         # Years of cases may need the rates of all conditions.
         alone = {} if CAUSE in condition.factors else fields
         for side, values in alone.items():
-            ages = [sides[side]] if side in sides else [*sides.values()]
+            ages = [*sessions.values(), sides["query"]]
+            if side in sides:
+                ages = ages[:-1] if side == "database" else ages[-1:]
             if "rates" in values and not any("years" in one for one in ages):
                 raise InputError(
                     f"{self.source}: {side}.rates: those of no years"
                 )
-        for side, changes in sides.items():
-            self._check_side(side, changes)
-            # `years` says how much older one drive is: the other drive's city
-            # is aged by this number of years.
-            other = sides["query" if side == "database" else "database"]
-            age = other.get("years", 0), other.get("rates", 1.0)
-            drive = self._changed(side, changes, age, seed)
-            built[side] = self._named(side, drive, condition, seed)
+        for place, changes in sessions.items():
+            self._check_side(place, changes)
+        self._check_side("query", sides["query"])
+        database = self._database(sessions, sides, condition, seed)
+        years = max(one.get("years", 0) for one in sessions.values())
+        age = years, sides["database"].get("rates", 1.0)
+        drive = self._changed("query", sides["query"], age, seed)
+        query = self._named("query", drive, condition.factors, seed)
         changed = {
             name: sides["query"][name]
             for name in _QUERY_FIELDS
@@ -246,9 +271,112 @@ class PairMaker:
             radius = math.hypot(protocol.radius, lateral)
             protocol = replace(protocol, radius=radius)
         number = sides["database"].get("distractors", 0)
-        return Compared(
-            built["database"], built["query"], protocol, number, changed
+        keep = checked_keep(
+            sides["database"].get("keep", KEEP_ALL),
+            f"{self.source}: database.keep",
         )
+        return Compared(
+            database[0],
+            query,
+            protocol,
+            number,
+            changed,
+            tuple(database[1:]),
+            keep,
+        )
+
+    def _sessions(self, database: Changes) -> dict[str, dict[str, Any]]:
+        """Returns place in the file -> changes, for each drive of a database.
+
+        Each drive has the fields of the database; its own ones replace them.
+        """
+        shared = dict(database)
+        given = shared.pop(SESSIONS, None)
+        shared.pop("keep", None)
+        if SESSIONS not in database:
+            return {"database": shared}
+        where = f"{self.source}: database.{SESSIONS}"
+        if isinstance(given, Mapping):
+            numbers = [str(k) for k in range(1, len(given) + 1)]
+            given = [*given.values()] if list(given) == numbers else None
+        if not (isinstance(given, list) and given):
+            raise InputError(f"{where}: not a list of one drive or more")
+        found = {}
+        for number, own in enumerate(given, start=1):
+            place = f"database.{SESSIONS}.{number}"
+            if not isinstance(own, Mapping):
+                raise InputError(
+                    f"{self.source}: {place}: {own!r} is no mapping of fields"
+                )
+            for name in _PLACE_FIELDS:
+                if name in own:
+                    raise InputError(
+                        f"{self.source}: {place}.{name}: another map has"
+                        " another frame of reference than the other drives"
+                    )
+            for name in _SHARED_FIELDS:
+                if name in own:
+                    raise InputError(
+                        f"{self.source}: {place}.{name}: all drives share it;"
+                        " it is a field of database"
+                    )
+            found[place] = merged(shared, own)
+        return found
+
+    def _database(
+        self,
+        sessions: Mapping[str, Changes],
+        sides: Mapping[str, Changes],
+        condition: Condition,
+        seed: int,
+    ) -> list[Scenario]:
+        """Returns the drives of a database, from older to newer.
+
+        `years` says how much older a drive is than another one, through whose
+        city these years have passed. So the city of the oldest drive is aged by
+        the years of the query, which are 0 in most experiments; the city of
+        each other drive by its distance from the oldest one as well; and the
+        city of the query by the years of the oldest drive.
+
+        Args:
+            sessions: place in the file -> changes of each drive.
+            sides: changes of the database and of the query.
+            condition: the condition.
+            seed: seed of the random choices.
+        """
+        query = sides["query"]
+        since = query.get("years", 0)
+        oldest = max(one.get("years", 0) for one in sessions.values())
+        rates = query.get("rates", 1.0)
+        if any(one.get("years", 0) != oldest for one in sessions.values()):
+            rates = sides["database"].get("rates", rates)
+        stages = list(self.query.folder.stages())
+        asked = self._unchanged["query"]
+        stage = self._stage("query", asked, query.get("stage", OWN))
+        last = stages.index(stage) if stage in stages else len(stages)
+        found: list[tuple[tuple, str, Scenario]] = []
+        for place, changes in sessions.items():
+            age = since + oldest - changes.get("years", 0)
+            drive = self._unchanged["database"]
+            stage = self._stage(place, drive, changes.get("stage", OWN))
+            is_later = stages.index(stage) > last if stage in stages else False
+            if place != "database" and (age > oldest or is_later):
+                raise InputError(
+                    f"{self.source}: {place}: this drive is later than the"
+                    " query"
+                )
+            drive = self._changed(place, changes, (age, rates), seed)
+            factors = _factors_of(place, condition.factors)
+            drive = self._named("database", drive, factors, seed)
+            found.append(((age, natural_key(stage)), place, drive))
+        known: dict[str, str] = {}
+        for _, place, drive in found:
+            before = known.setdefault(drive.name, place)
+            if before != place:
+                raise InputError(
+                    f"{self.source}: {place}: the same drive as {before}"
+                )
+        return [drive for _, _, drive in sorted(found, key=lambda one: one[0])]
 
     def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
         """Returns those fields of a case that are possible on the map.
@@ -300,16 +428,21 @@ class PairMaker:
             raise InputError(
                 f"{self.source}: {side}.version: this field is now `redraw`"
             )
-        others = _DATABASE_FIELDS if side == "query" else _QUERY_FIELDS
+        is_query = side == "query"
+        others = _DATABASE_FIELDS if is_query else _QUERY_FIELDS
         for name in others:
             if name in changes:
-                right = "query" if side == "database" else "database"
+                right = "database" if is_query else "query"
                 raise InputError(
                     f"{self.source}: {side}.{name}: it is a field of {right}"
                 )
-        for name, most in (("distractors", 100_000), ("lateral", 100)):
+        for name, most in (
+            ("distractors", 100_000),
+            ("lateral", 100),
+            ("years", LAST_YEAR),
+        ):
             value = changes.get(name, 0)
-            kinds = (int,) if name == "distractors" else (int, float)
+            kinds = (int, float) if name == "lateral" else (int,)
             if type(value) not in kinds or not 0 <= value <= most:
                 raise InputError(
                     f"{self.source}: {side}.{name}: {value!r} is not from 0 to"
@@ -321,10 +454,12 @@ class PairMaker:
     ) -> Scenario:
         """Returns a drive with the changes of a condition.
 
-        `side` is `database` or `query`. `age` contains the years by which the
-        drive's city is aged, and the rates of change.
+        `side` is `query`, `database` or the place of one of its drives in the
+        file. `age` contains the years by which the drive's city is aged, and
+        the rates of change.
         """
-        drive = self._unchanged[side]
+        is_query = side == "query"
+        drive = self._unchanged["query" if is_query else "database"]
         left = dict(changes)
         for name in (*_QUERY_FIELDS, "distractors", "years", "rates"):
             left.pop(name, None)
@@ -353,7 +488,7 @@ class PairMaker:
             )
         if lateral:
             viewpoint = (lateral, 0.0)
-        if side == "database" and self.same_route:
+        if not is_query and self.same_route:
             place = self._place(
                 side, "near" if viewpoint is None else viewpoint
             )
@@ -369,7 +504,7 @@ class PairMaker:
                     f"{self.source}: years: stage {LAST} ages, not the stage"
                     f" {drive.stage} of the {side}"
                 )
-            older = "query" if side == "database" else "database"
+            older = "database" if is_query else "query"
             if "redraw" in left:
                 raise InputError(
                     f"{self.source}: {side}.redraw: a city drawn anew does not"
@@ -507,7 +642,7 @@ class PairMaker:
             self._loaded.add(world)
 
     def _named(
-        self, side: str, drive: Scenario, condition: Condition, seed: int
+        self, side: str, drive: Scenario, factors: Changes, seed: int
     ) -> Scenario:
         """Returns a drive with a name that no other drive has.
 
@@ -525,7 +660,7 @@ class PairMaker:
                     drive = control_drive(plain, str(drive.stage))
                     name = drive.name
             elif drive != plain:
-                name += f"_{_ending(side, condition, seed)}"
+                name += f"_{_ending(side, factors, seed)}"
             if name in {one.name for one in known.values()}:
                 name += f"_{content[:6]}"
             known[content] = drive.replaced(name=name)
@@ -554,9 +689,26 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
     )
 
 
-def _ending(side: str, condition: Condition, seed: int) -> str:
+def _factors_of(place: str, factors: Changes) -> dict[str, Any]:
+    """Returns the factors of a condition that concern a drive of a database.
+
+    Its own ones are named as if it were the only drive. Those of other drives,
+    and what all drives share, are left out.
+    """
+    several = f"database.{SESSIONS}"
+    found = {}
+    for path, value in factors.items():
+        if path.startswith(f"{place}."):
+            path = f"database.{path.removeprefix(place)[1:]}"
+        elif path.startswith(several) or path == "database.keep":
+            continue
+        found[path] = value
+    return found
+
+
+def _ending(side: str, given: Changes, seed: int) -> str:
     """Returns the suffix of the name of a changed drive."""
-    factors = dict(condition.factors)
+    factors = dict(given)
     labels = []
     cause, level = factors.pop(CAUSE, NO_CAUSE), factors.pop(LEVEL, 0)
     for path, value in factors.items():

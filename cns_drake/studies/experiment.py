@@ -64,6 +64,8 @@ CAUSE = "cause"
 # Factor of experiments with cases: the level of the case.
 LEVEL = "level"
 NO_CAUSE = "none"
+# Field of the database with its drives, each with fields of its own.
+SESSIONS = "sessions"
 _MOST_CONDITIONS = 20_000
 
 Changes = Mapping[str, Any]
@@ -199,7 +201,10 @@ class Experiment(Section):
         both: scenario fields of both drives. A list of values makes the field a
             factor, which varies.
         database: scenario fields of the drive that makes the database. A list
-            of values makes the field a factor.
+            of values makes the field a factor. Its field `sessions` is a list
+            of several drives, each with further fields of its own; `keep` says
+            how many of their places are kept, and `maintain` how their maps
+            are updated.
         query: scenario fields of the drive that makes the queries. A list of
             values makes the field a factor.
         cases: kinds of change by name. Each has fields of one or both drives,
@@ -625,6 +630,9 @@ def _leaves(
             except ValueError as error:
                 raise ValueError(f"{path}: {error}") from None
             continue
+        if name == SESSIONS and _is_of(value, dict):
+            # Each drive's fields can be factors, named by its number.
+            value = {str(k): one for k, one in enumerate(value, start=1)}
         if isinstance(value, dict) and value:
             yield from _leaves(value, place)
             continue
@@ -644,6 +652,15 @@ def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
     kinds = _LISTS.get(name)
     return kinds is not None and all(isinstance(v, kinds) for v in value)
+
+
+def _is_of(value: Any, kind: type) -> bool:
+    """Returns whether a value is a list, and all of its members of a type."""
+    return (
+        isinstance(value, list)
+        and len(value) > 0
+        and all(isinstance(one, kind) for one in value)
+    )
 
 
 def _nested(path: str, value: Any) -> Any:

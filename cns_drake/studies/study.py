@@ -31,6 +31,7 @@ from cns_drake.studies.comparisons import (
 from cns_drake.studies.experiment import (
     CAUSE,
     LEVEL,
+    SESSIONS,
     SIDES,
     Condition,
     Experiment,
@@ -186,7 +187,8 @@ class Study:
     on_note: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
-        self._tasks = made_tasks(self.experiment.tasks, TASKS, self.source)
+        self._conditions = conditions(self.experiment)
+        self._tasks = made_tasks(self._wanted_tasks(), TASKS, self.source)
         with errors_at(f"{self.source}: methods", "--method: "):
             self._variants = self._choose_methods()
         if self.experiment.frozen is not None:
@@ -195,7 +197,6 @@ class Study:
         for chart in self.experiment.charts:
             with errors_at(self.source):
                 check(chart)
-        self._conditions = conditions(self.experiment)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")
 
@@ -265,12 +266,37 @@ class Study:
         drives: dict[str, Scenario] = {}
         for some in found:
             for _, _, compared, _, _ in self._built(some, made=True):
-                for drive in (compared.database, compared.query):
+                for drive in compared.drives:
                     if drives.setdefault(drive.name, drive) != drive:
                         raise InputError(
                             f"{self.source}: two drives are named {drive.name}"
                         )
         return list(drives.values())
+
+    def _wanted_tasks(self) -> Mapping[str, Mapping[str, Any]]:
+        """Returns the experiment's tasks with their settings.
+
+        If a database has several drives, what it costs belongs to the answer.
+
+        Raises:
+            InputError: a task compares two drives, but the database has more.
+        """
+        wanted = self.experiment.tasks
+        if not any(map(_has_several, self._conditions)):
+            return wanted
+        for name in (DrivenMapTask.name, ChangeTask.name):
+            if name in wanted:
+                raise InputError(
+                    f"{self.source}: tasks: {name}: it compares two drives, and"
+                    f" the database has several (database.{SESSIONS})"
+                )
+        if PlaceTask.name in wanted and CostTask.name not in wanted:
+            self.on_note(
+                f"{CostTask.name} is measured, too: what a database of several"
+                " drives costs"
+            )
+            return {**wanted, CostTask.name: {}}
+        return wanted
 
     def _choose_methods(
         self,
@@ -527,7 +553,7 @@ class Study:
 
     def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
         """Returns a pair of drives, which tables show with given fields."""
-        database, asked = map(self._named, (compared.database, compared.query))
+        database, *beside, asked = map(self._named, compared.drives)
         way = database
         if self.experiment.drives == "same-route":
             city = {
@@ -555,6 +581,8 @@ class Study:
             way=way,
             protocol=compared.protocol,
             distractors=compared.distractors,
+            beside=tuple(beside),
+            keep=compared.keep,
             may_repeat=bool(compared.asked or compared.distractors),
         )
 
@@ -603,6 +631,16 @@ class Study:
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
         return base_protocol(fields, self.source)
+
+
+def _has_several(condition: Condition) -> bool:
+    """Returns whether a condition's database can have several drives."""
+    levels = [one for cause in condition.causes for one in cause]
+    for changes in (condition.changes, *levels):
+        given = changes.get("database", {}).get(SESSIONS)
+        if isinstance(given, list | dict) and len(given) > 1:
+            return True
+    return False
 
 
 def _base_name(database: Scenario) -> str:

@@ -34,10 +34,12 @@ from evaluation.alignment.registration import (
     make_surface,
 )
 from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
+from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.localisation.robust import MAX_RANGE, align_robustly
 from evaluation.maps.voxel_maps import VoxelAccumulator
 from evaluation.methods.method import run_module, with_named_faults
+from evaluation.recognition.keeping import kept_places
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
@@ -228,11 +230,24 @@ def make_map(
 
 def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """Yields the cropped scans of which a map is made, each with its X_WS."""
-    frames = sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING).tolist()
+    frames = map_frames(drive).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
         near = within_range(clouds.xyz(scan), MAX_RANGE)
         yield scan[near], drive.X_WS[frame]
+
+
+def map_frames(drive: Drive) -> np.ndarray:
+    """Returns the frames (K,) of a drive of which a map is made.
+
+    Of several drives, those frames are left out that are not to be kept.
+    """
+    if not isinstance(drive, JoinedDrive):
+        return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)
+    frames = drive.sampled(_MAP_SPACING)
+    p_WSs = drive.X_WS[frames, :3, 3]
+    kept = kept_places(p_WSs, drive.drive_of(frames), drive.keep, _MAP_SPACING)
+    return frames[kept]
 
 
 def map_of(

@@ -25,6 +25,7 @@ class QueryCost:
     Attributes:
         places: number of places.
         place_bytes: mean size of a place's pickled descriptor.
+        memory: size of the pickled descriptors of all places [bytes].
         build_ms: CPU time to build the database from descriptors [ms].
         query_ms: median CPU time to compare a query with all places [ms], see
             `query_ms`.
@@ -32,6 +33,7 @@ class QueryCost:
 
     places: int
     place_bytes: float
+    memory: int
     build_ms: float
     query_ms: float
 
@@ -75,6 +77,7 @@ def measure_search(
     return QueryCost(
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
+        memory=sum(sizes),
         build_ms=cpu_ms(method.build_database, places.descriptors),
         query_ms=query_ms(method, places, queries),
     )

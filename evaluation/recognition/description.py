@@ -1,5 +1,7 @@
 """Lets place-recognition methods describe a drive's places and queries."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
@@ -55,6 +57,18 @@ class DescribedScans:
     def p_WSs(self) -> np.ndarray:
         """(K, 3) positions of the sensor [m]."""
         return self.X_WS[:, :3, 3]
+
+    def chosen(self, rows: np.ndarray) -> DescribedScans:
+        """Returns some of the places or queries, by their indices (J,)."""
+        blocks = None if self.blocks is None else self.blocks[rows]
+        return DescribedScans(
+            self.frames[rows],
+            self.stamps_ns[rows],
+            self.X_WS[rows],
+            [self.descriptors[row] for row in rows],
+            [self.clouds[row] for row in rows] if self.clouds else [],
+            blocks,
+        )
 
 
 def joined_scans(

@@ -92,7 +92,9 @@ _METRICS = {
     "tcr_sym": "TCR_sym",
     "miou": "mean IoU",
     "visible_change_added": "visible change minus the baseline's",
-    "query_ms": "time of a query [ms]",
+    "query_time": "time of a query [s]",
+    "build_time": "time to build the database [s]",
+    "memory": "memory of the descriptors [bytes]",
 }
 # The sign of per cent never begins a line.
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"

@@ -51,7 +51,7 @@ _SHIPPED = "shipped"
 # Metrics for which less is better.
 _LESS = re.compile(
     r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
-    r"|lost"
+    r"|lost|memory|\w+_time"
 )
 # Metric -> its index in the result of `resampled_metrics`.
 _RESAMPLED = {"auc": 0, "r1": 1}

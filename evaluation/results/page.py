@@ -47,7 +47,7 @@ _HEADLINES = {
     "localise": ("success_03m_1deg", "success_2m_5deg", "kept"),
     "map": ("miou", "right_structures", "called_structures"),
     "change": ("tcr_sym", "tcr_sym_masked"),
-    "cost": ("query_ms", "build_ms"),
+    "cost": ("query_time", "build_time", "memory"),
 }
 _MOST_COLUMNS = 12
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3", "": "0 99"}

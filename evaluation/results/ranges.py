@@ -60,6 +60,7 @@ _RANGES = (
     (r"no_\w+|just_too_far|other_\w+|too_far|twin|elsewhere", _COUNT),
     (r"changed|lost(_per_km)?|found|(right|called)_structures", _NOT_NEGATIVE),
     (r"hidden|distance|points|place_bytes|bytes_a_place|\w+_ms", _NOT_NEGATIVE),
+    (r"memory|(query|build)_time", _NOT_NEGATIVE),
     (r"translation\w*|rotation\w*|error_of_position_m", _NOT_NEGATIVE),
     (r"difference|a_b|rank_correlation\w*", _SIGNED_SHARE),
     # Change.

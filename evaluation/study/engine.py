@@ -92,15 +92,14 @@ class Engine:
         for name, task in self.tasks.items():
             if tasks is not None and name not in tasks:
                 continue
-            seen: set[tuple[str, str]] = set()
+            seen: set[tuple[object, ...]] = set()
             for one in comparisons:
-                both = one.database.name, one.query.name
-                is_new = not one.may_repeat or both not in seen
+                is_new = not one.may_repeat or one.drives not in seen
                 if (task.asks or is_new) and (
                     parts := task.measure(one, planned)
                 ):
                     one.parts[name] = parts
-                seen.add(both)
+                seen.add(one.drives)
         self.jobs |= planned.jobs
         self._notes |= planned.notes
         self.measured += comparisons

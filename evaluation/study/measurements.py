@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from evaluation.recognition.description import (
     Role,
     joined_scans,
 )
+from evaluation.recognition.keeping import KEEP_ALL, kept_places
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -39,11 +41,14 @@ class Searched(NamedTuple):
         described: the described places.
         drives: name of each place's drive.
         num_here: number of places in the query's own world; they come first.
+        rows: (num_here,) index of each of these among all places of the drives
+            through the query's world.
     """
 
     described: DescribedDrive
     drives: list[str]
     num_here: int
+    rows: np.ndarray
 
 
 # The source of a drive, or the parts of its scans and of its descriptions by
@@ -65,6 +70,7 @@ def shown_overlaps(
     radii: tuple[float, ...],
     beside: tuple[tuple[Part, Part], ...] = (),
     leaves_out_itself: bool = False,
+    keep: str | int = KEEP_ALL,
 ) -> dict[float, np.ndarray]:
     """Returns how much of each query's scan its best match shows.
 
@@ -78,7 +84,7 @@ def shown_overlaps(
         radii: radii of a match [m].
         beside: files with the scans of further drives in the same world, and
             with a method's descriptions of their places.
-        leaves_out_itself: see `Pair`.
+        leaves_out_itself, keep: see `Pair`.
 
     Returns:
         Radius -> (Q,) overlaps; NaN without a match.
@@ -97,9 +103,16 @@ def shown_overlaps(
             for frame in query.queries.frames.tolist()
         ]
     kept += [scan for scans, _ in beside for scan in scans.read()]
-    database = crowded(
-        database, (), 0, [places for _, places in beside]
-    ).described
+    searched = crowded(
+        database,
+        (),
+        0,
+        [places for _, places in beside],
+        keep,
+        protocol.place_spacing,
+    )
+    database = searched.described
+    kept = [kept[row] for row in searched.rows]
     names = [""] * len(kept)
     allowed = _others(query, names) if leaves_out_itself else True
     return {
@@ -129,6 +142,7 @@ def measure_method(
     radii: tuple[float, ...],
     beside: tuple[Part, ...] = (),
     leaves_out_itself: bool = False,
+    keep: str | int = KEEP_ALL,
 ) -> list[PlaceOutcome]:
     """Returns the outcomes of one method, as `measure_places` does.
 
@@ -145,7 +159,7 @@ def measure_method(
         protocol, radii: see `measure_places`.
         beside: files with the method's descriptions of the places of further
             drives in the same world.
-        leaves_out_itself: see `Pair`.
+        leaves_out_itself, keep: see `Pair`.
     """
     # The method comes first, because it registers the type of its
     # descriptions.
@@ -155,7 +169,14 @@ def measure_method(
     shown = {} if overlaps is None else overlaps.read()
     return _compare(
         (choice, method),
-        crowded(mapped, distractors, num_distractors, beside),
+        crowded(
+            mapped,
+            distractors,
+            num_distractors,
+            beside,
+            keep,
+            protocol.place_spacing,
+        ),
         asked,
         (protocol, radii),
         lambda radius, matches: shown.get(radius),
@@ -273,7 +294,7 @@ def _compare(
         leaves_out_itself: see `Pair`.
     """
     choice, method = chosen
-    searched, drives, num_here = database
+    searched, drives, num_here, _ = database
     protocol, radii = asked
     if (
         leaves_out_slow
@@ -353,6 +374,8 @@ def crowded(
     distractors: Sequence[Part],
     num_others: int,
     beside: Sequence[Part] = (),
+    keep: str | int = KEEP_ALL,
+    cell: float = math.inf,
 ) -> Searched:
     """Returns a database to which places of other drives are added.
 
@@ -366,18 +389,26 @@ def crowded(
             same method's descriptions of its places.
         num_others: number of places to append.
         beside: files with the same method's descriptions of further drives in
-            the same world. All of their places come before those of other
-            cities.
+            the same world, from older to newer. All of their places come before
+            those of other cities.
+        keep: which places in this world are kept, see `kept_places`.
+        cell: side of the cells by which places are kept [m].
     """
     known = [database, *(part.read()[1] for part in beside)]
-    num_here = sum(len(one.places.frames) for one in known)
-    most = num_here + num_others
-    worlds = [0] * len(known)
+    here = joined_scans([one.places for one in known], [0] * len(known))
+    lengths = [len(one.places.frames) for one in known]
+    drive_of = np.repeat(np.arange(len(known)), lengths)
+    rows = np.flatnonzero(kept_places(here.p_WSs, drive_of, keep, cell))
+    names = [known[k].name for k in drive_of[rows]]
+    every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
+    most = len(rows) + num_others
     for part in distractors:
-        if sum(len(one.places.frames) for one in known) >= most:
+        if len(names) >= most:
             break
-        known.append(part.read()[1])
-        worlds.append(worlds[-1] + 1)
-    places = joined_scans([one.places for one in known], worlds, most)
-    drives = [one.name for one in known for _ in one.places.frames]
-    return Searched(replace(database, places=places), drives[:most], num_here)
+        other = part.read()[1]
+        every.append(other.places)
+        names += [other.name] * len(other.places.frames)
+    places = joined_scans(every, range(len(every)), most)
+    return Searched(
+        replace(database, places=places), names[:most], len(rows), rows
+    )

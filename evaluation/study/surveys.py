@@ -23,6 +23,7 @@ from cns_drake.base.progress import doing, track
 from evaluation.change.drive_change import Surveyed
 from evaluation.drives import Drive, PlacedDrive, open_drive
 from evaluation.drives.drive_views import RecentScans
+from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import cropped, sample_frames, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import (
@@ -140,6 +141,27 @@ class RecordingSource:
             [drive.name, drive.world_frame, self.lidar, self.columns],
             *map(list, zip(names, file_digests(drive.files), strict=True)),
         ]
+
+
+@dataclass(frozen=True)
+class JoinedSource:
+    """The source of a database of several drives, as one drive.
+
+    Attributes:
+        sources: the sources of the drives, from older to newer.
+        keep: which frames are kept in a map, see
+            `evaluation.recognition.keeping.kept_places`.
+    """
+
+    sources: tuple[DriveSource, ...]
+    keep: str | int
+
+    def __call__(self) -> JoinedDrive:
+        return JoinedDrive(self.sources, self.keep)
+
+    def identity(self) -> list[object]:
+        """Returns the identities of the drives, and what is kept."""
+        return [*(one.identity() for one in self.sources), self.keep]
 
 
 @dataclass(frozen=True)

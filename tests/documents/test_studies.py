@@ -10,7 +10,7 @@ import yaml
 
 from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies import comparisons
+from cns_drake.studies import comparisons, experiment
 from cns_drake.studies.experiment import (
     Experiment,
     conditions,
@@ -73,7 +73,7 @@ def test_what_can_vary_exists():
         section, field = name.split(".")
         annotation = Scenario.model_fields[section].annotation
         assert field in annotation.model_fields, name
-    source = inspect.getsource(comparisons)
+    source = "".join(map(inspect.getsource, (comparisons, experiment)))
     lost = Losses.model_fields.keys()
     assert lost <= set(named)
     for name in set(named) - {*scenario, *lost, "protocol", "crop"}:
@@ -141,6 +141,7 @@ def test_metrics_are_those_of_the_tasks():
     [
         ("docs/studies.md", "name: season-and-age", 8),
         ("docs/studies.md", "about: What do leaves", 7),
+        ("docs/studies.md", "name: how-many-drives", 4),
         ("docs/ladder.md", "about: Do snow", 4),
         ("docs/tutorial.md", "maps: riverside", 3),
     ],

@@ -640,6 +640,11 @@ RECIPES = {
         changes=(("suburbia", "town"),),
         file="winter.yaml",
     ),
+    "sessions": Recipe(
+        "name: how-many-drives",
+        changes=(("suburbia", "town"),),
+        file="how_many_drives.yaml",
+    ),
     "ladder": Recipe(
         ".venv/bin/cns-drake study ladder metropolis",
         # All causes of the ladder take many minutes.

@@ -15,7 +15,7 @@ from evaluation.localisation import estimators, localise, tracking
 from evaluation.localisation.localise import Starts
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.recognition.place_outcome import Number, kept_share
-from evaluation.study.surveys import DriveSource
+from evaluation.study.surveys import DriveSource, JoinedSource
 from evaluation.study.tasks.task import (
     Answered,
     Jobs,
@@ -30,6 +30,8 @@ SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
 _COST = 60.0
+# Expected time to add a further drive to the map [s].
+_MAP_COST = 20.0
 # Scans within this distance make the map of a scan that is localised among
 # the others of its drive [m].
 _AROUND = 30.0
@@ -102,8 +104,13 @@ class LocaliseTask(Task):
             only = pair.database.source, named, texts, starts
             return (jobs.add(part, localise_among_others, only, cost=_COST),)
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
+        drives = pair.database, *pair.beside
+        database = pair.database.source
+        if pair.is_composed:
+            sources = tuple(one.source for one in drives)
+            database = JoinedSource(sources, pair.keep)
         arguments = (
-            pair.database.source,
+            database,
             pair.query.source,
             named,
             texts,
@@ -113,7 +120,8 @@ class LocaliseTask(Task):
             self.settings["odometry_drift"],
             jobs.processes,
         )
-        found = jobs.add(part, measure_localisation, arguments, cost=_COST)
+        cost = _COST + _MAP_COST * len(pair.beside)
+        found = jobs.add(part, measure_localisation, arguments, cost=cost)
         return (found,)
 
     def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:

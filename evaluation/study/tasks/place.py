@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+import math
 from typing import Any
 
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import QueryCost, measure_search
+from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.place_outcome import (
     Number,
     PlaceOutcome,
@@ -47,15 +49,13 @@ class PoseTask(Task):
         radii = tuple(sorted(jobs.radii[pair.key]))
         protocol = replace(pair.protocol, radius=radii[0])
         database, query = (
-            jobs.described(drive, role, pair.protocol, needs)
+            jobs.described(
+                drive, role, pair.protocol, needs, kept=pair.is_composed
+            )
             for drive, role in pair.roles
         )
         others = jobs.elsewhere(pair, needs)
-        near = [
-            jobs.described(one, "places", pair.protocol, needs, kept=True)
-            for one in pair.beside
-        ]
-        beside = [one for one in near if isinstance(one, tuple)]
+        beside = jobs.beside(pair, needs)
         # The task `place` reads the same files.
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
             part = jobs.files.part("place", pair.key)
@@ -85,6 +85,7 @@ class PoseTask(Task):
                 radii,
                 tuple((parts[0], parts[1]) for parts in beside),
                 pair.leaves_out_itself,
+                pair.keep,
             ),
         )
         overlaps = (shown,) if jobs.shows_overlaps else ()
@@ -103,6 +104,7 @@ class PoseTask(Task):
                     radii,
                     tuple(parts[k] for parts in beside),
                     pair.leaves_out_itself,
+                    pair.keep,
                 ),
             )
             for k, choice in enumerate(jobs.methods, start=1)
@@ -140,7 +142,7 @@ class PlaceTask(PoseTask):
 
 
 class CostTask(Task):
-    """Measures the CPU time to compare a query, and to build a database."""
+    """Measures what a database costs: its memory, and the time of a query."""
 
     name = "cost"
     asks = True
@@ -159,14 +161,20 @@ class CostTask(Task):
             jobs.elsewhere(pair, needs),
             pair.distractors,
             jobs.methods,
+            tuple(parts[1:] for parts in jobs.beside(pair, needs)),
+            pair.keep,
+            pair.protocol.place_spacing,
         )
         part = jobs.files.part("cost", pair.key)
         return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, cost in found.items():
-            for name in ("build_ms", "query_ms"):
-                value = getattr(cost, name)
+            for name, value in (
+                ("build_time", 1e-3 * cost.build_ms),
+                ("query_time", 1e-3 * cost.query_ms),
+                ("memory", float(cost.memory)),
+            ):
                 yield Number(method, False, name, value, n=cost.places)
 
 
@@ -177,6 +185,9 @@ def measure_costs(
     distractors: tuple[tuple[Part, ...], ...],
     num_distractors: int,
     methods: tuple[MethodChoice, ...],
+    beside: tuple[tuple[Part, ...], ...] = (),
+    keep: str | int = KEEP_ALL,
+    cell: float = math.inf,
 ) -> dict[str, QueryCost]:
     """Returns the cost of searching a database: key of a method -> cost.
 
@@ -189,6 +200,10 @@ def measure_costs(
         num_distractors: number of places of the drives through other cities
             that are added to the database.
         methods: methods to measure.
+        beside: for each further drive in the same world, files with the
+            descriptions of its places, one file for each method.
+        keep, cell: which places in this world are kept, see
+            `evaluation.recognition.keeping.kept_places`.
     """
     found = {}
     for k, choice in enumerate(
@@ -197,9 +212,12 @@ def measure_costs(
         method = choice.make()
         mapped = database[k].read()[1]
         others = [parts[k] for parts in distractors]
-        places = crowded(mapped, others, num_distractors).described.places
+        near = [parts[k] for parts in beside]
+        searched = crowded(mapped, others, num_distractors, near, keep, cell)
         asked = query[k].read()[1].queries
-        found[choice.key] = measure_search(method, places, asked)
+        found[choice.key] = measure_search(
+            method, searched.described.places, asked
+        )
     return found
 
 

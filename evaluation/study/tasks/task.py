@@ -13,6 +13,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.value_lists import repeated
 from evaluation.recognition.description import Role
+from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import FROZEN_REDRAW
@@ -97,7 +98,9 @@ class Pair:
         distractors: number of places of other cities that are added to the
             database.
         beside: further drives in the same world, whose places are added to the
-            database.
+            database, from older to newer.
+        keep: which places of these drives and of the database drive are kept,
+            see `evaluation.recognition.keeping.kept_places`.
         leaves_out_itself: whether a drive is compared with itself, and each
             scan with all scans but itself.
         may_repeat: whether the pair can repeat drives of another pair,
@@ -126,6 +129,7 @@ class Pair:
     protocol: RetrievalProtocol
     distractors: int = 0
     beside: tuple[NamedDrive, ...] = ()
+    keep: str | int = KEEP_ALL
     leaves_out_itself: bool = False
     may_repeat: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -152,6 +156,17 @@ class Pair:
     def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
         """Both drives, each with its role: `places` or `queries`."""
         return (self.database, "places"), (self.query, "queries")
+
+    @property
+    def is_composed(self) -> bool:
+        """Whether the database is more, or less, than the places of a drive."""
+        return bool(self.beside) or self.keep != KEEP_ALL
+
+    @property
+    def drives(self) -> tuple[object, ...]:
+        """Names of the drives of database and query, and what is kept."""
+        database = [one.name for one in (self.database, *self.beside)]
+        return (*database, self.keep, self.query.name)
 
 
 @dataclass
@@ -265,6 +280,27 @@ class Jobs:
         cost = _MAP_COST if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
         return self.add(part, map_city, arguments, drive.needs, cost)
+
+    def beside(self, pair: Pair, needs: list[str]) -> list[tuple[Part, ...]]:
+        """Returns the files of a pair's further drives in the same world.
+
+        Args:
+            pair: the pair.
+            needs: list to which the names of the jobs are appended that write
+                the files.
+
+        Returns:
+            For each drive, the file with the scans of its places, and one file
+            per method with their descriptions.
+        """
+        found = []
+        for drive in pair.beside:
+            parts = self.described(
+                drive, "places", pair.protocol, needs, kept=True
+            )
+            assert isinstance(parts, tuple)
+            found.append(parts)
+        return found
 
     def elsewhere(
         self, pair: Pair, needs: list[str]

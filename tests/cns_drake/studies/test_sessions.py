@@ -1,0 +1,316 @@
+"""Several drives in a database: which they are, their order, and their rows."""
+
+from helpers import studies
+from helpers.small_map import write_town
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.studies import study as study_module
+from cns_drake.studies.comparisons import PairMaker
+from cns_drake.studies.experiment import (
+    Experiment,
+    conditions,
+    load_experiment,
+)
+from cns_drake.studies.study import Study, run_study
+from evaluation.results.table import Results
+from evaluation.study import engine
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a map with two drives of 40 frames along one route."""
+    routes = {"01": "metropolis_04", "04": "metropolis_04"}
+    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 40)
+
+
+def experiment(**fields):
+    return Experiment.model_validate({"name": "mine", **fields})
+
+
+def compared(town, **fields):
+    """What is compared in each condition, aged cities being only named."""
+    query = load_scenario(town / "sequence_04.yaml")
+
+    def age(drive, years, rates, seed):
+        return f"/aged_{rates}", f"{years:02d}"
+
+    pair = PairMaker(
+        query.replaced(name=f"{query.name}_database"),
+        query,
+        True,
+        "mine.yaml",
+        age,
+        lambda drive, seed: ("/redrawn", str(seed)),
+        lambda text: None,
+    )
+    wanted = experiment(**fields)
+    return [pair.build(one, 1) for one in conditions(wanted)]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"years": 10},
+        {"viewpoint": "lane", "transient": {"snow": 0.3}},
+        {"lidar": "os1-64", "years": 3, "rates": 2.0},
+        {},
+    ],
+)
+def test_one_session_is_the_database_itself(town, fields):
+    shared = {n: fields[n] for n in ("rates",) if n in fields}
+    own = {n: one for n, one in fields.items() if n not in shared}
+    (plain,) = compared(town, database=fields)
+    (one,) = compared(town, database={**shared, "sessions": [own]})
+    assert one == plain
+    assert one.fingerprint() == plain.fingerprint()
+
+
+def test_fields_of_the_database_are_those_of_each_session(town):
+    (found,) = compared(
+        town,
+        database={
+            "transient": {"snow": 0.5},
+            "sessions": [{"transient": {"leaves": 0.0}}, {"viewpoint": "lane"}],
+        },
+    )
+    seasons = [(o.transient.snow, o.transient.leaves) for o in found.drives]
+    assert seasons == [(0.5, 0.0), (0.5, 1.0), (0.0, 1.0)]
+
+
+def test_each_session_sees_the_city_of_its_year(town):
+    """Of 20 years, 15 have passed at the second drive, 20 at the query."""
+    (found,) = compared(
+        town,
+        database={"sessions": [{"years": 5}, {"years": 20}, {"years": 0}]},
+    )
+    places = [(one.map, one.stage) for one in found.drives]
+    ages = [("/aged_1.0", "15"), *[("/aged_1.0", "20")] * 2]
+    # Sessions are sorted from older to newer.
+    assert places == [(found.database.map, "04"), *ages]
+    assert "aged" not in found.database.map
+
+
+def test_years_of_the_query_move_all_drives(town):
+    """The query is 2 years old, so the oldest of 10 years is 8 before it."""
+    (found,) = compared(
+        town,
+        database={"sessions": [{"years": 10}, {"years": 2}]},
+        query={"years": 2},
+    )
+    assert [one.stage for one in found.drives] == ["02", "10", "10"]
+
+
+def test_older_stages_come_first(town):
+    (found,) = compared(
+        town,
+        database={"sessions": [{"stage": "04"}, {"stage": "01"}]},
+    )
+    assert [one.stage for one in found.drives] == ["01", "04", "04"]
+
+
+def test_sessions_keep_and_their_fields_are_factors(town):
+    wanted = experiment(
+        database={
+            "sessions": [{"years": [5, 10]}, {"years": 0}],
+            "keep": ["all", 1],
+        }
+    )
+    assert [one.factors for one in conditions(wanted)] == [
+        {"database.sessions.1.years": years, "database.keep": keep}
+        for years in (5, 10)
+        for keep in ("all", 1)
+    ]
+    sets = [[{"years": 5}], [{"years": 5}, {"years": 0}]]
+    wanted = experiment(database={"sessions": sets})
+    assert [one.factors for one in conditions(wanted)] == [
+        {"database.sessions": text}
+        for text in ("[{years: 5}]", "[{years: 5},{years: 0}]")
+    ]
+
+
+def test_conditions_share_the_drives_that_are_the_same(town):
+    found = compared(
+        town,
+        database={
+            "sessions": [
+                [{"viewpoint": "near"}],
+                [{"viewpoint": "near"}, {"viewpoint": "lane"}],
+                [{"viewpoint": "lane"}],
+            ]
+        },
+    )
+    near, both, lane = found
+    assert both.drives[:2] == (near.database, lane.database)
+    assert len({one.fingerprint() for one in found}) == 3
+
+
+FAULTS = [
+    ({"sessions": []}, r"database\.sessions: a list without a value"),
+    ({"sessions": [[]]}, r"database\.sessions: a list without a value"),
+    ({"sessions": 2}, r"database\.sessions: not a list of one drive"),
+    ({"sessions": {"old": {}}}, r"database\.sessions: not a list of one"),
+    ({"sessions": [[{}, 3]]}, r"database\.sessions\.2: 3 is no mapping"),
+    (
+        {"sessions": [{"map": "riverside"}, {}]},
+        r"database\.sessions\.1\.map: another map has another frame",
+    ),
+    (
+        {"sessions": [{}, {"world": "x.sdf"}]},
+        r"database\.sessions\.2\.world: another map has another frame",
+    ),
+    (
+        {"sessions": [{"years": 3}, {"years": 3}]},
+        r"database\.sessions\.2: the same drive as database\.sessions\.1",
+    ),
+    (
+        {"sessions": [{}, {"years": 2}, {"viewpoint": "near"}]},
+        r"database\.sessions\.3: the same drive as database\.sessions\.1",
+    ),
+    (
+        {"sessions": [{"years": 3}, {"distractors": 5}]},
+        r"database\.sessions\.2\.distractors: all drives share it",
+    ),
+    ({"sessions": [{"keep": 1}]}, r"database\.sessions\.1\.keep: all drives"),
+    ({"sessions": [{"rates": 2}]}, r"database\.sessions\.1\.rates: all dri"),
+    ({"sessions": [{"years": 201}]}, r"database\.sessions\.1\.years: 201 is"),
+    ({"sessions": [{"years": True}]}, r"database\.sessions\.1\.years: True"),
+    (
+        {"sessions": [{"hide_sector": 30}]},
+        r"database\.sessions\.1\.hide_sector: it is a field of query",
+    ),
+    ({"sessions": [{"snow": 1}]}, r"database\.sessions\.1: snow: "),
+    ({"keep": 0}, r"database\.keep: 0 is neither all, latest nor a whole"),
+    ({"keep": True}, r"database\.keep: True is neither"),
+    ({"keep": "newest"}, r"database\.keep: 'newest' is neither"),
+]
+
+
+@pytest.mark.parametrize(("database", "fault"), FAULTS)
+def test_faults_are_one_line_with_file_and_field(town, database, fault):
+    with pytest.raises((InputError, ValueError), match=fault) as error:
+        compared(town, database=database)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"database": {"sessions": [{"years": 9}, {"years": 4}]}, "years": 5},
+        {"database": {"sessions": [{"years": 0}]}, "years": 1},
+        {"database": {"sessions": [{}, {"stage": "04"}]}, "stage": "01"},
+    ],
+)
+def test_no_session_is_later_than_the_query(town, fields):
+    query = {n: one for n, one in fields.items() if n != "database"}
+    with pytest.raises(InputError, match="this drive is later than the query"):
+        compared(town, database=fields["database"], query=query)
+
+
+@pytest.mark.parametrize("side", ["both", "query"])
+def test_sessions_are_those_of_the_database(town, side):
+    with pytest.raises(InputError, match=r"query\.\w+: it is a field of data"):
+        compared(town, **{side: {"sessions": [{"years": 2}]}})
+
+
+@pytest.mark.parametrize("task", ["map", "change"])
+def test_tasks_on_two_drives_refuse_more(town, task):
+    wanted = experiment(
+        tasks=[task], database={"sessions": [{"years": 2}, {"years": 1}]}
+    )
+    with pytest.raises(InputError, match=f"tasks: {task}: it compares two"):
+        Study(wanted, town, "mine.yaml", Cluster())
+
+
+@pytest.fixture
+def jobs_done(monkeypatch):
+    """The names of the jobs of each run, which run in this process."""
+    runs = []
+    monkeypatch.setattr(
+        engine,
+        "run_jobs",
+        lambda jobs, cluster, unit="": runs.append(studies.do(jobs)),
+    )
+    monkeypatch.setattr(
+        study_module, "write_page", lambda *given, **options: given[2]
+    )
+    return runs
+
+
+SIMULATED = {
+    "methods": ["solid"],
+    "protocol": {"query_spacing": 5.0, "place_spacing": 2.0},
+}
+
+
+def measure(town, output, **fields):
+    wanted = experiment(maps=[str(town)], **SIMULATED, **fields)
+    run_study(wanted, output, Cluster())
+    return Results.read(output / "results.csv")
+
+
+@pytest.mark.slow
+def test_rows_of_one_session_are_those_without_sessions(
+    town, tmp_path, jobs_done
+):
+    """Bit for bit, in both tables."""
+    tables = []
+    for name, database in (
+        ("plain", {"viewpoint": "lane"}),
+        ("one", {"sessions": [{"viewpoint": "lane"}], "keep": "all"}),
+    ):
+        measure(
+            town, tmp_path / name, database=database, tasks=["place", "pose"]
+        )
+        tables.append(
+            [
+                (tmp_path / name / file).read_bytes()
+                for file in ("results.csv", "queries.csv")
+            ]
+        )
+    assert tables[0] == tables[1]
+
+
+@pytest.mark.slow
+def test_places_memory_and_answers_of_several_sessions(
+    town, tmp_path, jobs_done
+):
+    near, lane = {"viewpoint": "near"}, {"viewpoint": "lane"}
+    results = measure(
+        town,
+        tmp_path,
+        database={"sessions": [[near], [lane], [near, lane]]},
+        tasks=["place", "localise"],
+    )
+    (jobs,) = jobs_done
+    # Each drive is described once, for all conditions.
+    described = [one for one in jobs if one.startswith("describe ")]
+    assert len(described) == 3
+
+    def of(metric, task, method="solid"):
+        rows = results.where(metric=metric, task=task, method=method).rows
+        return [row.value for row in rows if not row.gate]
+
+    places = of("places", "place")
+    assert places[2] == places[0] + places[1]
+    memory = of("memory", "cost")
+    assert memory[2] == memory[0] + memory[1] > 0
+    assert min(of("query_time", "cost")) > 0.0
+    assert all(0.0 <= one <= 1.0 for one in of("r1", "place"))
+    # A map with more drives localises each query near one of them.
+    assert len(of("success_03m_1deg", "localise", "icp")) == 3
+
+
+def test_a_file_with_sessions_is_read(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        "database:\n  sessions: [{years: 10}, {years: 5}]\n  keep: [all, 1]\n"
+        "quick:\n  database: {sessions: [{years: 10}], keep: [all]}\n"
+    )
+    assert len(conditions(load_experiment(path))) == 2
+    quick = load_experiment(path, quick=True)
+    (one,) = conditions(quick)
+    assert one.changes["database"]["sessions"] == {"1": {"years": 10}}
+    assert load_experiment(path, ["database.keep=latest"])
