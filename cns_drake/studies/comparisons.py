@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 import math
 from pathlib import Path
 import re
@@ -39,6 +40,7 @@ from cns_drake.studies.experiment import (
     merged,
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
+from evaluation.map_update.upkeep import MAINTAINERS, NOT_MAINTAINED
 from evaluation.recognition.keeping import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import LAST, OWN
@@ -47,7 +49,7 @@ from evaluation.results.table import LAST, OWN
 LOSS_FIELDS = tuple(Losses.model_fields)
 # Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
-_DATABASE_FIELDS = ("distractors", "lateral", SESSIONS, "keep")
+_DATABASE_FIELDS = ("distractors", "lateral", SESSIONS, "keep", "maintain")
 # Fields that all drives of a database share.
 _SHARED_FIELDS = (*_DATABASE_FIELDS, "rates")
 # Fields that put a drive into another frame of reference.
@@ -109,6 +111,8 @@ class Compared:
         beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
             `evaluation.recognition.keeping.kept_places`.
+        maintain: what updates the maps of older drives by newer ones, see
+            `evaluation.map_update.upkeep`.
     """
 
     database: Scenario
@@ -118,6 +122,7 @@ class Compared:
     asked: Changes = field(default_factory=dict)
     beside: tuple[Scenario, ...] = ()
     keep: str | int = KEEP_ALL
+    maintain: str = NOT_MAINTAINED
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
@@ -132,6 +137,7 @@ class Compared:
         several = {
             "beside": [one.model_dump(mode="json") for one in self.beside],
             "keep": self.keep,
+            "maintain": self.maintain,
         }
         is_one = not self.beside and self.keep == KEEP_ALL
         return fingerprint(
@@ -283,7 +289,31 @@ class PairMaker:
             changed,
             tuple(database[1:]),
             keep,
+            self._maintained(sides["database"], len(database)),
         )
+
+    def _maintained(self, database: Changes, number: int) -> str:
+        """Returns what updates the maps of a database of some drives.
+
+        Raises:
+            InputError: it is unknown, or there is nothing to update.
+        """
+        value = database.get("maintain", NOT_MAINTAINED)
+        where = f"{self.source}: database.maintain"
+        if value not in (NOT_MAINTAINED, *MAINTAINERS):
+            known = ", ".join((NOT_MAINTAINED, *MAINTAINERS))
+            raise InputError(f"{where}: {value!r} is none of {known}")
+        if value != NOT_MAINTAINED and number == 1:
+            raise InputError(
+                f"{where}: {value}: no later drive updates the map of a single"
+                " one; give several sessions"
+            )
+        if value == "m3c2" and find_spec("py4dgeo") is None:
+            raise InputError(
+                f"{where}: m3c2 needs the extra map-update (pip install"
+                " 'cns-drake[map-update]')"
+            )
+        return str(value)
 
     def _sessions(self, database: Changes) -> dict[str, dict[str, Any]]:
         """Returns place in the file -> changes, for each drive of a database.
@@ -292,7 +322,8 @@ class PairMaker:
         """
         shared = dict(database)
         given = shared.pop(SESSIONS, None)
-        shared.pop("keep", None)
+        for name in ("keep", "maintain"):
+            shared.pop(name, None)
         if SESSIONS not in database:
             return {"database": shared}
         where = f"{self.source}: database.{SESSIONS}"
@@ -700,7 +731,10 @@ def _factors_of(place: str, factors: Changes) -> dict[str, Any]:
     for path, value in factors.items():
         if path.startswith(f"{place}."):
             path = f"database.{path.removeprefix(place)[1:]}"
-        elif path.startswith(several) or path == "database.keep":
+        elif path.startswith(several) or path in (
+            "database.keep",
+            "database.maintain",
+        ):
             continue
         found[path] = value
     return found

@@ -203,8 +203,8 @@ class Experiment(Section):
         database: scenario fields of the drive that makes the database. A list
             of values makes the field a factor. Its field `sessions` is a list
             of several drives, each with further fields of its own; `keep` says
-            how many of their places are kept, and `maintain` how their maps
-            are updated.
+            how many of their places are kept, and `maintain` what updates
+            their maps.
         query: scenario fields of the drive that makes the queries. A list of
             values makes the field a factor.
         cases: kinds of change by name. Each has fields of one or both drives,

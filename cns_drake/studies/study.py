@@ -10,6 +10,7 @@ from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.running import Job
 from cns_drake.base.listing import listed, natural_key
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -47,8 +48,10 @@ from cns_drake.studies.made_maps import (
     made_map_step,
 )
 from cns_drake.studies.map_task import DrivenMapTask
+from cns_drake.studies.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import make_maps, redraw_frozen
+from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts import check
@@ -72,6 +75,7 @@ from evaluation.study.collection import (
     group_cities,
 )
 from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.parts import MakePart, StudyFiles
 from evaluation.study.recorded import (
     ExtractionJobs,
     RecordedCondition,
@@ -80,7 +84,13 @@ from evaluation.study.recorded import (
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
+from evaluation.study.tasks.task import (
+    Jobs,
+    NamedDrive,
+    Pair,
+    Task,
+    job_name,
+)
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
@@ -93,6 +103,8 @@ TASKS: Mapping[str, type[Task]] = {
         CostTask,
     )
 }
+# Expected time to update a map by one drive [s].
+_UPKEEP_COST = 40.0
 # Tables that earlier versions wrote.
 _FORMER = (
     "ladder.csv",
@@ -199,6 +211,7 @@ class Study:
                 check(chart)
         self._protocol = self._protocol_of(self._conditions[0])
         self._made = MadeMaps(self.output / "cities")
+        self._upkeep: dict[str, Job] = {}
 
     def run(self, maps: Sequence[str] = ()) -> Path:
         """Measures all conditions; returns the path of the study's page.
@@ -453,6 +466,7 @@ class Study:
             raise InputError(
                 f"{self.source}: no condition that can be measured"
             )
+        engine.jobs = {**self._upkeep, **engine.jobs}
         if self.experiment.frozen is not None:
             check_frozen(self.experiment.frozen, prints)
         return engine
@@ -553,7 +567,8 @@ class Study:
 
     def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
         """Returns a pair of drives, which tables show with given fields."""
-        database, *beside, asked = map(self._named, compared.drives)
+        *drives, asked = map(self._named, compared.drives)
+        database, *beside = self._maintained(drives, compared.maintain)
         way = database
         if self.experiment.drives == "same-route":
             city = {
@@ -585,6 +600,33 @@ class Study:
             keep=compared.keep,
             may_repeat=bool(compared.asked or compared.distractors),
         )
+
+    def _maintained(
+        self, drives: Sequence[NamedDrive], maintain: str
+    ) -> Sequence[NamedDrive]:
+        """Returns drives whose maps are updated by later ones, with its job."""
+        if maintain == NOT_MAINTAINED:
+            return drives
+        sources = tuple(one.source for one in drives)
+        content = fingerprint({"drives": [one.name for one in drives]})[:8]
+        part = StudyFiles(self.output).part(
+            "upkeep", drives[0].name, f"{content} {maintain}"
+        )
+        job = Job(
+            job_name(part),
+            MakePart(part, update_maps, (sources, maintain)),
+            tuple(need for one in drives for need in one.needs),
+            _UPKEEP_COST * len(drives),
+        )
+        self._upkeep[job.name] = job
+        return [
+            NamedDrive(
+                f"{one.name}_{maintain}_{content}",
+                UpkeptSource(sources, number, maintain, part),
+                (job.name,),
+            )
+            for number, one in enumerate(drives)
+        ]
 
     def _recorded(self, city: City) -> Iterator[Pair]:
         """Yields the pairs of recordings; only their stage can vary."""

@@ -117,6 +117,24 @@ class Session:
         return scan[np.isfinite(scan).all(axis=1)]
 
 
+def cell_keys(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a number for each cell of a grid.
+
+    Args:
+        cells: (N, 3) numbers of cells along x, y and z.
+
+    Returns:
+        (M,) int64 numbers, which sort like the cells; and which cells have one,
+        (N,) bool. Cells that are not finite, or beyond the range of 21 bits for
+        each axis, have none.
+    """
+    with np.errstate(invalid="ignore"):
+        is_near = (cells >= 0) & (cells < 1 << _BITS)
+    inside = np.asarray(is_near.all(axis=1))
+    x, y, z = cells[inside].astype(np.int64).T
+    return (x << (2 * _BITS) | y << _BITS) | z, inside
+
+
 class MapBuilder:
     """Merges scans into a map with one point in each cell of 0.1 m.
 
@@ -146,12 +164,7 @@ class MapBuilder:
             if name in (scan.dtype.names or ()):
                 points[name] = scan[name]
         cells = np.floor(p_W / THINNED) - self._origin
-        with np.errstate(invalid="ignore"):
-            inside = ((cells >= 0) & (cells < 1 << _BITS)).all(axis=1)
-        numbers = cells[inside].astype(np.int64)
-        keys = (
-            numbers[:, 0] << (2 * _BITS) | numbers[:, 1] << _BITS
-        ) | numbers[:, 2]
+        keys, inside = cell_keys(cells)
         keys, first = np.unique(keys, return_index=True)
         is_new = np.ones(len(keys), bool)
         for part in self._parts:

@@ -57,7 +57,7 @@ def kept_places(
     cells = np.floor(p_WPs[:, :2] / cell)
     _, cell_of = np.unique(cells, axis=0, return_inverse=True)
     cell_of = cell_of.ravel()
-    if keep == KEEP_LATEST:
+    if isinstance(keep, str):
         latest = np.full(cell_of.max() + 1, -1)
         np.maximum.at(latest, cell_of, drives)
         return drives == latest[cell_of]

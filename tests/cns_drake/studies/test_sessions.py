@@ -185,6 +185,16 @@ FAULTS = [
     ({"keep": 0}, r"database\.keep: 0 is neither all, latest nor a whole"),
     ({"keep": True}, r"database\.keep: True is neither"),
     ({"keep": "newest"}, r"database\.keep: 'newest' is neither"),
+    (
+        {"sessions": [{}, {"years": 2}], "maintain": "magic"},
+        r"database\.maintain: 'magic' is none of none, free-space, distance",
+    ),
+    (
+        {"sessions": [{"years": 2}], "maintain": "truth"},
+        r"database\.maintain: truth: no later drive updates the map of a",
+    ),
+    ({"maintain": "distance"}, r"database\.maintain: distance: no later"),
+    ({"sessions": [{"maintain": "none"}, {}]}, r"1\.maintain: all drives"),
 ]
 
 
@@ -314,3 +324,28 @@ def test_a_file_with_sessions_is_read(tmp_path):
     (one,) = conditions(quick)
     assert one.changes["database"]["sessions"] == {"1": {"years": 10}}
     assert load_experiment(path, ["database.keep=latest"])
+
+
+@pytest.mark.slow
+def test_maps_are_maintained(town, tmp_path, jobs_done):
+    """Cars park elsewhere on the second day, as they do at the query."""
+    days = [{"viewpoint": "near"}, {"viewpoint": "lane"}]
+    days[1]["transient"] = {"parked_cars": 1.0}
+    fields = {
+        "database": {
+            "sessions": days,
+            "maintain": ["none", "distance", "truth"],
+        },
+        "query": {"transient": {"parked_cars": 1.0}},
+    }
+    results = measure(town, tmp_path, **fields)
+    (jobs,) = jobs_done
+    upkeep = [one for one in jobs if one.startswith("upkeep ")]
+    assert len(upkeep) == 2
+    rows = results.where(metric="places", task="place", gate=False).rows
+    # No place is added or lost.
+    assert len(rows) == 3
+    assert len({row.value for row in rows}) == 1
+    # A second run has nothing to do.
+    measure(town, tmp_path, **fields)
+    assert jobs_done[1] == []
