@@ -20,6 +20,7 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import draw_route
 from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.provenance import combined_digest, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
@@ -807,6 +808,29 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
         ): row["drives"]
         for line, row in read_records(path, _FROZEN)
     }
+
+
+def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
+    """Returns a hash of two drives and of the cities that they lead through.
+
+    Args:
+        compared: the drives.
+        worlds: digests of the files of worlds that are known already, to which
+            those of these drives are added.
+
+    Raises:
+        InputError: a file of a world cannot be read.
+    """
+    for drive in (compared.database, compared.query):
+        if drive.world_file not in worlds:
+            worlds[drive.world_file] = combined_digest(digest_inputs(drive))
+    both = compared.database, compared.query
+    return fingerprint(
+        {
+            "drives": compared.fingerprint(),
+            "worlds": [worlds[drive.world_file] for drive in both],
+        }
+    )
 
 
 def check_frozen(

@@ -28,6 +28,7 @@ from cns_drake.studies.comparisons import (
     beside,
     check_frozen,
     frozen_drives,
+    frozen_print,
 )
 from cns_drake.studies.experiment import (
     CAUSE,
@@ -446,15 +447,18 @@ class Study:
             self.on_note,
         )
         prints: dict[tuple[str, int], list[str]] = {}
+        worlds: dict[Path, str] = {}
         for some in drives:
             found: list[Pair] = []
             if some.city is not None:
                 found += self._recorded(some.city)
             else:
-                for one, drives_digest in self._simulated(some):
+                for one, compared in self._simulated(some):
                     found.append(one)
-                    place = one.map_name, one.factors.get(LEVEL, 0)
-                    prints.setdefault(place, []).append(drives_digest)
+                    if self.experiment.frozen is not None:
+                        place = one.map_name, one.factors.get(LEVEL, 0)
+                        drawn = prints.setdefault(place, [])
+                        drawn.append(frozen_print(compared, worlds))
             if not found:
                 self.on_note(f"{some.map_name}: no two drives to compare")
             jobs: Callable[..., Jobs] = Jobs
@@ -506,11 +510,11 @@ class Study:
 
     def _simulated(
         self, some: _Drives, *, made: bool = True
-    ) -> Iterator[tuple[Pair, str]]:
+    ) -> Iterator[tuple[Pair, Compared]]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        Each item is a comparison and the fingerprint of its drives. If `made`
-        is false, the maps that conditions need are only noted.
+        Each item is a pair and its changed drives. If `made` is false, the maps
+        that conditions need are only noted.
         """
         for names, query, compared, condition, seed in self._built(
             some, made=made
@@ -526,7 +530,7 @@ class Study:
                     is_baseline=condition.is_baseline,
                     stated=self._protocol_of(condition),
                 ),
-                compared.fingerprint(),
+                compared,
             )
 
     def _built(

@@ -3,15 +3,23 @@
 import csv
 import itertools
 
+from helpers.small_map import scenario_values, write_small_map
 import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import worlds_folder
-from cns_drake.studies.comparisons import check_frozen, frozen_drives
+from cns_drake.studies.comparisons import (
+    Compared,
+    check_frozen,
+    frozen_drives,
+    frozen_print,
+)
 from cns_drake.studies.experiment import load_experiment
 from cns_drake.studies.study import Study
+from evaluation.recognition.protocol import RECORDED_PROTOCOL
 
 TABLE = "levels.csv"
 
@@ -39,14 +47,16 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     assert frozen_drives(TABLE) == frozen
     found = {}
     study, maps = planned(tmp_path)
-    for one, drives in itertools.chain(*map(study._simulated, maps)):
+    worlds = {}
+    for one, compared in itertools.chain(*map(study._simulated, maps)):
         key = one.map_name, one.factors["level"]
-        found.setdefault(key, []).append(drives)
+        found.setdefault(key, []).append(frozen_print(compared, worlds))
     assert frozen == {
         key: fingerprint({"drives": prints}) for key, prints in found.items()
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -64,6 +74,20 @@ def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
     with pytest.raises(InputError, match=rf"{TABLE}: level \d of suburbia: "):
         planned(tmp_path, change, "maps=[suburbia]")
     planned(tmp_path, change, "maps=[suburbia]", "frozen=null")
+
+
+def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
+    values = scenario_values(write_small_map(tmp_path / "small"))
+    drive = make_scenario(values, "test")
+    compared = Compared(drive, drive, RECORDED_PROTOCOL)
+    before = frozen_print(compared, {})
+    assert frozen_print(compared, {}) == before
+    known = compared.fingerprint()
+    world = drive.world_file
+    world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
+    assert frozen_print(compared, {}) != before
+    # The drives alone do not show it.
+    assert compared.fingerprint() == known
 
 
 def test_maps_of_ones_own_are_not_frozen():
