@@ -208,8 +208,9 @@ def import_city(
             says, or right if the file does not say.
         grow: Add a first stage in which a random sample of the buildings, of
             this share, is missing or lower. A number from 0.01 to 0.9; by
-            default 0.3. With --years, --plain or an OpenDRIVE file, no such
-            stage is added, and --grow is an error.
+            default 0.3. With --years or --plain, no such stage is added, and
+            --grow is an error. In the town along an OpenDRIVE file, the
+            buildings in the east are missing, by default a share of 0.35.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Buildings along the roads of an OpenDRIVE
             file are added nevertheless.

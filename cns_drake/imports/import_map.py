@@ -2,11 +2,9 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 import math
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
@@ -20,10 +18,10 @@ from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.ground import Ground, bottom_of, ground_of
+from cns_drake.imports.ground import bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
-from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
+from cns_drake.imports.options import ImportOptions, ImportReport
 from cns_drake.imports.staged_city import grow, stage_city
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
@@ -66,7 +64,7 @@ def import_city(
     own = None if options.along is None else [drive_along(options.along)]
     doing(f"reading {source}")
     if source.suffix == ".xodr":
-        return _import_roads(source, output, options, finish)
+        return _import_roads(source, output, options, own, finish)
     city = _read(source, options)
     staged = stage_city(source, city, options)
     changes = None
@@ -84,7 +82,7 @@ def import_city(
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
-    drives = _lifted(drives, ground, city.faults)
+    drives = search.lifted(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None
     added: list[Imported] = []
@@ -152,17 +150,14 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
         InputError: naming the option that cannot be used.
     """
     if source.suffix == ".xodr":
-        for option, value, why in (
-            ("--years", options.years, "without any"),
-            ("--lod", options.lod is not None, "without any"),
-            ("--along", options.along, "taken whole"),
-            ("--within", options.within is not None, "taken whole"),
-            ("--grow", options.grow is not None, "which has two stages"),
+        for option, value in (
+            ("--years", options.years),
+            ("--lod", options.lod is not None),
         ):
             if value:
                 raise InputError(
-                    f"{option}: {source} is a road network, {why}; leave the"
-                    " option out"
+                    f"{option}: {source} is a road network, without any; leave"
+                    " the option out"
                 )
     if options.grow is not None and options.years:
         raise InputError(
@@ -177,12 +172,13 @@ def _import_roads(
     source: Path,
     output: Path,
     options: ImportOptions,
+    own: Sequence[WaypointDrive] | None,
     finish: Finish,
 ) -> ImportReport:
     with uninterrupted():  # This imports the whole city generator.
         from cns_drake.imports.opendrive.town import build_town, write_town
 
-    town = build_town(source, options.seed, options.dressed)
+    town = build_town(source, options, own)
     with draft_folder(output) as draft:
         report, sizes = write_town(draft, source, town)
         map_files.write_report(draft, report)
@@ -220,23 +216,3 @@ def drive_along(path: Path) -> WaypointDrive:
             f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
         )
     return WaypointDrive(points[:, :2], control)
-
-
-def _lifted(
-    drives: Sequence[WaypointDrive], ground: Ground, faults: ImportFaults
-) -> list[WaypointDrive]:
-    """Returns drives whose waypoints have the heights of the ground.
-
-    A drive that a car cannot steer on its slopes is left out and counted.
-    """
-    lifted = []
-    for drive in drives:
-        xy = np.round(drive.waypoints, 3)
-        waypoints = np.column_stack([xy, ground.height(xy)])
-        if isinstance(
-            search.steerable_drive(waypoints, margin=1.0), WaypointDrive
-        ):
-            lifted.append(replace(drive, waypoints=waypoints))
-        else:
-            faults.add("drive too tight on its slope, left out", "drive")
-    return lifted

@@ -32,8 +32,8 @@ _MARGIN = 45.0
 _SQUARE = 900.0
 # Smaller pieces of ground between carriageways belong to the outskirts [m^2].
 _LEAST_BLOCK = 60.0
-# Share of the buildings that stand in the first stage.
-_STANDING = 0.65
+# Default share of the buildings that the first stage lacks.
+_MISSING = 0.35
 _ROUTE_LENGTH = 1200.0
 _SPEEDS = {
     "cruise": 12.0,
@@ -158,11 +158,15 @@ def starter_plan(areas: Areas, seed: int) -> dict:
     }
 
 
-def starter_stages(city: City) -> dict:
+def starter_stages(city: City, missing: float = _MISSING) -> dict:
     """Returns two stages, of which the first lacks the east of the city.
 
     The first stage lacks buildings and trees there. The result has the fields
     of `cns_drake.city.plan.stages.Stages`.
+
+    Args:
+        city: the whole city.
+        missing: share of the buildings that the first stage lacks.
     """
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]
@@ -170,7 +174,7 @@ def starter_stages(city: City) -> dict:
     x = [structure.xyz[0] for structure in buildings or standing]
     absent = defaultdict(list)
     if x:
-        limit = float(np.quantile(x, _STANDING))
+        limit = float(np.quantile(x, 1.0 - missing))
         for structure in standing:
             if structure.xyz[0] > limit:
                 absent[" ".join(structure.tags[:1])].append(structure.name)

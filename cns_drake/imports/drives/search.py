@@ -9,8 +9,8 @@ a sequence of its pieces is called a way.
 
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice, pairwise, product
 
 import numpy as np
@@ -28,7 +28,7 @@ from cns_drake.imports.foreign_city import (
     Street,
     cut_at_nodes,
 )
-from cns_drake.imports.options import DriveOn
+from cns_drake.imports.options import DriveOn, ImportFaults
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
@@ -681,3 +681,29 @@ class StreetGraph(WayGraph):
             for k in way
         ]
         return np.array([way[int(np.argmin(from_line))]])
+
+
+def lifted(
+    drives: Iterable[WaypointDrive],
+    height: Callable[[np.ndarray], np.ndarray],
+    faults: ImportFaults,
+) -> list[WaypointDrive]:
+    """Returns drives whose waypoints have the heights of the ground.
+
+    A drive that a car cannot steer on its slopes is left out and counted.
+
+    Args:
+        drives: the drives.
+        height: function that returns the heights (N,) of the ground at places
+            (N, 2) [m].
+        faults: counts the drives that are left out.
+    """
+    found = []
+    for drive in drives:
+        xy = np.round(drive.waypoints, 3)
+        waypoints = np.column_stack([xy, height(xy)])
+        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointDrive):
+            found.append(replace(drive, waypoints=waypoints))
+        else:
+            faults.add("drive too tight on its slope, left out", "drive")
+    return found

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 from shapely import GEOSException
+from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
@@ -31,6 +32,7 @@ from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
 from cns_drake.imports import map_files
+from cns_drake.imports.drives import search
 from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
@@ -47,7 +49,11 @@ from cns_drake.imports.opendrive.lanes import (
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMap, RoadMark
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.options import ImportFaults, ImportReport
+from cns_drake.imports.options import (
+    ImportFaults,
+    ImportOptions,
+    ImportReport,
+)
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # The edges of carriageways and of lanes differ by less than this, which is also
@@ -356,6 +362,10 @@ _SHOWN = (
 )
 
 
+# Classes of the ground, which is kept whole however far the drives are.
+_GROUND = ("road", "parking", "sidewalk", "terrain", "other-ground")
+
+
 @dataclass(frozen=True)
 class Town:
     """A town built on an imported road network, in all its stages.
@@ -385,23 +395,26 @@ class Town:
 
 def build_town(
     source: Path,
-    seed: int,
-    dressed: bool = False,
+    options: ImportOptions,
+    own: Sequence[WaypointDrive] | None = None,
 ) -> Town:
     """Returns a town, built at random along the roads of an OpenDRIVE file.
 
     Args:
         source: the file.
-        seed: seed of all random draws.
-        dressed: whether to paint the road marks of the file.
+        options: `seed` of all random draws; `dressed`: whether to paint the
+            road marks of the file; `grow`: the share of the buildings that the
+            first stage lacks, those in the east; `within`: the greatest
+            distance of structures from the drives [m].
+        own: drives that replace those that are proposed; None for these.
 
     Raises:
-        InputError: the file cannot be used.
+        InputError: the file cannot be used, or no drive was found for `within`.
     """
     faults = ImportFaults()
     roads = read_roads(source, faults)
     try:
-        return _build(source, roads, seed, faults, dressed)
+        return _build(source, roads, faults, options, own)
     except GEOSException as error:
         raise InputError(
             f"{source}: an area cannot be used: {error}"
@@ -411,9 +424,9 @@ def build_town(
 def _build(
     source: Path,
     roads: RoadMap,
-    seed: int,
     faults: ImportFaults,
-    dressed: bool,
+    options: ImportOptions,
+    own: Sequence[WaypointDrive] | None,
 ) -> Town:
     with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
@@ -433,7 +446,7 @@ def _build(
             f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
             f" {_LONGEST_SIDE / 1000:.0f} km"
         )
-    plan = CityPlan.model_validate(starter_plan(streets.areas, seed))
+    plan = CityPlan.model_validate(starter_plan(streets.areas, options.seed))
     lanes = streets.areas.lane_area
     things = [
         one
@@ -445,7 +458,7 @@ def _build(
     kerbs = KerbHeights(ground, kerb)
     surface = RoadHeights(ground)
     marks: list[Structure] = []
-    if dressed:
+    if options.dressed:
         _count_spans(roads, {band.road.name for band in raised}, faults)
         marks += road_marks(
             "marks", ground, surface.heights, streets.areas.carriageway
@@ -484,23 +497,60 @@ def _build(
         plan,
         str(source),
     )
+    drives = (
+        lane_drives.find_lane_drives(bands)
+        if own is None
+        else search.lifted(own, surface.heights, faults)
+    )
+    if options.within is not None:
+        city = _near_drives(city, drives, options.within, faults)
     imported = {one.name for one in (*decks, *things, *marks)}
     generated = [one for one in city.structures if one.name not in imported]
     lanes_of_traffic = lane_drives.lanes_for_traffic(bands, kerbs)
     if lanes_of_traffic is None:
         faults.add("no lanes for traffic: none leads on for ever", source.name)
-    stages = starter_stages(City(tuple(generated), city.cars))
+    missing = {} if options.grow is None else {"missing": options.grow}
+    stages = starter_stages(City(tuple(generated), city.cars), **missing)
     return Town(
         roads,
-        seed,
+        options.seed,
         city,
         Stages.model_validate(stages),
         streets,
-        lane_drives.find_lane_drives(bands),
+        drives,
         lanes_of_traffic,
         _kinds(roads, things, decks, marks, generated),
         faults,
     )
+
+
+def _near_drives(
+    city: City,
+    drives: Sequence[WaypointDrive],
+    distance: float,
+    faults: ImportFaults,
+) -> City:
+    """Returns a city without what stands far from drives [m].
+
+    The ground is kept.
+
+    Raises:
+        InputError: there is no drive.
+    """
+    if not drives:
+        raise InputError("--within: no drive was found; give one with --along")
+    ways = MultiLineString([drive.path for drive in drives])
+    shapely.prepare(ways)
+    kept = []
+    for one in city.structures:
+        if one.semantic_class in _GROUND or shapely.dwithin(
+            ways, one.footprint_W, distance
+        ):
+            kept.append(one)
+        else:
+            kind = "structure far from the drives, left out"
+            faults.add(kind, one.name)
+    return City(tuple(kept), city.cars)
 
 
 def _count_spans(

@@ -7,7 +7,7 @@ import shapely
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town, road_marks
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, ImportOptions
 
 RADIUS = 50.0
 # A bend to the left, from its middle; two lanes of 3.5 m, one line in the
@@ -176,7 +176,9 @@ def test_marks_lie_beside_kerbs(tmp_path, left, yellow):
     path.write_text(KERB.format(left=left))
     (one,) = (
         structure
-        for structure in build_town(path, 0, dressed=True).city.structures
+        for structure in build_town(
+            path, ImportOptions(dressed=True)
+        ).city.structures
         if structure.name == "marks_1"
     )
     found = {}

@@ -19,7 +19,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, ImportOptions
 
 LINE = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
 LANES = section(0.0, *TWO_LANES)
@@ -158,7 +158,7 @@ def test_things_that_stand_twice_are_named(tmp_path, more, fault):
         tmp_path / "a.xodr", straight("17", 0, 0, 50, 0) + "\n", *more
     )
     with pytest.raises(InputError) as info:
-        build_town(path, 0)
+        build_town(path, ImportOptions())
     assert str(info.value).startswith(f"{path}: {fault}")
     assert "\n" not in str(info.value)
 
@@ -203,14 +203,14 @@ def test_lanes_that_lead_out_of_the_world(tmp_path, lanes, more, fault):
         straight("1", 0, 0, 50, 0, lanes=lanes, elevation=more),
     )
     with pytest.raises(InputError, match=fault) as info:
-        build_town(path, 0)
+        build_town(path, ImportOptions())
     assert str(info.value).startswith(f"{path}: ")
 
 
 def test_roads_too_long_to_be_built_on(tmp_path):
     path = write_roads(tmp_path / "a.xodr", straight("1", 0, 0, 12_000, 0))
     with pytest.raises(InputError, match="12000 m by 7 m; cut out a piece"):
-        build_town(path, 0)
+        build_town(path, ImportOptions())
 
 
 def test_ids_become_names_that_are_unique(tmp_path):

@@ -13,7 +13,7 @@ from cns_drake.imports.opendrive.lanes import lane_bands, split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.opendrive.town import build_town
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, ImportOptions
 
 SIGNS = """<signals>
 <signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"
@@ -45,7 +45,7 @@ def test_signals_and_objects_stand_at_their_places(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=SIGNS)
     )
-    built = build_town(path, 0)
+    built = build_town(path, ImportOptions())
     found = {s.name: s for s in built.city.structures}
     stop = found["signal_1_0"]
     assert stop.semantic_class == "traffic-sign"
@@ -311,7 +311,7 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     s = np.concatenate([band.s for band in raised])
     assert 41.0 < s.min() < 50.0
     assert 70.0 < s.max() < 79.0
-    built = build_town(path, 0)
+    built = build_town(path, ImportOptions())
     # No kerb lies across the road where the bridge begins, and those of the
     # road below go on.
     (kerbs,) = (s for s in built.city.structures if s.name == "kerbs")
@@ -343,11 +343,11 @@ def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
         straight("1", -40, 0, 40, 0, more=more),
         straight("2", 0, -40, 0, 40, elevation=rise, more=more),
     )
-    rows = build_town(path, 0, dressed=True).faults.rows()
+    rows = build_town(path, ImportOptions(dressed=True)).faults.rows()
     assert {kind: number for kind, number, _ in rows} == {
         "tunnel, its road left open": 2,
         # Road 2 has a deck above road 1.
         "bridge over no other road, laid on the ground": 1,
         "no lanes for traffic: none leads on for ever": 1,
     }
-    assert len(build_town(path, 0).faults.rows()) == 1
+    assert len(build_town(path, ImportOptions()).faults.rows()) == 1

@@ -24,6 +24,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import ground_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
+from cns_drake.imports.drives.search import WaypointDrive
 from cns_drake.imports.map_files import REPORT_NAME
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
@@ -40,7 +41,7 @@ from cns_drake.imports.opendrive.lanes import (
 )
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town, write_town
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.options import ImportFaults, ImportOptions
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -125,7 +126,7 @@ def source(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def town(source):
-    return build_town(source, seed=1)
+    return build_town(source, ImportOptions(seed=1))
 
 
 def bands_of(path):
@@ -286,7 +287,7 @@ def test_kerbs_are_closed_where_a_slope_begins(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 10, 5, 210, 45, elevation=rise)
     )
-    built = build_town(path, 0)
+    built = build_town(path, ImportOptions())
     (kerbs,) = (one for one in built.city.structures if one.name == "kerbs")
     upright = 0.0
     for mesh in kerbs.model.meshes.values():
@@ -308,7 +309,7 @@ def test_parking_lanes_are_parking(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, lanes=lanes)
     )
-    built = build_town(path, 0)
+    built = build_town(path, ImportOptions())
     classes = {s.name: s for s in built.city.structures}
     assert classes["parking_bays"].semantic_class == "parking"
     bays = classes["parking_bays"].model.footprint
@@ -374,12 +375,46 @@ def test_options_of_other_formats(source, tmp_path, option, value):
     assert f"{option}: " in str(result.exception)
 
 
+@pytest.mark.slow
+def test_a_drive_of_ones_own_through_what_stands_near(source, town):
+    xy = np.array([[20.0, -1.75], [60.0, -1.75], [100.0, -1.75]])
+    own = WaypointDrive(xy, xy)
+    options = ImportOptions(seed=1, within=40.0, grow=0.8)
+    near = build_town(source, options, [own])
+    (drive,) = near.drives
+    np.testing.assert_array_equal(drive.waypoints, np.c_[xy, np.zeros(3)])
+    ground = {"road", "parking", "sidewalk", "terrain", "other-ground"}
+    way = LineString(xy)
+    kept = {one.name for one in near.city.structures}
+    for one in town.city.structures:
+        stays = (
+            one.semantic_class in ground or way.distance(one.footprint_W) <= 40
+        )
+        assert (one.name in kept) == stays, one.name
+    # The file's objects and what is generated are left out alike, and counted.
+    gone = len(town.city.structures) - len(near.city.structures)
+    counts = {kind: count for kind, count, _ in near.faults.rows()}
+    assert counts["structure far from the drives, left out"] == gone > 0
+    buildings = {
+        one.name
+        for one in near.city.structures
+        if one.semantic_class == "building"
+    }
+    absent = {
+        name
+        for names in near.stages.stages["01"].absent.values()
+        for name in names
+    }
+    share = len(absent & buildings) / len(buildings)
+    assert share == pytest.approx(0.8, abs=1.5 / len(buildings))
+
+
 def test_lanes_without_area(tmp_path):
     line = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
     own = section(0.0, lane(-1, "none", 3.0))
     path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [line], [own]))
     with pytest.raises(InputError, match="no lane in it has an area"):
-        build_town(path, 0)
+        build_town(path, ImportOptions())
 
 
 def height(start, inner, outer):
@@ -407,7 +442,7 @@ def test_lanes_have_the_heights_of_the_file(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 120, 0, lanes=lanes)
     )
-    built = build_town(path, 0)
+    built = build_town(path, ImportOptions())
     top = upper_side(built, "sidewalks", "kerbs", "carriageway")
     for x in (20.3, 90.7):
         assert top(x, 1.75) == pytest.approx(0.0, abs=0.005)
@@ -446,7 +481,7 @@ def test_a_level_lane_is_not_banked(tmp_path, roll):
     np.testing.assert_allclose(
         other.outer[:, 2] - other.inner[:, 2], -2.0 * np.sin(roll)
     )
-    top = upper_side(build_town(path, 0), "sidewalks", "kerbs")
+    top = upper_side(build_town(path, ImportOptions()), "sidewalks", "kerbs")
     rise = top(60.3, 5.3) - top(60.3, 3.7)
     assert rise == pytest.approx(0.0, abs=0.01)
     fall = top(60.3, -5.3) - top(60.3, -3.7)
