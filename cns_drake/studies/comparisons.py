@@ -401,9 +401,10 @@ class PairMaker:
             factors = _factors_of(place, condition.factors)
             drive = self._named("database", drive, factors, seed)
             found.append(((age, natural_key(stage)), place, drive))
-        known: dict[str, str] = {}
-        for _, place, drive in found:
-            before = known.setdefault(drive.name, place)
+        # While maps are only noted, drives of all ages are in one map.
+        known: dict[object, str] = {}
+        for time, place, drive in found:
+            before = known.setdefault((time, drive.name), place)
             if before != place:
                 raise InputError(
                     f"{self.source}: {place}: the same drive as {before}"

@@ -30,12 +30,13 @@ def experiment(**fields):
     return Experiment.model_validate({"name": "mine", **fields})
 
 
-def compared(town, **fields):
+def aged(drive, years, rates, seed):
+    return f"/aged_{rates}", f"{years:02d}"
+
+
+def compared(town, age=aged, **fields):
     """What is compared in each condition, aged cities being only named."""
     query = load_scenario(town / "sequence_04.yaml")
-
-    def age(drive, years, rates, seed):
-        return f"/aged_{rates}", f"{years:02d}"
 
     pair = PairMaker(
         query.replaced(name=f"{query.name}_database"),
@@ -217,6 +218,23 @@ def test_no_session_is_later_than_the_query(town, fields):
     query = {n: one for n, one in fields.items() if n != "database"}
     with pytest.raises(InputError, match="this drive is later than the query"):
         compared(town, database=fields["database"], query=query)
+
+
+def test_drives_differ_before_their_cities_are_aged(town):
+    """As in the first look at an experiment, when no map is made yet."""
+
+    def not_yet(drive, *given):
+        return str(drive.map), str(drive.stage)
+
+    (found,) = compared(
+        town,
+        not_yet,
+        database={"sessions": [{"years": 9}, {"years": 4}, {"years": 0}]},
+    )
+    assert len(found.drives) == 4
+    twice = {"sessions": [{"years": 9}, {"years": 4}, {"years": 4}]}
+    with pytest.raises(InputError, match=r"3: the same drive as .*2$"):
+        compared(town, not_yet, database=twice)
 
 
 @pytest.mark.parametrize("side", ["both", "query"])
