@@ -44,6 +44,8 @@ class DescribedScans:
         blocks: (K,) block of the route in which each place or query lies, see
             `evaluation.recognition.metrics.route_blocks`; None if the route is
             unknown.
+        drive_of: (K,) number of the drive of each place, if they are of several
+            drives; None for one drive.
     """
 
     frames: np.ndarray
@@ -52,6 +54,7 @@ class DescribedScans:
     descriptors: list = field(default_factory=list)
     clouds: list[np.ndarray] = field(default_factory=list)
     blocks: np.ndarray | None = None
+    drive_of: np.ndarray | None = None
 
     @property
     def p_WSs(self) -> np.ndarray:
@@ -60,7 +63,10 @@ class DescribedScans:
 
     def chosen(self, rows: np.ndarray) -> DescribedScans:
         """Returns some of the places or queries, by their indices (J,)."""
-        blocks = None if self.blocks is None else self.blocks[rows]
+        blocks, drive_of = (
+            None if one is None else one[rows]
+            for one in (self.blocks, self.drive_of)
+        )
         return DescribedScans(
             self.frames[rows],
             self.stamps_ns[rows],
@@ -68,6 +74,7 @@ class DescribedScans:
             [self.descriptors[row] for row in rows],
             [self.clouds[row] for row in rows] if self.clouds else [],
             blocks,
+            drive_of,
         )
 
 
@@ -85,7 +92,13 @@ def joined_scans(
         most: number of scans to keep, from the start of the list; None for all.
     """
     poses = []
+    drives: list[np.ndarray] = []
     for one, world in zip(every, worlds, strict=True):
+        own = one.drive_of
+        if own is None:
+            own = np.zeros(len(one.frames), np.int64)
+        before = max((int(d.max(initial=-1)) for d in drives), default=-1)
+        drives.append(own + before + 1)
         X_WS = one.X_WS.copy()
         X_WS[:, 0, 3] += world * _APART
         poses.append(X_WS)
@@ -95,6 +108,7 @@ def joined_scans(
         X_WS=np.concatenate(poses)[:most],
         descriptors=[d for one in every for d in one.descriptors][:most],
         clouds=[cloud for one in every for cloud in one.clouds][:most],
+        drive_of=np.concatenate(drives)[:most] if len(every) > 1 else None,
     )
 
 

@@ -188,7 +188,12 @@ def compare_with_gates(
         )
     if length := method.config.sequence:
         alone = along_the_way(
-            alone, is_known, queries.p_WSs, places.p_WSs, length
+            alone,
+            is_known,
+            queries.p_WSs,
+            places.p_WSs,
+            length,
+            places.drive_of,
         )
     for row, ungated in enumerate(alone):
         descriptor = queries.descriptors[row]

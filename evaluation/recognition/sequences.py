@@ -17,6 +17,7 @@ def along_the_way(
     p_WQs: np.ndarray,
     p_WPs: np.ndarray,
     length: float,
+    drive_of: np.ndarray | None = None,
 ) -> np.ndarray:
     """Returns scores (Q, D) that are averaged along the path.
 
@@ -40,12 +41,35 @@ def along_the_way(
         p_WPs: (D, 3) positions of the places in the world [m].
         length: earlier queries count up to this distance before the query,
             along the path of the queries [m].
+        drive_of: (D,) number of the drive of each place, in ascending order.
+            Paths of different drives are not connected. By default all places
+            are of one drive.
     """
-    of_query, of_place = travelled(p_WQs), travelled(p_WPs)
-    between = (of_place[1:] + of_place[:-1]) / 2.0
     least = np.fmin.reduce(scores, axis=1, keepdims=True)
     filled = np.where(np.isnan(scores), least, scores)
-    result = np.empty_like(scores)
+    of_query = travelled(p_WQs)
+    starts: list[int] = []
+    if drive_of is not None:
+        starts = (np.flatnonzero(np.diff(drive_of)) + 1).tolist()
+    parts = zip(
+        np.split(filled, starts, axis=1), np.split(p_WPs, starts), strict=True
+    )
+    result = np.concatenate(
+        [_voted(some, of_query, travelled(p), length) for some, p in parts],
+        axis=1,
+    )
+    return np.where(is_known, result, np.nan)
+
+
+def _voted(
+    filled: np.ndarray,
+    of_query: np.ndarray,
+    of_place: np.ndarray,
+    length: float,
+) -> np.ndarray:
+    """Returns the mean scores (Q, D) of the places of one drive."""
+    between = (of_place[1:] + of_place[:-1]) / 2.0
+    result = np.empty_like(filled)
     for row, end in enumerate(of_query):
         first = int(np.searchsorted(of_query, end - length))
         back = (end - of_query[first : row + 1])[:, None]
@@ -60,4 +84,4 @@ def along_the_way(
             with np.errstate(invalid="ignore"):
                 means.append(np.nansum(votes, axis=0) / number)
         result[row] = np.fmax(*means)
-    return np.where(is_known, result, np.nan)
+    return result

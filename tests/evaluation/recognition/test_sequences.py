@@ -86,3 +86,27 @@ def test_a_setting_of_every_method_asks_for_it(towns):
     np.testing.assert_array_equal(found.scores, expected)
     assert (found.scores != alone.scores).any()
     np.testing.assert_array_equal(found.distances, alone.distances)
+
+
+@pytest.mark.parametrize("gap", [0.0, 5.0, 1e5])
+def test_votes_stay_within_a_drive(gap):
+    """Wherever the second drive begins: also where the first one ends."""
+    rng = np.random.default_rng(1)
+    scores = rng.random((6, 9))
+    known = np.ones_like(scores, bool)
+    queries = on_a_line(*range(0, 30, 5))
+    first = on_a_line(*range(0, 25, 5))
+    second = on_a_line(*(20 + gap + np.arange(0, 20, 5)))
+    found = along_the_way(
+        scores,
+        known,
+        queries,
+        np.concatenate([first, second]),
+        20.0,
+        np.repeat([0, 1], [5, 4]),
+    )
+    for columns, way in ((slice(0, 5), first), (slice(5, 9), second)):
+        alone = along_the_way(
+            scores[:, columns], known[:, columns], queries, way, 20.0
+        )
+        np.testing.assert_array_equal(found[:, columns], alone)
