@@ -36,7 +36,7 @@ from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.studies.comparisons import DrawnRoute
+from cns_drake.studies.comparisons import DrawnRoute, Fleet
 from cns_drake.studies.experiment import Experiment, MadeMap
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
@@ -83,6 +83,7 @@ EXPERIMENT: Sections = {
     "A map to make": MadeMap,
     "What is missing": Losses,
     "A route at random": DrawnRoute,
+    "A fleet": Fleet,
 }
 METHODS: Sections = {
     "All methods": MethodConfig,

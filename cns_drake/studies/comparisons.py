@@ -32,6 +32,7 @@ from cns_drake.sensors.sensor_config import Section
 from cns_drake.simulation.loaded_drive import load_ways
 from cns_drake.studies.experiment import (
     CAUSE,
+    FLEET,
     LEVEL,
     NO_CAUSE,
     SESSIONS,
@@ -50,7 +51,14 @@ from evaluation.results.table import LAST, OWN
 LOSS_FIELDS = tuple(Losses.model_fields)
 # Fields that only the database, or only the query, can have.
 _QUERY_FIELDS = ("turn_queries", "tilt_queries", "hide_sector")
-_DATABASE_FIELDS = ("distractors", "lateral", SESSIONS, "keep", "maintain")
+_DATABASE_FIELDS = (
+    FLEET,
+    "distractors",
+    "lateral",
+    SESSIONS,
+    "keep",
+    "maintain",
+)
 # Fields that all drives of a database share.
 _SHARED_FIELDS = (*_DATABASE_FIELDS, "rates")
 # Fields that put a drive into another frame of reference.
@@ -91,6 +99,45 @@ class DrawnRoute(Section):
 
     length: float = Field(gt=0.0, le=100_000.0)
     seed: int = Field(default=0, ge=0)
+
+
+class Fleet(Section):
+    """Cars that drive through a city year by year, and make a database.
+
+    Each drive has a route that is sampled at random, one of the viewpoints
+    `near`, `lane` and `reversed`, and trees with or without leaves. The draws
+    of a car in a year do not depend on the numbers of cars and of years, so a
+    greater fleet has the drives of a smaller one.
+
+    Attributes:
+        cars: number of drives a year.
+        years: number of years. The first drives are so many years before the
+            query, the last ones are one year before it.
+        length: smallest length of a route [m].
+        seed: seed of the draws; by default that of the condition.
+    """
+
+    cars: int = Field(ge=1, le=1000, strict=True)
+    years: int = Field(ge=1, le=LAST_YEAR, strict=True)
+    length: float = Field(gt=0.0, le=100_000.0)
+    seed: int = Field(ge=0)
+
+    def sessions(self) -> list[dict[str, Any]]:
+        """Returns the fields of each drive, from older to newer."""
+        found = []
+        for years in range(self.years, 0, -1):
+            for car in range(self.cars):
+                rng = np.random.default_rng([self.seed, years, car])
+                number = int(rng.integers(2**31))
+                found.append(
+                    {
+                        "years": years,
+                        "route": {"length": self.length, "seed": number},
+                        "viewpoint": str(rng.choice(list(VIEWPOINTS))),
+                        "transient": {"leaves": float(rng.integers(2))},
+                    }
+                )
+        return found
 
 
 class MissingError(Exception):
@@ -242,7 +289,7 @@ class PairMaker:
             side: merged(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
         }
-        sessions = self._sessions(sides["database"])
+        sessions = self._sessions(sides["database"], seed)
         # Years of cases may need the rates of all conditions.
         alone = {} if CAUSE in condition.factors else fields
         for side, values in alone.items():
@@ -316,12 +363,23 @@ class PairMaker:
             )
         return str(value)
 
-    def _sessions(self, database: Changes) -> dict[str, dict[str, Any]]:
+    def _sessions(
+        self, database: Changes, seed: int
+    ) -> dict[str, dict[str, Any]]:
         """Returns place in the file -> changes, for each drive of a database.
 
         Each drive has the fields of the database; its own ones replace them.
         """
         shared = dict(database)
+        if FLEET in database:
+            where = f"{self.source}: database.{FLEET}"
+            fleet = shared.pop(FLEET)
+            if SESSIONS in database:
+                raise InputError(f"{where}: give it or {SESSIONS}")
+            if isinstance(fleet, Mapping):
+                fleet = {"seed": seed, **fleet}
+            drives = validated(Fleet, fleet, where).sessions()
+            return self._sessions({**shared, SESSIONS: drives}, seed)
         given = shared.pop(SESSIONS, None)
         for name in ("keep", "maintain"):
             shared.pop(name, None)
@@ -728,7 +786,7 @@ def _factors_of(place: str, factors: Changes) -> dict[str, Any]:
     Its own ones are named as if it were the only drive. Those of other drives,
     and what all drives share, are left out.
     """
-    several = f"database.{SESSIONS}"
+    several = tuple(f"database.{name}" for name in (SESSIONS, FLEET))
     found = {}
     for path, value in factors.items():
         if path.startswith(f"{place}."):

@@ -32,6 +32,7 @@ from cns_drake.studies.comparisons import (
 )
 from cns_drake.studies.experiment import (
     CAUSE,
+    FLEET,
     LEVEL,
     SESSIONS,
     SIDES,
@@ -683,8 +684,11 @@ def _has_several(condition: Condition) -> bool:
     """Returns whether a condition's database can have several drives."""
     levels = [one for cause in condition.causes for one in cause]
     for changes in (condition.changes, *levels):
-        given = changes.get("database", {}).get(SESSIONS)
-        if isinstance(given, list | dict) and len(given) > 1:
+        database = changes.get("database", {})
+        given = database.get(SESSIONS)
+        if FLEET in database or (
+            isinstance(given, list | dict) and len(given) > 1
+        ):
             return True
     return False
 

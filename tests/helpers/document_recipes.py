@@ -645,6 +645,11 @@ RECIPES = {
         changes=(("suburbia", "town"),),
         file="how_many_drives.yaml",
     ),
+    "fleet": Recipe(
+        "name: fleet",
+        changes=(("suburbia", "town"),),
+        file="fleet.yaml",
+    ),
     "ladder": Recipe(
         ".venv/bin/cns-drake study ladder metropolis",
         # All causes of the ladder take many minutes.

@@ -34,6 +34,10 @@ def aged(drive, years, rates, seed):
     return f"/aged_{rates}", f"{years:02d}"
 
 
+def not_yet(drive, *given):
+    return str(drive.map), str(drive.stage)
+
+
 def compared(town, age=aged, **fields):
     """What is compared in each condition, aged cities being only named."""
     query = load_scenario(town / "sequence_04.yaml")
@@ -148,7 +152,55 @@ def test_conditions_share_the_drives_that_are_the_same(town):
     assert len({one.fingerprint() for one in found}) == 3
 
 
+FLEET = {"cars": 2, "years": 3, "length": 100.0}
+
+
+def test_a_fleet_drives_every_year(town):
+    ages = []
+
+    def age(drive, years, *given):
+        ages.append(years)
+        return not_yet(drive)
+
+    (found,) = compared(town, age, database={"fleet": FLEET})
+    # The first drives go through the city of today, 3 years before the query.
+    assert ages == [1, 1, 2, 2, 3]
+    database = found.drives[:-1]
+    assert len({one.name for one in database}) == 6
+    assert {one.transient.leaves for one in database} == {0.0, 1.0}
+    assert len({repr(one.route) for one in database}) > 1
+
+
+def test_a_greater_fleet_has_the_drives_of_a_smaller_one(town):
+    small, more_cars, other = compared(
+        town,
+        not_yet,
+        database={
+            "fleet": [
+                {"cars": 1, "years": 2, "length": 100.0},
+                {"cars": 3, "years": 2, "length": 100.0},
+                {"cars": 1, "years": 2, "length": 100.0, "seed": 7},
+            ]
+        },
+    )
+    names = [
+        {drive.name for drive in one.drives[:-1]}
+        for one in (small, more_cars, other)
+    ]
+    assert names[0] < names[1]
+    assert not names[0] & names[2]
+
+
 FAULTS = [
+    ({"fleet": {**FLEET, "cars": 0}}, r"database\.fleet: cars: "),
+    ({"fleet": {**FLEET, "years": 201}}, r"database\.fleet: years: "),
+    ({"fleet": {**FLEET, "length": 0}}, r"database\.fleet: length: "),
+    ({"fleet": {**FLEET, "buses": 2}}, r"database\.fleet: buses: "),
+    ({"fleet": 3}, r"database\.fleet: "),
+    (
+        {"fleet": FLEET, "sessions": [{}]},
+        r"database\.fleet: give it or sessions",
+    ),
     ({"sessions": []}, r"database\.sessions: a list without a value"),
     ({"sessions": [[]]}, r"database\.sessions: a list without a value"),
     ({"sessions": 2}, r"database\.sessions: not a list of one drive"),
@@ -222,10 +274,6 @@ def test_no_session_is_later_than_the_query(town, fields):
 
 def test_drives_differ_before_their_cities_are_aged(town):
     """As in the first look at an experiment, when no map is made yet."""
-
-    def not_yet(drive, *given):
-        return str(drive.map), str(drive.stage)
-
     (found,) = compared(
         town,
         not_yet,
