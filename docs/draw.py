@@ -26,6 +26,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.signal import welch
@@ -54,7 +55,7 @@ from evaluation.methods.layered_overlap import (
     LayeredOverlapConfig,
 )
 from evaluation.report import figures
-from evaluation.results import charts
+from evaluation.results import charts, summaries
 from evaluation.results.drawing import (
     GONE,
     INK,
@@ -63,7 +64,7 @@ from evaluation.results.drawing import (
     PALE,
     unit,
 )
-from evaluation.results.table import Results
+from evaluation.results.table import Results, Row
 from evaluation.results.table_forms import title
 
 # The methods that this project made; all others are published ones.
@@ -276,49 +277,80 @@ def assumptions(path: Path) -> None:
 
 
 def ranking(path: Path) -> None:
-    """Draws the mean AUC strict and AUC over the radius of a match."""
+    """Draws mean AUC strict and AUC for each radius of a match.
+
+    Means are over pairs of drives, and their 95 % intervals over cities.
+    """
     metrics = {"auc_strict": "AUC strict", "auc": "AUC"}
-    gates = {"0": "not verified", "1": "verified"}
-    kinds = {
-        "shipped": "shipped cities",
-        "fresh": "fresh cities",
-        "plans": "other streets",
+    gates = {
+        False: "without geometric verification",
+        True: "with geometric verification",
     }
-    # Metric, gate, cities and method -> radius -> values.
-    found: dict[tuple[str, ...], dict[float, list[float]]] = {}
+    # Cities -> how their means look.
+    kinds: dict[str, dict[str, Any]] = {
+        "shipped": {"marker": "o", "ms": 6},
+        "fresh": {"marker": "o", "ms": 6, "mfc": "white"},
+        "plans": {"marker": "D", "ms": 5},
+    }
+    # Metric, gate, cities and radius -> rows.
+    found: dict[tuple[str, bool, str, float], list[Row]] = {}
     with open(ROOT / "docs/notes/ranking.csv", newline="") as stream:
-        for row in csv.DictReader(stream):
-            for metric in metrics:
-                place = metric, row["gate"], row["cities"], row["method"]
-                of_radius = found.setdefault(place, {})
-                radius, value = float(row["radius"]), float(row[metric])
-                of_radius.setdefault(radius, []).append(value)
-    figure = Figure(figsize=(_WIDTH, 11.0), layout="constrained")
-    grid = figure.subplots(4, len(kinds), sharex=True, sharey=True)
-    lines = zip(grid, itertools.product(metrics, gates), strict=True)
-    for line, (metric, gate) in lines:
-        for axes, kind in zip(line, kinds, strict=True):
-            for key, (colour, style, marker) in METHOD_STYLES.items():
-                values = found[metric, gate, kind, key]
-                axes.plot(
-                    list(values), [np.mean(some) for some in values.values()],
-                    style, color=colour, marker=marker, label=title(key),
-                )  # fmt: skip
-            axes.set_ylim(0.0, 1.04)
-            axes.set_xticks((5.0, 7.5, 10.0, 15.0), ("5", "7.5", "10", "15"))
-            _plain(axes, "both")
-        line[0].set_ylabel(f"{metrics[metric]},\n{gates[gate]}")
-    for axes, name in zip(grid[0], kinds.values(), strict=True):
-        axes.set_title(name, loc="left")
-    grid[-1][1].set_xlabel("radius of a match [m]")
+        for line, metric in itertools.product(csv.DictReader(stream), metrics):
+            row = Row(
+                experiment="ranking",
+                map=line["map"],
+                database=line["database"],
+                query=line["query"],
+                seed=int(line["seed"]),
+                factors={"version": line["version"]},
+                task="place",
+                method=line["method"],
+                gate=line["gate"] == "1",
+                protocol="own",
+                metric=metric,
+                value=float(line[metric]),
+            )
+            place = metric, row.gate, line["cities"], float(line["radius"])
+            found.setdefault(place, []).append(row)
+    radii = sorted({radius for *_, radius in found})
+    every = [row for rows in found.values() for row in rows]
+    order = [one.method for one in summaries.ranking(every)[0]]
+    figure = Figure(figsize=(_WIDTH, 13.6), layout="constrained")
+    blocks = list(itertools.product(metrics, gates))
+    parts = figure.subfigures(len(blocks), 1)
+    for part, (metric, gate) in zip(parts, blocks, strict=True):
+        part.suptitle(
+            f"{metrics[metric]}, {gates[gate]}", x=0.01, ha="left", fontsize=14
+        )
+        panels = part.subplots(1, len(radii), sharex=True, sharey=True)
+        for axes, radius in zip(panels, radii, strict=True):
+            for k, (kind, look) in enumerate(kinds.items()):
+                rows = found[metric, gate, kind, radius]
+                for one in summaries.ranking(rows)[0]:
+                    y = order.index(one.method) + 0.25 * (k - 1)
+                    colour = METHOD_STYLES[one.method][0]
+                    ends = [one.interval.low, one.interval.high]
+                    axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
+                    axes.plot(one.value, y, color=colour, **look)
+            axes.set(xlim=(-0.05, 1.05), ylim=(len(order) - 0.5, -0.5))
+            axes.set_xticks((0.0, 0.5, 1.0), ("0", "0.5", "1"))
+            axes.set_yticks(range(len(order)), [title(n) for n in order])
+            axes.set_title(f"{radius:g} m")
+            _plain(axes)
+        panels[0].set_title(f"radius {radii[0]:g} m")
     _head(
         figure,
         "Layered overlap is best with geometric\n"
         "verification; without it, the radius decides",
     )
+    handles = [
+        Line2D([], [], color=INK, ls="", **one) for one in kinds.values()
+    ]
+    interval = Line2D([], [], color=INK, lw=3, alpha=0.45)
     figure.legend(
-        *grid[0][0].get_legend_handles_labels(), loc="outside lower center",
-        ncols=3, frameon=False,
+        [*handles, interval],
+        ["shipped cities", "fresh cities", "other streets", "95 % interval"],
+        loc="outside lower center", ncols=2, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
 

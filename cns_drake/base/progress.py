@@ -66,6 +66,10 @@ class JobsListener:
 
 _NOBODY = Listener()
 _listener: ContextVar[Listener] = ContextVar("listener", default=_NOBODY)
+# What the loops around are about, and how far they are: the outermost first.
+_loops: ContextVar[tuple[tuple[str, int, int, str], ...]] = ContextVar(
+    "loops", default=()
+)
 
 
 def listener() -> Listener:
@@ -96,12 +100,22 @@ def track(
 ) -> Iterator[_Item]:
     """Yields the items of a long loop, and says how far it is.
 
+    After a loop inside another one, the work is that of the outer loop again.
+
     Args:
         items: the items.
         activity: what is done with them, such as `reading scans`.
         total: their number.
         unit: what they are.
     """
-    for done, item in enumerate(items):
-        doing(activity, done, total, unit)
-        yield item
+    around = _loops.get()
+    try:
+        for done, item in enumerate(items):
+            now = activity, done, total, unit
+            _loops.set((*around, now))
+            doing(*now)
+            yield item
+    finally:
+        _loops.set(around)
+    if around:
+        doing(*around[-1])

@@ -8,6 +8,7 @@ the pair is therefore due to the change alone, and not to the routes.
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 import math
 from typing import NamedTuple
 
@@ -51,7 +52,7 @@ def ranked_methods(
     return ranked, _headline(ranked, num_pairs, of_pair.values())
 
 
-def beside(results: Results) -> dict[str, dict[str, float]]:
+def beside(results: Results) -> dict[str, dict[str, Ranked]]:
     """Returns further columns of the ranking: column -> method -> mean.
 
     The columns are shares of the queries with a match: R@1; near misses, which
@@ -59,15 +60,27 @@ def beside(results: Results) -> dict[str, dict[str, float]]:
     success. The means are over the pairs of drives with results of all methods.
     """
     rows = results.where({STAGE: OWN})
-    r1, far, matched, pose = (
-        {one.method: one.value for one in ranking(some.rows)[0]}
-        for some in (
-            rows.where(metric=name)
-            for name in ("r1", "too_far", "with_match", "pose_success")
-        )
-    )
-    far = {name: far[name] / max(matched[name], 1.0) for name in far}
-    return {"R@1": r1, "near miss": far, "pose success": pose}
+    matched = {
+        row.but(): row.value for row in rows.where(metric="with_match").rows
+    }
+    columns = {
+        "R@1": rows.where(metric="r1").rows,
+        "near miss": [
+            replace(
+                row,
+                metric="near_miss",
+                value=row.value / max(matched[row.but()], 1.0),
+                low=math.nan,
+                high=math.nan,
+            )
+            for row in rows.where(metric="too_far").rows
+        ],
+        "pose success": rows.where(metric="pose_success").rows,
+    }
+    return {
+        name: {one.method: one for one in ranking(some)[0]}
+        for name, some in columns.items()
+    }
 
 
 def _headline(

@@ -12,8 +12,13 @@ from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.results.charts import styles
-from evaluation.results.drawing import INK, PALE, plain, save
+from evaluation.results.drawing import INK, PALE, name_lines, plain, save
 from evaluation.results.table_forms import by_pair, in_table_order, title
+
+# Size of the names of curves [pt]: 12 px on a phone, which shows one panel.
+_NAME_SIZE = 10.0
+# Distance between them, as a part of a panel's height.
+_NAME_GAP = 0.1
 
 
 def draw_pr_curves(
@@ -31,7 +36,7 @@ def draw_pr_curves(
     """
     pairs = by_pair(results)
     style_of = styles(in_table_order(result.method for result in results))
-    size = (9.2, 0.3 + 2.7 * len(pairs))
+    size = (9.2, 0.3 + 2.6 * len(pairs))
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
         len(pairs), len(MODES), sharex=True, sharey=True, squeeze=False
@@ -47,16 +52,11 @@ def draw_pr_curves(
             axes.tick_params(labelleft=True)
             axes.set_title(
                 plain(f"{map_name} {' → '.join(pair[1:])}, {mode} queries"),
-                fontsize=9,
+                fontsize=_NAME_SIZE,
             )
             axes.grid(alpha=0.3)
-            # Beside the curves, which it would hide.
-            axes.legend(
-                fontsize=7,
-                frameon=False,
-                loc="upper left",
-                bbox_to_anchor=(1.0, 1.0),
-            )
+            # Beside the curves, which they would hide.
+            name_lines(axes, _NAME_GAP, _NAME_SIZE)
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")

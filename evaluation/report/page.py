@@ -83,7 +83,7 @@ _SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
 # Controls, in which nothing changes, show no trend.
 _CHANGED: dict[str, str] = {**_SCATTER, STAGE: OWN}
 _DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
-_SURVIVAL = "AUC of each method without and with the change, and what it keeps"
+_SURVIVAL = "AUC without and with the change, and the share that is retained"
 # Width of charts [px].
 _WIDTH = 480
 

@@ -43,7 +43,7 @@ from evaluation.results.headlines import (
     greatest_auc,
     listed,
 )
-from evaluation.results.ranges import checked
+from evaluation.results.ranges import checked, range_of
 from evaluation.results.smoothing import curves
 from evaluation.results.summaries import (
     CAUSE,
@@ -363,6 +363,7 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
     figure.supxlabel(plain(text), fontsize=_FONT)
     axes.grid(axis="x", alpha=0.3)
     axes.tick_params(length=0)
+    _start_at_zero(axes, x=chart.metric)
     shares = {name: 100.0 * median_kept(kept[name]) for name in kept}
     number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
     message = (
@@ -394,7 +395,7 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
         if chart.metric.endswith("_ms"):
             axes.set_yscale("log")
         else:
-            axes.set_ylim(bottom=0.0)
+            _start_at_zero(axes, y=chart.metric)
         axes.grid(alpha=0.3)
         # A label of the whole figure would lie below its legend.
         axes.set_xlabel(plain(words(over)))
@@ -421,6 +422,23 @@ def _spread(axes: Axes, at: Sequence[float]) -> None:
         axes.set_xscale("symlog", linthresh=min(above))
         axes.set_xticks(list(at), [f"{one:g}" for one in at])
         axes.minorticks_off()
+
+
+def _start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
+    """Makes axes start at 0 whose metric cannot be negative.
+
+    Args:
+        axes: a panel in which everything is drawn.
+        x, y: name of what the axis shows; empty for an axis that stays.
+    """
+    limits = [range_of(name) for name in (x, y)]
+    corner = [
+        0.0 if limit is not None and limit.least == 0.0 else math.nan
+        for limit in limits
+    ]
+    # Markers at 0 are whole.
+    axes.update_datalim([corner], *(not math.isnan(one) for one in corner))
+    axes.autoscale_view()
 
 
 def _matrix(chart: _Chart) -> tuple[str, Figure]:
@@ -527,6 +545,7 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
             )
             axes.plot(one.x, one.y, style, color=colour)
     axes.set(xlabel=plain(words(x_name)), ylabel=plain(words(y_name)))
+    _start_at_zero(axes, x=x_name, y=y_name)
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)

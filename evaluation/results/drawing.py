@@ -10,7 +10,9 @@ from matplotlib.collections import Collection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import Bbox
 import numpy as np
+from sklearn.isotonic import isotonic_regression
 
 from cns_drake.base.files import completing
 from evaluation.results.ranges import check_all
@@ -60,12 +62,48 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
+def name_lines(axes: Axes, gap: float, size: float) -> None:
+    """Writes the names of a panel's lines right of it, at the lines' ends.
+
+    Names that would overlap are moved apart, as little as possible. Lines
+    without a label get no name.
+
+    Args:
+        axes: the panel, whose limits do not change any more.
+        gap: least distance between two names, as a part of the panel's height.
+        size: size of the letters [pt].
+    """
+    lines = [line for line in axes.lines if str(line.get_label())[:1] != "_"]
+    bottom, top = axes.get_ylim()
+    values = [np.asarray(line.get_ydata(), dtype=float) for line in lines]
+    known = [some[np.isfinite(some)] for some in values]
+    ends = [some[-1] if len(some) else bottom for some in known]
+    heights = (np.array(ends) - bottom) / (top - bottom)
+    order = np.argsort(heights, kind="stable")
+    # In steps of the gap, names in order must not descend.
+    steps = gap * np.arange(len(lines))
+    moved = isotonic_regression(heights[order] - steps)
+    moved = np.clip(moved, 0.0, max(1.0 - steps[-1], 0.0)) + steps
+    for index, height in zip(order, moved, strict=True):
+        line = lines[index]
+        axes.plot(
+            [1.03, 1.08], [height] * 2, transform=axes.transAxes, clip_on=False,
+            color=line.get_color(), linestyle=line.get_linestyle(),
+            linewidth=line.get_linewidth(), marker=line.get_marker(),
+            markersize=line.get_markersize(),
+        )  # fmt: skip
+        axes.text(
+            1.1, height, line.get_label(), fontsize=size, color=INK,
+            va="center", transform=axes.transAxes,
+        )  # fmt: skip
+
+
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     """Writes a figure as one file for each of several formats.
 
     Equal figures give equal bytes. SVG and WebP files, which are for web pages,
-    leave out the legend of the whole figure: the page writes it below the
-    figure, in letters that can be read on a phone.
+    end above the legend of the whole figure, which stands at its bottom: the
+    page writes it below the figure, in letters that can be read on a phone.
 
     Args:
         figure: the figure.
@@ -81,10 +119,16 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     # The layout is computed once for all formats.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+    bottom = max(
+        (one.get_window_extent().y1 for one in figure.legends), default=0.0
+    )
+    width, height = figure.get_size_inches()
+    above = Bbox.from_extents(0.0, bottom / figure.dpi, width, height)
     for kind in kinds:
         path = stem.with_name(f"{stem.name}.{kind}")
+        on_page = kind in ("svg", "webp")
         for legend in figure.legends:
-            legend.set_visible(kind not in ("svg", "webp"))
+            legend.set_visible(not on_page)
         options: dict = {"dpi": _DPI}
         if kind in ("pdf", "svg"):
             dated = "CreationDate" if kind == "pdf" else "Date"
@@ -94,6 +138,8 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
                 "dpi": _PAGE_DPI,
                 "pil_kwargs": {"quality": _WEBP_QUALITY},
             }
+        if on_page and figure.legends:
+            options["bbox_inches"] = above
         with (
             completing(path) as part,
             # TrueType fonts stay text in PDF; ids of SVG follow the salt.

@@ -49,7 +49,7 @@ _RANGES = (
     # Place recognition.
     (r"(paper_s_)?(auc|r1|r@\d+%?|f1|f1max)(_(?!kept)\w+)?", _SHARE),
     (
-        r"strict|precision\w*|recall\w*|success\w*|pose_success\w*|within_03m",
+        r"strict|precision\w*|recall\w*|(pose_)?success\w*|near_miss|within_03m",
         _SHARE,
     ),
     (r"mean_reciprocal_rank|(match_)?auroc\w*|(\w+_)?m?iou\w*|p", _SHARE),

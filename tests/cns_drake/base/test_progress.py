@@ -90,6 +90,32 @@ def test_work_is_heard_by_one_listener():
         jobs.end("a")
 
 
+def test_after_an_inner_loop_the_outer_one_goes_on():
+    heard = Heard()
+    with heard_by(heard):
+        for _ in track("ab", "localising", 2, "scans"):
+            for _ in track("c", "mapping", 1, "scans"):
+                pass
+            doing("aligning")
+        # A loop that was left early is no loop around the next one.
+        for _ in track("ab", "judging", 2, "draws"):
+            break
+        for _ in track("a", "writing", 1, "files"):
+            pass
+    assert heard.said == [
+        ("localising", 0, 2, "scans"),
+        ("mapping", 0, 1, "scans"),
+        ("localising", 0, 2, "scans"),
+        ("aligning", 0, 0, ""),
+        ("localising", 1, 2, "scans"),
+        ("mapping", 0, 1, "scans"),
+        ("localising", 1, 2, "scans"),
+        ("aligning", 0, 0, ""),
+        ("judging", 0, 2, "draws"),
+        ("writing", 0, 1, "files"),
+    ]
+
+
 def test_a_log_says_what_changes_and_then_less_and_less(clock, log):
     log.doing("loading")
     clock.now += 0.5

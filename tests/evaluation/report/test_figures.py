@@ -1,3 +1,5 @@
+import itertools
+
 from helpers.small_page import make_result
 from matplotlib.figure import Figure
 from matplotlib.image import imread
@@ -7,9 +9,10 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.methods import shipped_methods
 from evaluation.report import curve_figures
 from evaluation.report.figures import judge_points, top_view, voxel_of_each
-from evaluation.results.drawing import PIXELS, save
+from evaluation.results.drawing import PIXELS, name_lines, save
 
 
 def test_change_picture_has_the_colours_of_the_metric():
@@ -69,28 +72,59 @@ def test_points_on_a_border_have_a_voxel_beside_them(side):
 
 def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     figure = Figure(figsize=(2, 1))
-    figure.legend(handles=[Patch(color="red", label="gone")], loc="center")
+    handle = Patch(color="red", label="gone")
+    legend = figure.legend(handles=[handle], loc="lower center")
     save(figure, tmp_path / "figure", PIXELS)
     printed = imread(tmp_path / "figure.png")[..., :3]
     on_page = imread(tmp_path / "figure.webp")[..., :3] / 255.0
     red = [1.0, 0.0, 0.0]
     assert (np.abs(printed - red) < 0.2).all(axis=2).any()
     assert on_page.min() > 0.9
+    # Nor is its room.
+    height = 1.0 - legend.get_window_extent().y1 / figure.bbox.height
+    ratio = on_page.shape[0] / on_page.shape[1]
+    assert ratio == pytest.approx(0.5 * height, abs=0.01)
 
 
-def test_legends_stand_beside_the_curves(tmp_path, monkeypatch):
+def test_names_stand_beside_the_curves(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(
         curve_figures, "save", lambda figure, stem: drawn.append(figure)
     )
-    result = make_result("scan-context++", [0, 1, 4, 6, 3])
-    curve_figures.draw_pr_curves("town", [result], tmp_path / "pr")
+    # Curves that all end at the same place, and one above.
+    results = [make_result(name, [0, 1, 4, 6, 3]) for name in shipped_methods()]
+    curve_figures.draw_pr_curves("town", results, tmp_path / "pr")
     (figure,) = drawn
     figure.draw_without_rendering()
     for axes in figure.axes:
-        legend = axes.get_legend().get_window_extent()
-        assert legend.x0 >= axes.get_window_extent().x1
-        assert legend.x1 <= figure.bbox.x1
-        assert not any(
-            legend.overlaps(other.get_window_extent()) for other in figure.axes
-        )
+        boxes = [text.get_window_extent() for text in axes.texts]
+        assert len(boxes) == len(results)
+        for box in boxes:
+            assert box.x0 >= axes.get_window_extent().x1
+            assert box.x1 <= figure.bbox.x1
+        for one, other in itertools.combinations(boxes, 2):
+            assert not one.overlaps(other)
+        for box, other in itertools.product(boxes, figure.axes):
+            assert not box.overlaps(other.get_window_extent())
+
+
+@pytest.mark.parametrize(
+    ("ends", "heights"),
+    [
+        ((0.5, 0.2), (0.5, 0.2)),
+        # Both move by half of what is missing, and keep their order.
+        ((0.5, 0.52), (0.46, 0.56)),
+        # None leaves the panel.
+        ((0.0, 0.0, 1.0), (0.0, 0.1, 1.0)),
+        ((1.0, 0.99), (1.0, 0.9)),
+    ],
+)
+def test_names_move_apart_as_little_as_possible(ends, heights):
+    axes = Figure().subplots()
+    for number, end in enumerate(ends):
+        axes.plot([0.0, 1.0], [0.3, end], label=str(number))
+    axes.axhline(0.5)  # Has no name.
+    axes.set_ylim(0.0, 1.0)
+    name_lines(axes, 0.1, 10.0)
+    found = {text.get_text(): text.get_position()[1] for text in axes.texts}
+    assert [found[str(n)] for n in range(len(ends))] == pytest.approx(heights)

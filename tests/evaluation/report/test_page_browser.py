@@ -164,7 +164,7 @@ def test_table_ii_fits_its_box(browser, content, tmp_path):
     browser.open(path.as_uri(), *DESKTOP)
     unfold(browser)
     widths = browser.evaluate(
-        """[...document.querySelectorAll("#recognition .part > .table")].map(
+        """[...document.querySelectorAll("#recognition .grouped")].map(
           (one) => [one.scrollWidth, one.clientWidth])"""
     )
     assert len(widths) > 2
