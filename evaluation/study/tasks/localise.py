@@ -31,7 +31,7 @@ SHIPPED = tuple(
 )
 _COST = 60.0
 # Expected time to add a further drive to the map [s].
-_MAP_COST = 20.0
+_MAP_COST = 50.0
 # Scans within this distance make the map of a scan that is localised among
 # the others of its drive [m].
 _AROUND = 30.0
@@ -121,7 +121,8 @@ class LocaliseTask(Task):
             jobs.processes,
         )
         cost = _COST + _MAP_COST * len(pair.beside)
-        found = jobs.add(part, measure_localisation, arguments, cost=cost)
+        needs = [need for one in (*drives, pair.query) for need in one.needs]
+        found = jobs.add(part, measure_localisation, arguments, needs, cost)
         return (found,)
 
     def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:

@@ -177,9 +177,9 @@ def test_a_greater_fleet_has_the_drives_of_a_smaller_one(town):
         not_yet,
         database={
             "fleet": [
-                {"cars": 1, "years": 2, "length": 100.0},
-                {"cars": 3, "years": 2, "length": 100.0},
-                {"cars": 1, "years": 2, "length": 100.0, "seed": 7},
+                {"cars": 1, "years": 1, "length": 100.0},
+                {"cars": 2, "years": 1, "length": 100.0},
+                {"cars": 1, "years": 1, "length": 100.0, "seed": 7},
             ]
         },
     )
@@ -390,6 +390,25 @@ def test_a_file_with_sessions_is_read(tmp_path):
     (one,) = conditions(quick)
     assert one.changes["database"]["sessions"] == {"1": {"years": 10}}
     assert load_experiment(path, ["database.keep=latest"])
+
+
+def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
+    wanted = experiment(
+        maps=[str(town)],
+        database={
+            "sessions": [{"viewpoint": "near"}, {"viewpoint": "lane"}],
+            "maintain": ["none", "distance"],
+        },
+        tasks=["place", "localise"],
+        **SIMULATED,
+    )
+    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
+    jobs = study._plan(study._drives(())).jobs
+    (upkeep,) = [name for name in jobs if name.startswith("upkeep ")]
+    waiting = [one.name for one in jobs.values() if upkeep in one.needs]
+    kinds = sorted(name.partition(" ")[0] for name in waiting)
+    # The places of both drives are described in the updated map.
+    assert kinds == ["describe", "describe", "localise"]
 
 
 @pytest.mark.slow
