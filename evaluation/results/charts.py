@@ -54,6 +54,7 @@ from evaluation.results.summaries import (
     paired_values,
 )
 from evaluation.results.table import (
+    COSTS,
     LAST,
     OWN,
     STAGE,
@@ -392,7 +393,7 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
             if x[-1:] == at[-1:]:
                 last.setdefault(label, []).append(y[-1])
         _spread(axes, at)
-        if chart.metric.endswith("_ms"):
+        if chart.metric in COSTS:
             axes.set_yscale("log")
         else:
             _start_at_zero(axes, y=chart.metric)

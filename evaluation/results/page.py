@@ -26,7 +26,13 @@ from evaluation.results.summaries import (
     means,
     summarised,
 )
-from evaluation.results.table import KEYS, SETTINGS, QueryRows, Results
+from evaluation.results.table import (
+    COSTS,
+    KEYS,
+    SETTINGS,
+    QueryRows,
+    Results,
+)
 from evaluation.results.table_forms import in_table_order
 from evaluation.results.table_forms import title as title_of
 
@@ -47,7 +53,7 @@ _HEADLINES = {
     "localise": ("success_03m_1deg", "success_2m_5deg", "kept"),
     "map": ("miou", "right_structures", "called_structures"),
     "change": ("tcr_sym", "tcr_sym_masked"),
-    "cost": ("query_time", "build_time", "memory"),
+    "cost": COSTS,
 }
 _MOST_COLUMNS = 12
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3", "": "0 99"}

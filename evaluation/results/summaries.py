@@ -32,6 +32,7 @@ from evaluation.recognition.metrics import (
 from evaluation.recognition.place_outcome import kept_share
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import (
+    COSTS,
     Answers,
     Key,
     QueryRows,
@@ -549,7 +550,7 @@ def summarised(
             found += correlations(results.where(gate=False), x, y)
         elif chart.get("kind") == "lines" and metric == "kept":
             found += lifetimes(results, over)
-        elif chart.get("kind") == "lines" and metric.endswith("_ms"):
+        elif chart.get("kind") == "lines" and metric in COSTS:
             x = "places" if "places" in results.distinct("metric") else over
             found += growths(results, x, metric)
     if queries is not None and CAUSE in queries.factors:

@@ -90,6 +90,8 @@ _RESAMPLED = ("auc", "auc_strict", "r1")
 _MOST_MISSED = 0.05
 # Rounding may lead beyond 0 and 1 by this.
 _ROUNDING = 1e-9
+# What a database costs; it grows with the number of places.
+COSTS = ("query_time", "build_time", "memory")
 # Metrics that are known for any set of queries.
 _ALWAYS_KNOWN = ("auc", "auc_strict")
 # Columns of tables of earlier versions -> the command that makes such a table

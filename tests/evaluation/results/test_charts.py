@@ -239,10 +239,10 @@ def test_maps_may_be_the_lines_of_a_matrix():
 
 def test_times_are_on_a_logarithmic_axis():
     rows = [
-        row(value, {YEARS: year}, metric="query_ms", task="cost")
+        row(value, {YEARS: year}, metric="query_time", task="cost")
         for year, value in ((0, 1.0), (5, 100.0))
     ]
-    chart = {"kind": "lines", "over": YEARS, "metric": "query_ms"}
+    chart = {"kind": "lines", "over": YEARS, "metric": "query_time"}
     (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
     assert axes.get_yscale() == "log"
 

@@ -127,10 +127,10 @@ def test_growth_of_a_power_law():
         rows += [
             row(float(number), at, metric="places"),
             row(float(number), at, metric="places", gate=True),
-            row(3.0 * number**1.5, at, metric="query_ms", task="cost"),
+            row(3.0 * number**1.5, at, metric="query_time", task="cost"),
         ]
-    found = summaries.growths(Results.of(rows), "places", "query_ms")
-    what = "exponent of query_ms over places, at"
+    found = summaries.growths(Results.of(rows), "places", "query_time")
+    what = "exponent of query_time over places, at"
     assert [one.what for one in found] == [f"{what} 200", f"{what} 800"]
     assert [one.value for one in found] == pytest.approx([1.5, 1.5])
 
@@ -185,7 +185,12 @@ def test_summaries_of_charts():
             for year, value in ((0, 1.0), (10, 0.6))
         ),
         *(
-            row(10.0 ** (k * 2), {YEARS: 10**k}, metric="query_ms", task="cost")
+            row(
+                10.0 ** (k * 2),
+                {YEARS: 10**k},
+                metric="query_time",
+                task="cost",
+            )
             for k in (0, 1)
         ),
         *(row(0.9 - 0.1 * k, {YEARS: k, "query.nth": k}) for k in range(5)),
@@ -201,7 +206,7 @@ def test_summaries_of_charts():
         queries,
         [
             {**lines, "metric": "kept"},
-            {**lines, "metric": "query_ms"},
+            {**lines, "metric": "query_time"},
             {"kind": "scatter", "x": "query.nth", "y": "auc"},
             {"kind": "matrix", "over": "method", "metric": "auc"},
         ],
@@ -211,7 +216,7 @@ def test_summaries_of_charts():
         {
             f"{YEARS} until 90 % is left (of 10)": 2.5,
             f"{YEARS} until 50 % is left (of 10)": math.inf,
-            f"exponent of query_ms over {YEARS}, at 10": 2.0,
+            f"exponent of query_time over {YEARS}, at 10": 2.0,
             "rank correlation of 1 - auc with query.nth": 1.0,
             "excess of a and b": 0.2,
         }
@@ -243,7 +248,7 @@ def test_a_ranking_counts_what_all_methods_have():
     assert np.isnan([one.interval.high for one in found]).all()
 
 
-@pytest.mark.parametrize("metric", ["auc", "query_ms"])
+@pytest.mark.parametrize("metric", ["auc", "query_time"])
 def test_the_interval_of_a_mean_over_maps(metric):
     """SciPy's t interval; maps with more conditions count more often."""
     means = {"x": 0.5, "y": 0.7, "z": 0.8, "w": 0.6}
