@@ -302,9 +302,11 @@ class PairMaker:
                 )
         for place, changes in sessions.items():
             self._check_side(place, changes)
+        if SESSIONS in sides["database"]:
+            self._check_side("database", sides["database"])
         self._check_side("query", sides["query"])
         database = self._database(sessions, sides, condition, seed)
-        years = max(one.get("years", 0) for one in sessions.values())
+        years = _oldest(sides["database"], sessions)
         age = years, sides["database"].get("rates", 1.0)
         drive = self._changed("query", sides["query"], age, seed)
         query = self._named("query", drive, condition.factors, seed)
@@ -426,7 +428,9 @@ class PairMaker:
         city these years have passed. So the city of the oldest drive is aged by
         the years of the query, which are 0 in most experiments; the city of
         each other drive by its distance from the oldest one as well; and the
-        city of the query by the years of the oldest drive.
+        city of the query by the years of the oldest drive. The years of the
+        database itself count as those of a drive, so that databases of other
+        drives have the same query.
 
         Args:
             sessions: place in the file -> changes of each drive.
@@ -436,7 +440,7 @@ class PairMaker:
         """
         query = sides["query"]
         since = query.get("years", 0)
-        oldest = max(one.get("years", 0) for one in sessions.values())
+        oldest = _oldest(sides["database"], sessions)
         rates = query.get("rates", 1.0)
         if any(one.get("years", 0) != oldest for one in sessions.values()):
             rates = sides["database"].get("rates", rates)
@@ -778,6 +782,11 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
         title=f"Control: the route of {drive.name} in stage {stage}",
         driver=driver,
     )
+
+
+def _oldest(database: Changes, sessions: Mapping[str, Changes]) -> int:
+    """Returns by how many years the city of the query is aged."""
+    return max(one.get("years", 0) for one in (database, *sessions.values()))
 
 
 def _factors_of(place: str, factors: Changes) -> dict[str, Any]:

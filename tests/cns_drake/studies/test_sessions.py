@@ -98,6 +98,16 @@ def test_each_session_sees_the_city_of_its_year(town):
     assert "aged" not in found.database.map
 
 
+def test_the_years_of_the_database_fix_the_city_of_the_query(town):
+    new, old = compared(
+        town,
+        database={"years": 20, "sessions": [[{"years": 1}], [{"years": 15}]]},
+    )
+    assert [one.stage for one in new.drives] == ["19", "20"]
+    assert [one.stage for one in old.drives] == ["05", "20"]
+    assert new.query == old.query
+
+
 def test_years_of_the_query_move_all_drives(town):
     """The query is 2 years old, so the oldest of 10 years is 8 before it."""
     (found,) = compared(
@@ -228,6 +238,7 @@ FAULTS = [
     ),
     ({"sessions": [{"keep": 1}]}, r"database\.sessions\.1\.keep: all drives"),
     ({"sessions": [{"rates": 2}]}, r"database\.sessions\.1\.rates: all dri"),
+    ({"years": -1, "sessions": [{"years": 2}]}, r"database\.years: -1 is"),
     ({"sessions": [{"years": 201}]}, r"database\.sessions\.1\.years: 201 is"),
     ({"sessions": [{"years": True}]}, r"database\.sessions\.1\.years: True"),
     (
