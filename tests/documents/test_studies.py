@@ -192,3 +192,18 @@ def test_inline_examples_load(tmp_path):
         {"name": "a", "maps": [yaml.safe_load(line)]}
     )
     assert made.maps[0].years == 20
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [("sessions", 6), ("maintenance", 7)]
+)
+def test_examples_of_several_drives_have_one_query(name, number):
+    """Whatever the database, the city of the query is 20 years older."""
+    path = documents.ROOT / f"docs/examples/{name}.yaml"
+    (cells,) = {
+        tuple(sorted({one.factors["cause"] for one in conditions(some)}))
+        for some in (load_experiment(path), load_experiment(path, quick=True))
+    }
+    assert len(cells) == number
+    for one in conditions(load_experiment(path)):
+        assert one.changes["database"]["years"] == 20
