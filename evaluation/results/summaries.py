@@ -41,6 +41,10 @@ from evaluation.results.table import (
 )
 
 CAUSE = "cause"
+# Factor: what updates the map of several drives; its values without updates,
+# and with exact ones.
+MAINTAIN = "database.maintain"
+_NOT_MAINTAINED, _EXACTLY = "none", "truth"
 LEVEL = "level"
 NO_CAUSE = "none"
 # Joins the names of causes that come together.
@@ -523,6 +527,54 @@ def ranking(
     return [found[k] for k in order], samples[:, order]
 
 
+def worths(results: Results, metric: str) -> list[Summary]:
+    """Returns what each change detector is worth that updates a map.
+
+    The worth is the detector's share of the way from a map that is never
+    updated to one that is updated by exact labels: 0 if the metric is as in the
+    former, 1 if it is as in the latter, and negative if the detector does harm.
+    It is the quotient of two sums of differences, over all conditions that were
+    measured with the detector, without updates and with exact ones. If exact
+    updates change nothing, there is no worth.
+
+    Args:
+        results: the table of results.
+        metric: name of a metric.
+    """
+    groups: dict[tuple, dict[str, tuple[Row, float]]] = {}
+    for row in results.where(metric=metric).rows:
+        factors = dict(row.factors)
+        maintain = str(factors.pop(MAINTAIN, ""))
+        of_method = row.map, row.task, row.label, row.gate
+        condition = row.database, row.query, row.seed, *factors.items()
+        group = groups.setdefault((*of_method, *condition), {})
+        group[maintain] = row, row.value
+    ways: dict[tuple, list[tuple[Row, float, float]]] = {}
+    for group in groups.values():
+        if not {_NOT_MAINTAINED, _EXACTLY} <= group.keys():
+            continue
+        (_, start), (_, end) = group[_NOT_MAINTAINED], group[_EXACTLY]
+        for maintain, (row, value) in group.items():
+            way = value - start, end - start
+            if maintain in (_NOT_MAINTAINED, _EXACTLY) or any(
+                map(math.isnan, way)
+            ):
+                continue
+            name = maintain, row.map, row.task, row.label, row.gate
+            ways.setdefault(name, []).append((row, *way))
+    found = []
+    for (maintain, *_), some in ways.items():
+        row = some[0][0]
+        whole = sum(end for _, _, end in some)
+        if whole == 0.0:
+            continue
+        share = sum(way for _, way, _ in some) / whole
+        what = f"worth of {maintain}, of the way to {_EXACTLY}: {metric}"
+        one = Summary.of(what, row, share)
+        found.append(one._replace(n=len(some)))
+    return found
+
+
 def summarised(
     results: Results,
     queries: QueryRows | None,
@@ -532,9 +584,10 @@ def summarised(
 
     A scatter plot is summed up by the function `correlations` of this module. A
     chart of the kind `lines` is summed up by `lifetimes` if its metric is
-    `kept`, and by `growths` if its metric is a CPU time. Other charts give no
-    numbers. For an experiment with the factor `cause`, the result also contains
-    the numbers of `excesses`.
+    `kept`, and by `growths` if its metric is a CPU time. A chart over what
+    updates a map is summed up by `worths`. Other charts give no numbers. For an
+    experiment with the factor `cause`, the result also contains the numbers of
+    `excesses`.
 
     Args:
         results: all results of the experiment.
@@ -548,6 +601,8 @@ def summarised(
         if chart.get("kind") == "scatter":
             x, y = str(chart.get("x")), str(chart.get("y"))
             found += correlations(results.where(gate=False), x, y)
+        elif over == MAINTAIN:
+            found += worths(results, metric)
         elif chart.get("kind") == "lines" and metric == "kept":
             found += lifetimes(results, over)
         elif chart.get("kind") == "lines" and metric in COSTS:

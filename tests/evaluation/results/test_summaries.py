@@ -286,3 +286,34 @@ def test_a_ranking_of_one_condition_has_its_intervals():
     found, _ = summaries.ranking([one])
     assert found[0].interval == Interval(0.4, 0.7)
     assert summaries.ranking([one, row(0.1, {SNOW: 1}, method="b")])[0] == []
+
+
+MAINTAIN = "database.maintain"
+
+
+def maintained(values, year=5, **names):
+    return [
+        row(value, {MAINTAIN: how, YEARS: year}, metric="r1", **names)
+        for how, value in values.items()
+    ]
+
+
+def test_a_detector_is_worth_its_share_of_the_way_to_the_truth():
+    """Two conditions: (0.1 + 0.2) of (0.2 + 0.4); harm is negative."""
+    rows = [
+        *maintained({"none": 0.5, "truth": 0.7, "distance": 0.6}),
+        *maintained({"none": 0.4, "truth": 0.8, "distance": 0.6}, seed=2),
+        *maintained({"none": 0.5, "truth": 0.6, "m3c2": 0.4}, method="solid"),
+        # Nothing to gain; and no exact updates, or others are unknown.
+        *maintained({"none": 0.5, "truth": 0.5, "m3c2": 0.5}, gate=True),
+        *maintained({"none": 0.5, "distance": 0.9}, year=9),
+        *maintained({"none": 0.5, "truth": 0.9, "m3c2": math.nan}, year=7),
+    ]
+    charts = [{"kind": "matrix", "over": MAINTAIN, "metric": "r1"}]
+    found = summaries.summarised(Results.of(rows), None, charts)
+    assert [(one.method, one.gate, one.n) for one in found] == [
+        ("btc", False, 2),
+        ("solid", False, 1),
+    ]
+    assert [one.value for one in found] == pytest.approx([0.5, -1.0])
+    assert found[0].what == "worth of distance, of the way to truth: r1"
