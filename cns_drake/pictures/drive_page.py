@@ -205,7 +205,8 @@ def make_panel(
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
     duration = (len(p_WBset) - 1) * drive.period
-    minutes, seconds = divmod(int(duration), 60)
+    minutes, seconds = divmod(round(duration), 60)
+    took = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
     lowest, highest = drawing.POINT_HEIGHTS
     environment = Environment(
         autoescape=True,
@@ -216,7 +217,7 @@ def make_panel(
     return environment.from_string(_read_template("panel.html")).render(
         style=Markup(_read_template("drive.css")),
         title=title,
-        facts=f"{length / 1000.0:.2f} km in {minutes} min {seconds} s",
+        facts=f"{length / 1000.0:.2f} km in {took}",
         points=_gradient(drawing.height_rgb(np.linspace(lowest, highest, 9))),
         heights=f"{lowest:g} to {highest:g} m",
         route=_gradient([drawing.START_RGB, drawing.END_RGB]),

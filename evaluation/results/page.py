@@ -148,19 +148,18 @@ def write_page(
         ),
         section(
             "conditions",
-            f"All {len(table['rows'])} conditions and methods",
+            "Conditions",
             table=table,
         ),
         section(
             "made_by",
-            "Tables and experiment",
+            "Files",
             experiment_text=experiment_text,
             queries=sum(len(one.columns["correct"]) for one in answers),
         ),
     ]
     if numbers:
-        word = f"{len(numbers)} summaries"
-        sections.insert(1, section("summaries", word, numbers=numbers))
+        sections.insert(1, section("summaries", "Summaries", numbers=numbers))
     if shown:
         charts_shown = section(
             "charts",
@@ -220,12 +219,15 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     by_condition = 1 < len(cells) <= _MOST_COLUMNS
     if by_condition:
         metrics = metrics[:1]
-    found = {
-        one.key: one
-        for one in means(
-            rows, "label", "gate", "metric", *(factors if by_condition else ())
-        )
-        if one.number
+    shown = ("label", "gate", "metric", *(factors if by_condition else ()))
+    found = {one.key: one for one in means(rows, *shown) if one.number}
+    # A single result has an interval of its own.
+    intervals = {
+        key: (row.low, row.high)
+        for row in rows
+        if (key := tuple(row[name] for name in shown)) in found
+        and found[key].number == 1
+        and not math.isnan(row.low + row.high)
     }
     columns = [
         (metric, *(cell if by_condition else ()))
@@ -236,7 +238,10 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         {
             "name": (title_of(name) or "–")
             + (", with geometric verification" if gate else ""),
-            "cells": [found.get((name, gate, *one)) for one in columns],
+            "cells": [
+                (found.get(key), intervals.get(key))
+                for key in ((name, gate, *one) for one in columns)
+            ],
         }
         for gate in sorted({row.gate for row in rows})
         for name in in_table_order(row.label for row in rows)
@@ -293,10 +298,29 @@ def _wide_table(results: Results) -> dict[str, Any]:
         any(isinstance(v, str) for v in column)
         for column in zip(*cells, strict=True)
     ]
+    columns = [
+        [f"{v:.0f}" if _is_finite(v) else _shown(v) for v in column]
+        if _are_counts(column)
+        else [_shown(v) for v in column]
+        for column in zip(*cells, strict=True)
+    ]
     return {
         "header": list(zip(names, is_text, strict=True)),
-        "rows": [[_shown(value) for value in line] for line in cells],
+        "rows": list(zip(*columns, strict=True)),
     }
+
+
+def _are_counts(values: Iterable[object]) -> bool:
+    """Returns whether all numbers are whole, and one is greater than 1.
+
+    That all shares are 0 or 1 may be chance.
+    """
+    numbers = np.array([v for v in values if _is_finite(v)])
+    return bool((numbers == np.floor(numbers)).all() and (numbers > 1.0).any())
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, float) and math.isfinite(value)
 
 
 def _shown(value: object) -> str:

@@ -519,6 +519,51 @@ def test_a_page_stands_alone(tmp_path):
     assert names == ["chart_1.pdf", "chart_1.png", "index.html"]
 
 
+@pytest.mark.parametrize(
+    ("ends", "seeds", "cell"),
+    [
+        ((0.4, 0.6), (0,), "0.500(0.400–0.600)"),
+        # An interval that is unknown, and results of several seeds.
+        ((math.nan, math.nan), (0,), "0.500"),
+        ((0.4, 0.6), (0, 1), "0.5000.500 to 0.500"),
+    ],
+)
+def test_a_single_result_has_its_interval(tmp_path, ends, seeds, cell):
+    low, high = ends
+    results = Results.of(
+        replace(row(0.5, {YEARS: year}, seed=seed), low=low, high=high)
+        for year in (0, 10)
+        for seed in seeds
+    )
+    page = _Page()
+    page.feed(write_page(results, None, tmp_path, title="one").read_text())
+    assert page.tables[0][1] == ["mine", cell, cell]
+
+
+def test_counts_are_whole_on_a_page(tmp_path):
+    values = {
+        "lost": (29.0, 106.0),
+        "first_right_rank": (3.0, math.inf),
+        # Shares that are 0 or 1 by chance, and a metric that is no count.
+        "r1": (0.0, 1.0),
+        "found": (2.0, 2.5),
+    }
+    results = Results.of(
+        row(value, {YEARS: year}, metric=metric)
+        for metric, both in values.items()
+        for year, value in zip((0, 10), both, strict=True)
+    )
+    path = write_page(results, None, tmp_path, title="counts")
+    page = _Page()
+    page.feed(path.read_text())
+    header, *lines = page.tables[-1]
+    columns = dict(zip(header, zip(*lines, strict=True), strict=True))
+    assert columns["lost"] == ("29", "106")
+    assert columns["first_right_rank"] == ("3", "more")
+    assert columns["r1"] == ("0.000", "1.000")
+    assert columns["found"] == ("2.000", "2.500")
+
+
 def test_a_page_without_a_chart_or_a_value(tmp_path):
     results = Results.of([row(math.nan, {YEARS: 0}, metric="kept")])
     chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
