@@ -62,6 +62,7 @@ from evaluation.results.drawing import (
     METHOD_STYLES,
     NEW,
     PALE,
+    name_lines,
     unit,
 )
 from evaluation.results.table import Results, Row
@@ -385,15 +386,12 @@ def years(path: Path) -> None:
         axes.set_ylim(0.0, 110.0)
         axes.set_xticks(x)
         _plain(axes, "both")
+    for axes in grid[:, 1]:
+        name_lines(figure, axes, 0.095, _FONT["font.size"])
     for axes in grid[1]:
         axes.set_xlabel("age of the map [years]")
     figure.supylabel("retained AUC [%]", fontsize=13)
     _head(figure, "BTC fails in each city as its map grows old")
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(
-        handles[::-1], labels[::-1], loc="outside lower center", ncols=4,
-        frameon=False,
-    )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
 
 
@@ -402,7 +400,7 @@ def ladder(path: Path) -> None:
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
     chart = {"kind": "matrix", "over": "cause", "metric": "kept"}
     drawn = charts.draw(chart, results, 480)
-    _head(drawn.figure, "Weather, lateral offset\nand another sensor cost most")
+    _head(drawn.figure, "Weather, lateral offset\nand sensor cost most")
     drawn.figure.savefig(path, dpi=220)
 
 
@@ -448,10 +446,15 @@ def _allan(axes: Axes) -> None:
         axes.loglog(taus, walk * np.sqrt(taus / 3.0), "k:", lw=0.8)
         at = (1.4e-2, (0.16, 0.004)[k])
         axes.annotate(f"{name} [{('m/s²', 'rad/s')[k]}]", at, color=colour)
+    given = [
+        Line2D([], [], color="black", lw=0.8, ls=style) for style in ("--", ":")
+    ]
+    words = ("given white noise", "given random walk")
+    axes.legend(given, words, loc="lower right", frameon=False, borderpad=0.0)
     axes.set_ylim(1e-6, 0.4)
     axes.set_xlabel("averaging time [s]")
     axes.set_ylabel("Allan deviation")
-    axes.set_title("A resting IMU errs by its densities", loc="left")
+    axes.set_title("An IMU at rest has the noise that it was given", loc="left")
 
 
 def _spectra(axes: Axes) -> None:
@@ -475,10 +478,11 @@ def _spectra(axes: Axes) -> None:
         waves = np.array([1.0 / 90.0, 1.0 / 0.35])
         axes.loglog(waves, 16e-6 * 4.0**k * (waves / 0.1) ** -2, "k--", lw=0.8)
         axes.annotate(f"class {roughness}", (4.4, shown[-1]), va="center")
+    axes.annotate("dashed: ISO 8608", (8e-3, 3e-8))
     axes.set_xlim(right=13.0)
-    axes.set_xlabel("waves a metre [1/m]")
+    axes.set_xlabel("spatial frequency [1/m]")
     axes.set_ylabel("spectral density of heights [m³]")
-    axes.set_title("Roads are as rough as their class", loc="left")
+    axes.set_title("Roads are as rough as their ISO 8608 class", loc="left")
 
 
 def layers(path: Path) -> None:

@@ -56,7 +56,7 @@ def draw_pr_curves(
             )
             axes.grid(alpha=0.3)
             # Beside the curves, which they would hide.
-            name_lines(axes, _NAME_GAP, _NAME_SIZE)
+            name_lines(figure, axes, _NAME_GAP, _NAME_SIZE)
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")

@@ -10,7 +10,7 @@ from matplotlib.collections import Collection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.transforms import Bbox
+from matplotlib.transforms import Bbox, BboxTransformTo, ScaledTranslation
 import numpy as np
 from sklearn.isotonic import isotonic_regression
 
@@ -62,13 +62,14 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def name_lines(axes: Axes, gap: float, size: float) -> None:
+def name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
     """Writes the names of a panel's lines right of it, at the lines' ends.
 
     Names that would overlap are moved apart, as little as possible. Lines
     without a label get no name.
 
     Args:
+        figure: the figure that the panel is in.
         axes: the panel, whose limits do not change any more.
         gap: least distance between two names, as a part of the panel's height.
         size: size of the letters [pt].
@@ -86,15 +87,19 @@ def name_lines(axes: Axes, gap: float, size: float) -> None:
     moved = np.clip(moved, 0.0, max(1.0 - steps[-1], 0.0)) + steps
     for index, height in zip(order, moved, strict=True):
         line = lines[index]
+        # In inches from the panel's edge, so that letters have room.
+        inches = figure.dpi_scale_trans + ScaledTranslation(
+            1.0, height, BboxTransformTo(axes.bbox)
+        )
         axes.plot(
-            [1.03, 1.08], [height] * 2, transform=axes.transAxes, clip_on=False,
+            [0.1, 0.25, 0.4], [0.0] * 3, transform=inches, clip_on=False,
             color=line.get_color(), linestyle=line.get_linestyle(),
             linewidth=line.get_linewidth(), marker=line.get_marker(),
-            markersize=line.get_markersize(),
+            markersize=line.get_markersize(), markevery=[1],
         )  # fmt: skip
         axes.text(
-            1.1, height, line.get_label(), fontsize=size, color=INK,
-            va="center", transform=axes.transAxes,
+            0.48, 0.0, line.get_label(), fontsize=size, color=INK, va="center",
+            transform=inches,
         )  # fmt: skip
 
 

@@ -120,11 +120,16 @@ def test_names_stand_beside_the_curves(tmp_path, monkeypatch):
     ],
 )
 def test_names_move_apart_as_little_as_possible(ends, heights):
-    axes = Figure().subplots()
+    figure = Figure()
+    axes = figure.subplots()
     for number, end in enumerate(ends):
         axes.plot([0.0, 1.0], [0.3, end], label=str(number))
     axes.axhline(0.5)  # Has no name.
     axes.set_ylim(0.0, 1.0)
-    name_lines(axes, 0.1, 10.0)
-    found = {text.get_text(): text.get_position()[1] for text in axes.texts}
+    name_lines(figure, axes, 0.1, 10.0)
+    of_panel = axes.transAxes.inverted()
+    found = {}
+    for text in axes.texts:
+        at = text.get_transform().transform(text.get_position())
+        found[text.get_text()] = of_panel.transform(at)[1]
     assert [found[str(n)] for n in range(len(ends))] == pytest.approx(heights)
