@@ -134,7 +134,10 @@ class Fleet(Section):
                         "years": years,
                         "route": {"length": self.length, "seed": number},
                         "viewpoint": str(rng.choice(list(VIEWPOINTS))),
-                        "transient": {"leaves": float(rng.integers(2))},
+                        "transient": {
+                            "leaves": float(rng.integers(2)),
+                            "seed": number,
+                        },
                     }
                 )
         return found
