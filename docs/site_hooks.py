@@ -23,8 +23,8 @@ PACKAGES = ("cns_drake", "evaluation")
 _PROJECT = "project"
 # Where `nav` in mkdocs.yml has the tab of the API reference.
 _API_TAB = -2
-# Blocks of code have a `span` before `code`.
-_INLINE_CODE = re.compile(r"(?<!</span>)<code>[^<]*</code>")
+# Code in a line, and blocks of commands; blocks of a language have elements.
+_PLAIN_CODE = re.compile(r"<code>[^<]*</code>")
 _WITH_HYPHEN = re.compile(r"[^\s<>]{,40}-[^\s<>]{,40}")
 _FORMULA = re.compile(r"^( *)```math\n(.*?)\n *```$", re.DOTALL | re.MULTILINE)
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
@@ -83,7 +83,7 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
 
 def on_page_content(html: str, **_: Any) -> str:
     """Keeps lines from breaking in names, in options and before %."""
-    return _INLINE_CODE.sub(
+    return _PLAIN_CODE.sub(
         lambda code: _WITH_HYPHEN.sub(
             r'<span class="whole">\g<0></span>', code[0]
         ),
