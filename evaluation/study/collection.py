@@ -167,15 +167,16 @@ def find_recordings(
 ) -> list[RecordingInfo]:
     """Returns all recordings in a folder and its direct subfolders.
 
-    They can have any format that `evaluation.drives.open_drive` reads. Drives
-    in the layout of CNS and KITTI are found up to three levels down, where
-    exports put them. Those in the layout of KITTI need a `scenario.yaml`.
+    The recordings can have any format that `evaluation.drives.open_drive`
+    reads. Recordings in the layouts of CNS and KITTI are found up to three
+    levels down, where exports put them. A recording in the layout of KITTI
+    needs a `scenario.yaml`.
 
-    A recording states its map and stage in its scenario. Without a scenario,
-    they are taken from its name: `<map>_<stage>`, or without `_` as in KAIST01,
-    or `<map>-<date>`. If the name is only a date, as in NCLT, the world frame
-    is the map. What is left out is told by a note: recordings without map and
-    stage, and those in deeper folders.
+    Map and stage of a recording come from its scenario. Without a scenario,
+    the name of the recording gives both: `<map>_<stage>`, `<map><stage>` as in
+    KAIST01, or `<map>-<date>`. If the name is only a date, as in NCLT, the
+    world frame is the map. Recordings without map and stage, and recordings in
+    deeper folders, are left out with a note.
 
     Args:
         folder: the folder.

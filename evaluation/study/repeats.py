@@ -25,8 +25,8 @@ class Repeat:
     Attributes:
         method: the method.
         protocol: the protocol of the published numbers.
-        shares_places: whether the run uses the descriptions of the places of
-            the first run. Otherwise the places are described again.
+        shares_places: whether the run uses the descriptors of the places that
+            the first run computed, instead of computing its own.
     """
 
     method: MethodChoice

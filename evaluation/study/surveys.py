@@ -297,8 +297,8 @@ def survey_recording(
         recording: the drive.
         roles: whether the drive has places of the database, queries, or both;
             the set may be empty.
-        asked: key of a description -> method, roles and protocol of this
-            description; empty if the drive has neither places nor queries.
+        asked: key of each set of descriptors to compute -> method, roles and
+            protocol; empty if the drive has neither places nor queries.
         protocol: protocol that chooses the frames whose scans are shown as
             thumbnails and, if `with_scans` is set, kept.
         with_scans: whether the result contains the scans of the places and

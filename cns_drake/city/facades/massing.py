@@ -253,7 +253,7 @@ def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
 
 
 def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
-    """Returns a pyramid over an outline, with a lower side.
+    """Returns a pyramid over an outline, closed by a base.
 
     The outline `eaves` (N, 2) is at the height z0; the tip is at the place
     `tip` (2,) and the height z1 [m].

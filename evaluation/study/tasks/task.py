@@ -159,7 +159,10 @@ class Pair:
 
     @property
     def is_composed(self) -> bool:
-        """Whether the database is more, or less, than the places of a drive."""
+        """Whether the database differs from the places of a single drive.
+
+        It does if it has places of several drives, or only some of one.
+        """
         return bool(self.beside) or self.keep != KEEP_ALL
 
     @property
@@ -437,8 +440,8 @@ class Task(abc.ABC):
         """Adds the jobs that measure a pair of drives to `jobs`.
 
         Returns:
-            The results, as files to which the jobs write them or in memory;
-            none if the task does not apply to the pair.
+            The results: files that the jobs write, or objects in memory. There
+            are none if the task does not apply to the pair.
         """
 
     def found(self, pair: Pair) -> Any:
