@@ -4,7 +4,7 @@ Files of sound parts that contradict each other (lies) are refused, or give
 what the parts agree on.
 
 `pytest tests/fuzzing --fuzz 100000` damages files that many times in place of
-the three hundred times that fit beside the other tests, and `--fuzz-seed` does
+the hundred times that fit beside the other tests, and `--fuzz-seed` does
 it in other ways. A failure names the folder with the files that caused it.
 """
 

@@ -50,11 +50,11 @@ PLANS = {
 }
 
 # To draw one of these takes over ten seconds of processor time.
-_BY_NIGHT = ("downtown", "riverside")
+_BY_NIGHT = ("downtown", "metropolis", "riverside")
 
 
 def by_day_or_night() -> list:
-    """Returns a parameter for each map; the larger ones are for the night."""
+    """Returns a parameter for each map; all but Suburbia are for the night."""
     night = pytest.mark.night
     return [
         pytest.param(name, marks=night) if name in _BY_NIGHT else name

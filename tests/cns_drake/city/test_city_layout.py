@@ -131,6 +131,7 @@ def test_a_district_does_not_disturb_another(lay_out_text):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_the_seed_matters_and_nothing_else_does(lay_out_text):
     first, again = lay_out_text(PLAN), lay_out_text(PLAN)
     other = lay_out_text(PLAN.replace("seed: 3", "seed: 4"))

@@ -414,6 +414,7 @@ def test_far_structures_are_left_out(tmp_path):
     assert ("object more than 10 km away, left out", 3, "far") in report.faults
 
 
+@pytest.mark.night
 def test_large_surfaces_are_no_burden(tmp_path):
     city = CityWriter()
     for x in range(0, 200, 40):

@@ -410,6 +410,7 @@ def test_differences_of_every_two_methods(report):
         assert row["gate"] == "0"
 
 
+@pytest.mark.night
 def test_report_is_the_same_for_any_number_of_workers(
     recordings, report, tmp_path
 ):
