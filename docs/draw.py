@@ -10,7 +10,7 @@ they made before is taken as it is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 import csv
 import hashlib
 import io
@@ -65,13 +65,12 @@ from evaluation.results.drawing import (
     name_lines,
     unit,
 )
-from evaluation.results.table import Results, Row
+from evaluation.results.headlines import SURVIVES, listed, survivors
+from evaluation.results.table import OWN, STAGE, Results, Row
 from evaluation.results.table_forms import title
 
 # The methods that this project made; all others are published ones.
 OURS = {"layered-overlap", "learned"}
-# Networks with the weights of their authors.
-_NETWORKS = {"SVT-Net", "DPA-Net"}
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs/pictures"
 REGISTRY = ROOT / "docs/pictures.yaml"
@@ -138,111 +137,95 @@ def main(names: Sequence[str]) -> None:
 
 
 def survival(path: Path) -> str:
-    """Draws what methods and outside networks retain; returns the title.
+    """Draws what methods retain of their AUC strict; returns the title.
 
-    The networks were measured only by R@1, without random yaw. A panel of its
-    own shows all methods that were measured like this.
+    Cities are the units: a point is the mean over a city's pairs, and a bar is
+    the 95 % t interval over the cities.
     """
-    numbers = ("No", "One", "Two", "Three", "Four", "Five", "Six")
-    tables = [kept_shares(name) for name in ("stages", "fresh")]
-    strict = kept_shares("stages", "kept_strict")
-    # A method survives if the median pair keeps this share of its AUC.
-    medians = [{n: np.median(some[n]) for n in some} for some in tables]
-    order = sorted(METHOD_STYLES, key=medians[0].__getitem__)
-    survivors = {n for n in order if min(some[n] for some in medians) >= 0.95}
-    assert survivors == OURS  # As the title says.
-    figure = Figure(figsize=(_WIDTH, 9.2), layout="constrained")
-    upper, lower = figure.subfigures(2, height_ratios=(5.0, 4.2))
-    panels = upper.subplots(1, 2, sharey=True)
-    for y, name in enumerate(order):
-        colour = METHOD_STYLES[name][0]
-        for axes, shares, offset, fill in (
-            (panels[0], tables[0][name], 0.18, colour),
-            (panels[0], tables[1][name], -0.18, "none"),
-            (panels[1], strict[name], 0.0, colour),
-        ):
-            shown = 100.0 * np.array(shares)
-            at = y + offset
-            heights = np.full(len(shown), at)
-            axes.scatter(shown, heights, s=34, ec=colour, fc=fill)
-            ends = [at - 0.17, at + 0.17]
-            axes.plot([np.median(shown)] * 2, ends, color=INK, lw=3.5)
+    rows = kept_rows()
+    # The best method without geometric verification is on top.
+    order = [one.method for one in summaries.ranking(rows[False])[0]][::-1]
+    figure = Figure(figsize=(_WIDTH, 5.4), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, gate in zip(panels, (False, True), strict=True):
+        for one in summaries.ranking(rows[gate])[0]:
+            y = order.index(one.method)
+            colour = METHOD_STYLES[one.method][0]
+            ends = 100.0 * np.array([one.interval.low, one.interval.high])
+            axes.plot(ends, [y, y], color=INK, lw=2, zorder=2)
+            axes.plot(100.0 * one.value, y, "|", color=INK, ms=18, mew=3.5)
+            for city, (marker, _) in _CITY_MARKERS.items():
+                some = [
+                    row.value
+                    for row in rows[gate]
+                    if (row.map, row.method) == (city, one.method)
+                ]
+                at = 100.0 * np.mean(some)
+                axes.plot(at, y, marker, mec="white", mfc=colour, ms=9)
+        axes.axvline(100.0 * SURVIVES, color=INK, lw=1, ls=":", zorder=0)
+        axes.axvline(100.0, color=PALE, lw=1, zorder=0)
+        axes.set_xlim(-4.0, 119.0)
+        axes.set_xlabel("retained AUC strict [%]")
+        verified = "with" if gate else "without"
+        axes.set_title(f"{verified} verification", loc="left")
+        _plain(axes)
     names = [f"{title(n)}*" if n in OURS else title(n) for n in order]
     panels[0].set_yticks(range(len(order)), names)
-    for axes, metric in zip(panels, ("AUC", "AUC strict"), strict=True):
-        axes.set_xlabel(f"retained {metric} [%]")
-    finding = (
-        f"{numbers[len(survivors)]} of {numbers[len(order)].lower()} methods"
-        " survive a rebuilt city:\nboth are this project's own (*)"
+    signs = "  ".join(
+        f"{sign} {city.capitalize()}"
+        for city, (_, sign) in _CITY_MARKERS.items()
     )
-    counts = [len(some[order[0]]) for some in tables]
-    panels[0].set_title(
-        f"● {counts[0]} pairs of shipped cities   ○ {counts[1]} of fresh "
-        "cities   ┃ median",
-        loc="left", x=-0.57,
-    )  # fmt: skip
-    below = lower.subplots()
-    outside = outside_shares()
-    rows = sorted(outside, key=lambda n: np.mean(list(outside[n].values())))
-    names = []
-    for y, row in enumerate(rows):
-        key = next((n for n in order if title(n).lower() == row.lower()), "")
-        colour = METHOD_STYLES[key][0] if key else INK
-        for (city, _), share in outside[row].items():
-            fill = colour if city == "Metropolis" else "none"
-            below.scatter(100.0 * share, y, s=44, ec=colour, fc=fill)
-        mark = "*" if key in OURS else "†" if row in _NETWORKS else ""
-        names.append((title(key) if key else row) + mark)
-    below.set_yticks(range(len(rows)), names)
-    below.set_xlabel("retained R@1 [%], without random yaw")
-    below.set_title(
-        "● Metropolis   ○ Suburbia   † network trained by others",
-        loc="left", x=-0.25,
-    )  # fmt: skip
-    for axes in (*panels, below):
-        axes.set_xlim(-3.0, 119.0)
-        axes.axvline(100.0, color=PALE, linewidth=1, zorder=0)
-        _plain(axes)
+    figure.supxlabel(
+        f"{signs}\n┃ mean over pairs, with a 95 % interval over cities   "
+        "⋮ survives from here on",
+        fontsize=12,
+    )
+    finding = survival_title(
+        {gate: survivors(rows[gate]) for gate in (False, True)}
+    )
     _head(figure, finding)
     figure.savefig(path, dpi=_DPI)
     return finding
 
 
-def outside_shares() -> dict[str, dict[tuple[str, str], float]]:
-    """Returns the retained R@1 of methods and of networks of others.
-
-    Returns:
-        Method -> (city, weights of a network or "") -> R@1 in the map of the
-        first stage, divided by that in the unchanged city.
-    """
-    found: dict[str, dict[tuple[str, str], float]] = {}
-    for city, after, column in (
-        ("Metropolis", "### Metropolis", 2),
-        ("Suburbia", "without random yaw:", 4),
-    ):
-        _, *rows = _table("docs/notes/published_networks.md", after)
-        for name, *cells in rows:
-            before, now = (
-                float(cells[k].partition(" ")[0]) for k in (0, column - 1)
-            )
-            method, _, weights = name.partition(", ")
-            found.setdefault(method, {})[city, weights] = now / before
-    return found
+# Of each shipped city: its marker, and a character that looks like it.
+_CITY_MARKERS = {
+    "downtown": ("o", "●"),
+    "metropolis": ("s", "■"),
+    "riverside": ("^", "▲"),
+    "suburbia": ("D", "◆"),
+}
 
 
-def kept_shares(table: str, metric: str = "kept") -> dict[str, list[float]]:
-    """Returns method -> retained shares of a metric, one for each pair.
+def survival_title(found: Mapping[bool, Collection[str]]) -> str:
+    """Returns a title: which methods survive, without and with verification.
 
     Args:
-        table: `stages` or `fresh`, a shipped table.
-        metric: `kept` for AUC, `kept_strict` for AUC strict.
+        found: whether geometric verification was used -> methods that survive.
     """
-    file = ROOT / f"evaluation/results/baselines/{table}.csv"
-    rows = Results.read(file).where(metric=metric, gate=0).rows
-    return {
-        name: [row.value for row in rows if row.method == name]
-        for name in METHOD_STYLES
-    }
+
+    def named(some: Collection[str]) -> str:
+        marked = [f"{title(n)}{'*' * (n in OURS)}" for n in sorted(some)]
+        return listed(marked).lower() if marked else "no method"
+
+    alone, verified = named(found[False]), named(found[True])
+    if alone == verified:
+        return f"{alone.capitalize()} survives a rebuilt city"
+    return (
+        f"{alone.capitalize()} survives a rebuilt city;\n"
+        f"with geometric verification, {verified} does"
+    )
+
+
+def kept_rows() -> dict[bool, list[Row]]:
+    """Returns the retained shares of AUC strict, one for each pair and method.
+
+    Returns:
+        Whether geometric verification was used -> rows of the shipped table.
+    """
+    file = ROOT / "evaluation/results/baselines/stages.csv"
+    found = Results.read(file).where({STAGE: OWN}, metric="kept_strict")
+    return {gate: list(found.where(gate=gate).rows) for gate in (False, True)}
 
 
 def assumptions(path: Path) -> None:

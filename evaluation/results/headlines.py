@@ -22,7 +22,7 @@ SIGNIFICANT = 0.05
 # that it retains.
 KEPT = "kept_strict"
 # A method survives if the lower limit of this share is at least that.
-_SURVIVES = 0.9
+SURVIVES = 0.9
 
 
 def listed(names: Iterable[str]) -> str:
@@ -99,18 +99,25 @@ def survival(rows: Sequence[Row]) -> str:
         "Retained AUC strict, relative to the AUC strict without change"
         f" ({over}): {shares}."
     )
-    least = f"{100.0 * _SURVIVES:.0f} %"
+    least = f"{100.0 * SURVIVES:.0f} %"
     if not decided:
         return (
             f"{text} Fewer than {LEAST_UNITS} cities do not show whether a"
             f" method survives, that is, retains {least}."
         )
-    found = [one.method for one in ranked if one.interval.low >= _SURVIVES]
+    found = survivors(rows)
     which = listed(map(title, found)) if found else "none"
     return (
         f"{text} Methods that survive, because the lower limit is at least"
         f" {least}: {which}."
     )
+
+
+def survivors(rows: Sequence[Row]) -> list[str]:
+    """Returns the labels of the methods that survive, see `survival`."""
+    return [
+        one.method for one in ranking(rows)[0] if one.interval.low >= SURVIVES
+    ]
 
 
 def _share(value: float) -> str:

@@ -129,8 +129,13 @@ def test_the_shipped_tables_hold_the_published_numbers():
             if row := found.get((*drives, "own", False, "kept")):
                 ends = float(line["kept_low"]), float(line["kept_high"])
                 assert (row.low, row.high) == ends
-        rest = {place[-1] for place in found}
-        assert rest <= {"visible_change", "recall_at_full_precision"}
+        # The files of the documents have few numbers with verification.
+        rest = {place[-1] for place in found if not place[-2]}
+        assert rest <= {
+            "visible_change",
+            "recall_at_full_precision",
+            "pose_success",
+        }
 
 
 def test_an_entrant_stands_among_the_shipped(tmp_path):
