@@ -14,12 +14,8 @@ REGISTRY = yaml.safe_load(draw.REGISTRY.read_text())
 # Pictures of results on the cities of version 2.0.0, as their pages say; they
 # are drawn anew when the results are measured anew.
 OF_FORMER_CITIES = {
-    "layered_overlap.png",
-    "suburbia_change.jpg",
-    "report_queries.jpg",
     "map_update.jpg",
     "track.png",
-    "visible_change.png",
     "metropolis_page.jpg",
     "drive.webp",
 }
