@@ -91,7 +91,7 @@ METHODS: Sections = {
         name: make_method(name, {}).Config
         for name in (*shipped_methods(), "probe")
     },
-    "svt-net and dpa-net": NetworkConfig,
+    "svt-net, dpa-net and bevplace": NetworkConfig,
 }
 # What stands for the default where the model's own does not say it.
 _FILLED_IN = {

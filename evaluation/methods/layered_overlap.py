@@ -170,6 +170,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
 
     Config = LayeredOverlapConfig
     skips_places = True
+    sees_images = True
     config: LayeredOverlapConfig
 
     def describe(self, points: np.ndarray) -> LayeredScan:

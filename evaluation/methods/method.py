@@ -80,6 +80,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         batch_size: number of clouds for one call of `describe_batch`.
         skips_places: whether scores may be NaN (no candidate) even if every
             place is compared (`exhaustive`). If false, such a NaN is an error.
+        sees_images: whether the method can compare bird's-eye images, of which
+            each pixel is a column of points (see
+            `evaluation.clouds.count_images`). It may then use where points are
+            seen from above and how many are above each other, but not what
+            only a scan has, such as planes or angles of beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
         config: the parameters in use.
@@ -98,6 +103,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
     skips_places: ClassVar[bool] = False
+    sees_images: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
     # The Python file of a user's own method.
     _file: ClassVar[Path | None] = None
@@ -280,6 +286,7 @@ _METHODS: dict[str, type[Method]] = {}
 # Methods that run only on request: name -> module. Some need another package or
 # weights.
 _OPTIONAL = {
+    "bevplace": "evaluation.methods.bevplace",
     "map-closures": "evaluation.methods.map_closures",
     "probe": "evaluation.methods.probe",
     "svt-net": "evaluation.methods.published_networks",

@@ -117,6 +117,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
 
     Config = ProbeConfig
     skips_places = True
+    sees_images = True
     config: ProbeConfig
 
     def describe(self, points: np.ndarray) -> Probe:

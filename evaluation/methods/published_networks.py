@@ -423,7 +423,7 @@ def _deformable_attention(
 class NetworkConfig(MethodConfig):
     """Settings of a published neural network.
 
-    `sensor_height` has no effect: the method finds the ground in the cloud.
+    `sensor_height` has no effect.
 
     Attributes:
         weights: file with the weights that the authors of the network

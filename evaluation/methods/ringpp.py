@@ -142,6 +142,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
     Config = RingPlusPlusConfig
     skips_places = True
+    sees_images = True
     config: RingPlusPlusConfig
 
     def describe(self, points: np.ndarray) -> Ring:

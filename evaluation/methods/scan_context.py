@@ -147,6 +147,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
 
     Config = ScanContextConfig
     skips_places = True
+    sees_images = True
     config: ScanContextConfig
 
     def describe(self, points: np.ndarray) -> Contexts:

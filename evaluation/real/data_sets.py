@@ -23,9 +23,12 @@ from evaluation.clouds.cloud_files import OnNote, read_cloud
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions
+from evaluation.real import image_sequences, sessions
 from evaluation.study.surveys import RecordingSource
 from evaluation.study.tasks.task import NamedDrive
 
+# Folders that other modules read.
+_OTHERS = (image_sequences.FOLDER, sessions.FOLDER)
 # Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0
 
@@ -215,9 +218,9 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    known = {one.folder for one in DATA_SETS}
+    known = {one.folder for one in DATA_SETS} | {*_OTHERS}
     scans = [listed(folder / one.folder, one.scans) for one in DATA_SETS]
-    if not any(scans):
+    if not any(scans) and not any((folder / one).is_dir() for one in _OTHERS):
         names = ", ".join(sorted(known))
         raise InputError(f"{folder}: no data set that is known ({names})")
     found = []

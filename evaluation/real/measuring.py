@@ -28,9 +28,21 @@ from evaluation.real.data_sets import (
     open_data_sets,
     simulated_drives,
 )
+from evaluation.real.image_sequences import (
+    FOLDER,
+    RADIUS,
+    ImageSequence,
+    open_sequences,
+)
+from evaluation.real.sessions import FOLDER as SESSIONS
+from evaluation.real.sessions import draw_sessions, read_sessions
 from evaluation.recognition.description import Role
 from evaluation.recognition.place_outcome import Number
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import (
+    FAIR_PROTOCOL,
+    RECORDED_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.results.table import QueryRows, Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.engine import Engine
@@ -43,6 +55,14 @@ from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result, Task
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.
 _REAL = replace(_SIMULATED, query_spacing=1e-6, place_spacing=1e-6)
+# Every image is a query or a place.
+_IMAGES = replace(
+    RECORDED_PROTOCOL,
+    radius=RADIUS,
+    query_spacing=1e-6,
+    place_spacing=1e-6,
+    scans_per_place=1,
+)
 # Name of the experiment.
 _NAME = "real"
 # More places than all drives have.
@@ -100,18 +120,23 @@ def measure_real(
         on_note,
     )
     found = open_data_sets(folder, on_note)
+    _add_images(engine, open_sequences(folder / FOLDER, on_note), choices)
     for unit in dict.fromkeys(one.data_set.unit for one in found):
         sets = [one for one in found if one.data_set.unit == unit]
         made = simulated_drives(simulated, unit, on_note) if simulated else []
         _add_unit(engine, sets, made, choices)
         if not made:
             on_note(f"{unit}: no simulated scan of it to judge")
-    if not engine.jobs:
+    engine.given += read_sessions(folder / SESSIONS, _NAME)
+    if not (engine.jobs or engine.given):
         raise InputError(
             f"{folder}: no data set that these methods can measure; the notes"
             " say why"
         )
-    return engine.run(cluster)
+    tables = engine.run(cluster)
+    if engine.given:
+        on_note(f"{draw_sessions(engine.given, output)}: the sessions")
+    return tables
 
 
 def _aligns(name: str) -> bool:
@@ -119,6 +144,47 @@ def _aligns(name: str) -> bool:
     if name.endswith(".py"):
         return hasattr(run_module(Path(name)), "localise")
     return name in estimators.METHODS
+
+
+def _add_images(
+    engine: Engine,
+    sequences: Sequence[ImageSequence],
+    choices: Sequence[MethodChoice],
+) -> None:
+    """Adds sequences of bird's-eye images to the engine.
+
+    Args:
+        engine: the engine.
+        sequences: the sequences.
+        choices: the methods.
+    """
+    if not sequences:
+        return
+    able = [one for one in choices if one.make().sees_images]
+    if unable := [one.name for one in choices if one not in able]:
+        names = ", ".join(dict.fromkeys(unable))
+        engine.on_note(f"{FOLDER}: not for {names}: these need scans")
+    # The ground is at height 0.
+    methods = tuple(one.at_height(0.0) for one in able)
+    for choice, given in zip(methods, able, strict=True):
+        engine.methods[choice.key] = choice, given.columns
+    jobs = _RealJobs.of(methods, (), frozenset())
+    for one in sequences if methods else ():
+        pair = Pair(
+            map_name=one.name,
+            names=(one.places.name, one.queries.name),
+            factors={},
+            seed=_IMAGES.seed,
+            is_baseline=False,
+            stated=_IMAGES,
+            key=one.name,
+            database=one.places,
+            query=one.queries,
+            way=one.places,
+            protocol=_IMAGES,
+            settings={"sensor_height": 0.0},
+        )
+        engine.add([pair], (), jobs, [PlaceTask.name, PoseTask.name])
 
 
 def _add_unit(

@@ -53,6 +53,7 @@ class Engine:
             study takes.
         jobs: name -> job.
         measured: all comparisons.
+        given: results from elsewhere, which the tables begin with.
     """
 
     experiment: str
@@ -62,6 +63,7 @@ class Engine:
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
     measured: list[Pair] = field(default_factory=list)
+    given: list[Row] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
     def add(
@@ -150,7 +152,7 @@ class Engine:
         Raises:
             InputError: a job has not been done.
         """
-        rows: list[Row] = []
+        rows = list(self.given)
         answers: list[Answers] = []
         baselines = self._baselines()
         for one in self.measured:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 from scipy.spatial.transform import Rotation
 import yaml
 
+from evaluation.clouds.count_images import count_image
 from evaluation.drives import open_drive
 from helpers.layered_scans import town
 from helpers.small_cityjson import write_blocks
@@ -101,6 +103,19 @@ def write_real_scans(folder: Path) -> None:
         scan = town(1) - [x, 0.0, 0.0]
         path = folder / f"real_scans/kitti_00_revisits/{number:06d}.npy"
         np.save(path, scan.astype(np.float32))
+
+
+def write_images(folder: Path) -> None:
+    """Writes two images of one place, and two of another."""
+    sequence = folder / "real_scans/kitti_bev/05"
+    (sequence / "imgs").mkdir(parents=True)
+    rows = []
+    for number, (seed, x) in enumerate(((1, 0.0), (2, 90.0)) * 2):
+        image = count_image(town(seed))
+        path = sequence / "imgs" / f"{number:06d}.png"
+        Image.fromarray(image).save(path)
+        rows.append([1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0])
+    np.savetxt(sequence / "pose.txt", rows)
 
 
 _FIRST = ("metropolis_01", "town_01")
@@ -367,6 +382,16 @@ RECIPES = {
         after=("named poses",),
         makes=("real/results.csv", "real/queries.csv"),
         all_methods=True,
+    ),
+    "real images": Recipe(
+        ".venv/bin/cns-eval real real_scans --method scan-context++",
+        changes=((" --method ring++", ""),),
+        prepare=write_images,
+        makes=("images/results.csv",),
+    ),
+    "sessions of another program": Recipe(
+        "days,r1,low,high",
+        file="real_scans/sessions/mine.csv",
     ),
     "help: real": Recipe(
         "cns-eval real real_scans",
@@ -984,6 +1009,8 @@ NOT_RUN = {
     "cns-eval pr --method map-closures": "needs an extra",
     ".venv/bin/cns-eval pr --method svt-net": "needs weights that do not ship; "
     "test_published_networks has some of its own",
+    ".venv/bin/cns-eval pr --method bevplace": "needs weights, too; "
+    "test_bevplace has some of its own",
     "# cns-drake study outside.yaml": "needs these weights, too",
     "for half in even odd": "needs scans that do not ship",
     "cns-drake train": "needs an extra, and minutes; test_training trains",

@@ -1,16 +1,12 @@
 """Published networks: convolutions, files of weights, closed forms."""
 
-from collections import OrderedDict
-import io
 import itertools
 import math
-import pickle
 import struct
-import sys
 import tracemalloc
-import types
 import zipfile
 
+from helpers.torch_files import save_weights
 import numpy as np
 import pytest
 from scipy.ndimage import correlate
@@ -159,7 +155,7 @@ def test_collapsed_clouds_are_no_candidates(tmp_path, monkeypatch, name):
         key: RNG.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
         for key, shape in shapes.items()
     }
-    path = save(tmp_path / "w.pth", weights, monkeypatch)
+    path = save_weights(tmp_path / "w.pth", weights, monkeypatch)
     method = make_method(name, {"weights": path})
     ground = next(collapsed())
     clouds = [street(4000), *collapsed()]
@@ -238,22 +234,6 @@ def test_dpa_net_in_closed_form():
     np.testing.assert_allclose(dpa_net(weights, cloud), wanted, rtol=1e-3)
 
 
-def storage(name):
-    """Returns a class that stands for PyTorch's type of that name."""
-    return type(name, (), {"__module__": "torch"})
-
-
-# BFloat16 is the upper half of a float32.
-STORAGES = {
-    kind: storage(name)
-    for kind, name in {
-        **{"f4": "FloatStorage", "f2": "HalfStorage", "f8": "DoubleStorage"},
-        **{"u2": "BFloat16Storage", "i8": "LongStorage"},
-        "c8": "ComplexFloatStorage",
-    }.items()
-}
-
-
 class Ran:
     """Runs code when it is unpickled."""
 
@@ -261,66 +241,6 @@ class Ran:
 
     def __reduce__(self):
         return setattr, (Ran, "ran", True)
-
-
-def save(
-    path, state, monkeypatch, around=lambda state: state, *, as_parameter=False
-):
-    """Writes tensors as `torch.save` does."""
-    content = io.BytesIO()
-    numbers = itertools.count()
-    names = types.ModuleType("torch._utils")
-
-    class Tensor:
-        def __init__(self, values):
-            self.values = np.asarray(values)
-
-        def __reduce__(self):
-            v = self.values
-            steps = tuple(s // v.itemsize for s in v.strides)
-            return rebuild, (v, 0, v.shape, steps, False, OrderedDict())
-
-    class Parameter(Tensor):
-        def __reduce__(self):
-            arguments = (Tensor(self.values), True, OrderedDict())
-            return rebuild_parameter, arguments
-
-    def rebuild(*arguments):
-        raise AssertionError
-
-    def rebuild_parameter(*arguments):
-        raise AssertionError
-
-    for function, name in (
-        (rebuild, "_rebuild_tensor_v2"),
-        (rebuild_parameter, "_rebuild_parameter"),
-    ):
-        function.__module__ = "torch._utils"
-        function.__qualname__ = function.__name__ = name
-        setattr(names, name, function)
-    torch = types.ModuleType("torch")
-    for kind in STORAGES.values():
-        setattr(torch, kind.__name__, kind)
-    monkeypatch.setitem(sys.modules, "torch", torch)
-    monkeypatch.setitem(sys.modules, "torch._utils", names)
-    with zipfile.ZipFile(path, "w") as archive:
-
-        class Pickler(pickle.Pickler):
-            def persistent_id(self, one):
-                if not isinstance(one, np.ndarray):
-                    return None
-                key = str(next(numbers))
-                # The storage of an array in another order is its transpose.
-                flat = one.ravel(order="K")
-                archive.writestr(f"archive/data/{key}", flat.tobytes())
-                kind = STORAGES[one.dtype.str[1:]]
-                return "storage", kind, key, "cpu", one.size
-
-        made = Parameter if as_parameter else Tensor
-        state = OrderedDict((k, made(v)) for k, v in state.items())
-        Pickler(content, 2).dump(around(state))
-        archive.writestr("archive/data.pkl", content.getvalue())
-    return path
 
 
 def test_weights_as_saved(tmp_path, monkeypatch):
@@ -338,7 +258,7 @@ def test_weights_as_saved(tmp_path, monkeypatch):
         lambda state: {f"module.{k}": v for k, v in state.items()},
         lambda state: {"a": {f"x.model.{k}": v for k, v in state.items()}},
     ):
-        path = save(tmp_path / "w.pth", values, monkeypatch, around)
+        path = save_weights(tmp_path / "w.pth", values, monkeypatch, around)
         found = read_weights(path, shapes)
         assert not Ran.ran
         assert found.keys() == shapes.keys()
@@ -351,7 +271,7 @@ def test_weights_in_other_numbers(tmp_path, monkeypatch):
     path = tmp_path / "w.pth"
 
     def read(stored, **options):
-        save(path, {"a": stored}, monkeypatch, **options)
+        save_weights(path, {"a": stored}, monkeypatch, **options)
         (found,) = read_weights(path, {"a": (2, 3)}).values()
         assert found.dtype == np.float32
         return found
@@ -373,7 +293,7 @@ def test_weights_in_other_numbers(tmp_path, monkeypatch):
 
 def test_one_of_two_sets_of_weights_is_named(tmp_path, monkeypatch, capsys):
     values = {"a": np.ones(2, np.float32)}
-    path = save(
+    path = save_weights(
         tmp_path / "w.pth",
         values,
         monkeypatch,
@@ -456,7 +376,7 @@ def test_small_files_of_weights_take_little_memory(tmp_path, pickled, data):
 def test_other_weights(tmp_path, monkeypatch, changes, message):
     values = {**svt_weights(), **changes}
     values = {k: v for k, v in values.items() if v is not None}
-    path = save(tmp_path / "w.pth", values, monkeypatch)
+    path = save_weights(tmp_path / "w.pth", values, monkeypatch)
     with pytest.raises(InputError, match=rf"w\.pth: .*{message}") as error:
         make_method("svt-net", {"weights": path})
     assert "\n" not in str(error.value)
@@ -477,7 +397,7 @@ def test_files_that_are_no_weights(tmp_path):
 
 
 def test_as_a_method(tmp_path, monkeypatch):
-    path = save(tmp_path / "w.pth", svt_weights(), monkeypatch)
+    path = save_weights(tmp_path / "w.pth", svt_weights(), monkeypatch)
     chosen = choose_methods(["svt-net"], [f"svt-net.weights={path}"])[-1]
     method = chosen.make()
     assert len(chosen.identity()["parameters"]["digest"]) == 16

@@ -1,0 +1,146 @@
+"""Bird's-eye images that count voxels, as in the data of BEVPlace.
+
+An image is (151, 151) uint8 and shows the points within 25.2 m of the LiDAR: up
+is ahead, left is left. A pixel is a column of voxels with sides of 0.4 m. It
+counts the voxels with points beyond the first, which is mostly ground, up to
+10. Counts are scaled so that the largest one in the image is 255.
+
+The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
+their images of KITTI makes other images than these. The rules above were found
+from the images themselves, on five scans of KITTI 00; there, the correlation of
+pixels is 0.86. One of these rules is that indices are cut off towards zero, so
+that the middle row and the middle column are twice as wide as the others.
+"""
+
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
+import zlib
+
+import numpy as np
+from PIL import Image
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular, user_errors
+
+# Side of a voxel and of a pixel [m].
+PIXEL = 0.4
+# Number of pixels on each side of the middle one.
+_HALF = 75
+WIDTH = 2 * _HALF + 1
+# Greatest absolute coordinate of a point: 63 pixels [m].
+_REACH = 25.2
+# Counts of voxels end here.
+_MOST = 10
+# Largest number of pixels on a side.
+_WIDEST = 1001
+
+
+def count_image(points: np.ndarray) -> np.ndarray:
+    """Returns the image of a cloud, (151, 151) uint8.
+
+    Args:
+        points: (N, 3) points in the frame of the LiDAR: x ahead, y left, z up
+            [m].
+    """
+    near = points[(np.abs(points) < _REACH).all(axis=1)] / PIXEL
+    cells = np.column_stack(
+        [np.trunc(near[:, :2]), np.floor(near[:, 2])]
+    ).astype(np.int64)
+    ahead, left, _ = np.unique(cells, axis=0).T
+    counts = np.zeros((WIDTH, WIDTH), np.int64)
+    np.add.at(counts, (_HALF - ahead, _HALF - left), 1)
+    counts = np.clip(counts - 1, 0, _MOST)
+    return np.rint(counts * (255.0 / max(counts.max(), 1))).astype(np.uint8)
+
+
+def image_points(image: np.ndarray) -> np.ndarray:
+    """Returns a cloud (N, 3) whose image is the given one [m].
+
+    A pixel that is not zero becomes a column of one point in each voxel, at
+    heights of 0.2 m, 0.6 m and so on. From the cloud of an image of 151 pixels,
+    `count_image` makes the same image. Images of other programs can have more
+    than ten different values; these are rounded.
+
+    Args:
+        image: (W, W) uint8, W odd; the LiDAR is at the middle pixel.
+    """
+    counts = np.rint(image * (_largest_count(image) / 255.0)).astype(np.int64)
+    half = len(image) // 2
+    row, column = np.nonzero(counts)
+    number = counts[row, column] + 1
+    index = half - np.stack([row, column], axis=1)
+    # The pixels in the middle reach to both sides.
+    centre = (index + 0.5 * np.sign(index)) * PIXEL
+    level = np.arange(number.sum()) - np.repeat(
+        np.cumsum(number) - number, number
+    )
+    return np.column_stack(
+        [np.repeat(centre, number, axis=0), (level + 0.5) * PIXEL]
+    )
+
+
+def _largest_count(image: np.ndarray) -> int:
+    """Returns the number of voxels for which a value of 255 stands."""
+    values = np.unique(image)
+    for most in range(1, _MOST):
+        steps = values * (most / 255.0)
+        # Programs round values, or cut them off.
+        if (np.abs(steps - np.rint(steps)) <= most / 255.0).all():
+            return most
+    return _MOST
+
+
+def check_image(path: Path) -> None:
+    """Checks that a file is an image that `read_image` reads.
+
+    Only the beginning of the file is read.
+
+    Raises:
+        InputError: see `read_image`.
+    """
+    with _opened(path):
+        pass
+
+
+def read_image(path: Path) -> np.ndarray:
+    """Returns the image (W, W) uint8 in a PNG file; W is odd.
+
+    Raises:
+        InputError: the file is no image with one channel of 8 bits, is damaged,
+            or is not square, or has an even or a too large number of pixels on
+            a side.
+    """
+    with _opened(path) as image, _damages(path):
+        return np.asarray(image)
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    check_regular(path)
+    with contextlib.ExitStack() as stack:
+        with user_errors(path), _damages(path):
+            image = stack.enter_context(Image.open(path, formats=("PNG",)))
+        if image.mode != "L":
+            raise InputError(
+                f"{path}: an image of mode {image.mode}, not of one channel of"
+                " 8 bits"
+            )
+        width, height = image.size
+        if width != height:
+            raise InputError(f"{path}: {width} x {height} pixels, not square")
+        if width > _WIDEST or width % 2 == 0:
+            raise InputError(
+                f"{path}: {width} pixels on a side; it must be an odd number up"
+                f" to {_WIDEST}"
+            )
+        yield image
+
+
+@contextlib.contextmanager
+def _damages(path: Path) -> Iterator[None]:
+    """Turns what Pillow raises for a damaged file into an `InputError`."""
+    try:
+        yield
+    except (SyntaxError, ValueError, OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: no image (PNG), or damaged") from error

@@ -1,0 +1,127 @@
+"""Results of other programs over sessions, such as months of a data set.
+
+A file `sessions/NAME.csv` has the R@1 of one program, in the columns `days`
+(since the session of the map), `r1`, `low` and `high` (a 95 % interval). Its
+rows go into the table of results as those of a method NAME, with the factor
+`days`. A chart shows the curves of all files.
+"""
+
+from collections.abc import Sequence
+import itertools
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from cns_drake.base.csv_files import number_within, read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.listing import listed
+from evaluation.recognition.protocol import RECORDED_PROTOCOL
+from evaluation.results.drawing import METHOD_STYLES, plain, save
+from evaluation.results.table import Row, made_by
+
+FOLDER = "sessions"
+CHART = "sessions"
+_COLUMNS = ("days", "r1", "low", "high")
+# Greatest number of days since the map, a century.
+_MOST_DAYS = 36525.0
+# Size of the chart [inches].
+_SIZE = (6.0, 3.6)
+
+
+def read_sessions(folder: Path, experiment: str) -> list[Row]:
+    """Returns the results of all files `*.csv` in a folder, in order of days.
+
+    Args:
+        folder: folder of the files; it need not exist.
+        experiment: name of the experiment, for the rows.
+
+    Raises:
+        InputError: there is a folder but no file in it, or a file lacks a
+            column or a row, has the same day twice, or has a value that is no
+            number or not in its range.
+    """
+    if not folder.exists():
+        return []
+    files = listed(folder, "*.csv")
+    if not files:
+        raise InputError(f"{folder}: no table (*.csv) in it")
+    return [row for file in files for row in _rows(file, experiment)]
+
+
+def _rows(file: Path, experiment: str) -> list[Row]:
+    found: dict[float, Row] = {}
+    for line, cells in read_records(file, _COLUMNS):
+        days, r1, low, high = (
+            number_within(
+                cells[name],
+                _MOST_DAYS if name == "days" else 1.0,
+                f"{file}: line {line}: {name}",
+            )
+            for name in _COLUMNS
+        )
+        if days < 0.0 or days in found:
+            fault = "negative" if days < 0.0 else "there twice"
+            raise InputError(f"{file}: line {line}: days: {days:g} is {fault}")
+        if not 0.0 <= low <= r1 <= high:
+            raise InputError(
+                f"{file}: line {line}: not in the order 0, low, r1, high, 1"
+            )
+        found[days] = Row(
+            experiment=experiment,
+            map=FOLDER,
+            database="map",
+            query="session",
+            seed=0,
+            factors={"days": days},
+            task="place",
+            method=file.stem,
+            gate=False,
+            **made_by(RECORDED_PROTOCOL, {"sessions": file.stem}),
+            metric="r1",
+            value=r1,
+            low=low,
+            high=high,
+        )
+    if not found:
+        raise InputError(f"{file}: no row")
+    return [found[days] for days in sorted(found)]
+
+
+def draw_sessions(rows: Sequence[Row], folder: Path) -> Path:
+    """Draws R@1 over days, with intervals, and returns the path of the picture.
+
+    Args:
+        rows: rows from `read_sessions`.
+        folder: folder to which `sessions.png` and `sessions.pdf` are written.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    with rc_context({"font.size": 10.0}):
+        figure = Figure(figsize=_SIZE, layout="constrained")
+        axes = figure.subplots()
+        names = dict.fromkeys(one.method for one in rows)
+        styles = itertools.cycle(METHOD_STYLES.values())
+        for name, (colour, style, marker) in zip(names, styles, strict=False):
+            some = [one for one in rows if one.method == name]
+            below = [one.value - one.low for one in some]
+            above = [one.high - one.value for one in some]
+            axes.errorbar(
+                [float(str(one["days"])) for one in some],
+                [one.value for one in some],
+                [below, above],
+                linestyle=style,
+                marker=marker,
+                color=colour,
+                capsize=2,
+                ms=5,
+                label=plain(name),
+            )
+        axes.set_xlabel("days after the map")
+        axes.set_ylabel("R@1")
+        axes.set_ylim(0.0, 1.02)
+        axes.grid(alpha=0.3)
+        axes.legend(loc="lower left")
+        save(figure, folder / CHART, ("pdf", "png"))
+    return folder / f"{CHART}.png"

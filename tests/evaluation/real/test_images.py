@@ -1,0 +1,178 @@
+"""`cns-eval real` on bird's-eye images with poses."""
+
+from helpers.eval_program import run
+import numpy as np
+from PIL import Image
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.real import image_sequences
+from evaluation.real.image_sequences import open_sequences
+from evaluation.results.table import QueryRows, Results
+
+# Heading, x and y of each image: the second half passes the places of the first
+# again, in another order, and one place is new.
+POSES = (
+    *((0.0, 40.0 * k, 0.0) for k in range(5)),
+    *((0.0, 40.0 * k + 3.0, -1.0) for k in (3, 0, 4, 1)),
+    (1.0, 900.0, 900.0),
+)
+
+
+def view(yaw, x, y):
+    """Returns the image (151, 151) of a town from a pose."""
+    rng = np.random.default_rng(4)
+    image = np.zeros((151, 151), np.uint8)
+    walls = rng.uniform([-40, -25], [240, 25], (400, 2))
+    p = (walls - [x, y]) @ np.array(
+        [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    )
+    p = p[(np.abs(p) < 24.0).all(axis=1)]
+    for ahead, left in np.trunc(p / 0.4).astype(int):
+        image[75 - ahead, 74 - left : 77 - left] = 255
+        image[75 - ahead, 75 - left] = 102
+    return image
+
+
+def fill(root, name="09", poses=POSES):
+    """Writes a sequence; returns the folder of the data sets."""
+    folder = root / "kitti_bev" / name
+    (folder / "imgs").mkdir(parents=True)
+    rows = []
+    for k, (yaw, x, y) in enumerate(poses):
+        Image.fromarray(view(yaw, x, y)).save(
+            folder / "imgs" / f"{k:06d}.png", format="PNG"
+        )
+        c, s = np.cos(yaw), np.sin(yaw)
+        # The height changes, which an image from above does not show.
+        rows.append([c, -s, 0, x, s, c, 0, y, 0, 0, 1, 30.0 * k])
+    np.savetxt(folder / "pose.txt", rows)
+    return root
+
+
+def ask(capsys, root, output, *words):
+    return run(capsys, "real", root, "--output", output, *words)
+
+
+@pytest.mark.slow
+def test_places_are_found_in_images(tmp_path, capsys):
+    root = fill(tmp_path / "data")
+    methods = "--method", "scan-context++", "--method", "solid"
+    output = tmp_path / "out"
+    status, out, err = ask(capsys, root, output, *methods, "--jobs", 1)
+    assert (status, out) == (0, f"{output / 'results.csv'}\n"), err
+    results = Results.read(output).where(task="place", gate=False)
+    assert {(row.map, row.method) for row in results.rows} == {
+        ("kitti_09", "scan-context++")
+    }
+    values = {row.metric: row.value for row in results.rows}
+    assert (values["places"], values["with_match"]) == (5, 4)
+    assert values["r1"] == 1.0
+    answers = QueryRows.read(output).answers[0].columns
+    assert answers["match_frame"].tolist() == [3, 0, 4, 1]
+    np.testing.assert_allclose(answers["distance"], np.hypot(3, 1), atol=1e-6)
+    for note in (
+        "kitti_09: no frames of the published evaluation: the first 5 of 10",
+        "kitti_09: 4 of 5 queries have a place within 5 m; the others are left",
+        "kitti_bev: not for solid: these need scans",
+    ):
+        assert note in err
+
+
+def test_frames_of_the_published_evaluation(tmp_path, monkeypatch):
+    split = {"05": ((1, 3), (4, 9))}
+    monkeypatch.setattr(image_sequences, "_SPLITS", split)
+    root = fill(tmp_path, "05")
+    notes = []
+    (found,) = open_sequences(root / "kitti_bev", notes.append)
+    assert found.name == "kitti_05"
+    # Frame 8 is at place 1.
+    assert found.places.source.frames == (1, 2)
+    assert found.queries.source.frames == (8,)
+    assert notes == [
+        "kitti_05: 1 of 5 queries have a place within 5 m; the others are left"
+        " out"
+    ]
+    drive = found.queries.source()
+    np.testing.assert_allclose(drive.X_WS[0, :3, 3], [43.0, -1.0, 0.0])
+    assert drive.stamps_ns.tolist() == [800_000_000]
+    # The files and the poses identify a sequence.
+    before = found.queries.source.identity()
+    assert before == found.queries.source.identity()
+    table = root / "kitti_bev" / "05" / "pose.txt"
+    table.write_text(table.read_text().replace("e+00", "e+0"))
+    assert before != found.queries.source.identity()
+
+
+def test_a_sequence_without_a_revisit_is_left_out(tmp_path, capsys):
+    root = fill(tmp_path, poses=POSES[:4])
+    notes = []
+    assert open_sequences(root / "kitti_bev", notes.append) == []
+    assert "kitti_09: 0 of 2 queries have a place within 5 m" in notes[-1]
+    assert open_sequences(root / "none", notes.append) == []
+    status, out, err = ask(
+        capsys, root, root / "out", "--method", "scan-context++"
+    )
+    assert (status, out) == (2, "")
+    assert "no data set that these methods can measure" in err
+    assert not (root / "out" / "results.csv").exists()
+
+
+def test_methods_that_need_scans_measure_nothing(tmp_path, capsys):
+    root = fill(tmp_path)
+    status, out, err = ask(capsys, root, root / "out", "--method", "icp")
+    assert (status, out) == (2, "")
+    assert "no data set that these methods can measure" in err
+
+
+def broken(tmp_path, name, change):
+    """Returns the fault of a sequence after a change of its folder."""
+    folder = fill(tmp_path / name) / "kitti_bev" / "09"
+    change(folder)
+    with pytest.raises(InputError) as caught:
+        open_sequences(folder.parent, lambda note: None)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def without_images(folder):
+    for file in (folder / "imgs").iterdir():
+        file.unlink()
+
+
+def without_the_last_row(folder):
+    rows = (folder / "pose.txt").read_text().splitlines()[:-1]
+    (folder / "pose.txt").write_text("\n".join(rows))
+
+
+def without_a_column(folder):
+    np.savetxt(folder / "pose.txt", np.loadtxt(folder / "pose.txt")[:, 1:])
+
+
+def with_another_image(pixels):
+    def change(folder):
+        Image.fromarray(pixels).save(folder / "imgs" / "000003.png")
+
+    return change
+
+
+def test_faults_are_named(tmp_path):
+    colour = np.zeros((151, 151, 3), np.uint8)
+    for number, (change, fault) in enumerate(
+        (
+            (without_images, "imgs: no image (*.png) in it"),
+            (lambda one: (one / "pose.txt").unlink(), "pose.txt"),
+            (without_the_last_row, "pose.txt: 9 rows for 10 images"),
+            (without_a_column, "pose.txt: rows of 11 numbers instead of 12"),
+            (with_another_image(colour), "000003.png: an image of mode RGB"),
+            (with_another_image(colour[:99, :, 0]), "151 x 99 pixels, not sq"),
+            (
+                lambda one: (one / "imgs" / "000003.png").write_bytes(b"P"),
+                "000003.png: no image (PNG), or damaged",
+            ),
+        )
+    ):
+        assert fault in broken(tmp_path, str(number), change)
+    (tmp_path / "kitti_bev").mkdir()
+    with pytest.raises(InputError, match="no folder of a sequence in it"):
+        open_sequences(tmp_path / "kitti_bev", lambda note: None)
