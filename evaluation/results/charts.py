@@ -6,7 +6,7 @@
   the least to the greatest result of a single seed.
 - `matrix` (`over`, `metric`, `strips`): a metric for each method and each value
   of a factor. With `strips`, each cell is divided by the values of a second
-  factor.
+  factor. A retained share is bold if its 95 % interval lies below 1.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
   smooth curve and its 95 % band where there are points enough.
 
@@ -451,14 +451,23 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     names = list(chart.styles)
     weakest: list[tuple[float, str, str]] = []
     most = 1
+    columns = "label", over, strips or over
+    # What of a retained share is told from 1.
+    losses = {
+        (row.map, *(row[name] for name in columns))
+        for row in chart.rows
+        if chart.metric.startswith("kept") and row.high < 1.0
+    }
     for axes, rows in zip(panels, chart.panes.values(), strict=True):
-        cells: dict[tuple[int, int], list[tuple[Any, float]]] = {}
-        for mean in means(rows, "label", over, strips or over):
+        cells: dict[tuple[int, int], list[tuple[Any, float, bool]]] = {}
+        for mean in means(rows, *columns):
             x = names.index(title(mean.key[0]))
+            is_loss = mean.number == 1 and (rows[0].map, *mean.key) in losses
+            value = checked(chart.metric, mean.value)
             cell = cells.setdefault((x, values.index(mean.key[1])), [])
-            cell.append((mean.key[2], checked(chart.metric, mean.value)))
+            cell.append((mean.key[2], value, is_loss))
         for (x, y), some in cells.items():
-            shares = [share for _, share in sorted(some, key=_level)]
+            _, shares, are_losses = zip(*sorted(some, key=_level), strict=True)
             for k, share in enumerate(shares):
                 axes.add_patch(
                     Rectangle(
@@ -470,7 +479,10 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
                     )
                 )
             text = f"{100.0 * shares[-1]:.0f}"
-            axes.text(x + 0.5, y + 0.5, text, ha="center", va="center")
+            weight = "bold" if are_losses[-1] else "normal"
+            axes.text(
+                x + 0.5, y + 0.5, text, weight=weight, ha="center", va="center"
+            )
             most = max(most, len(shares))
             worst = value_words(values[y], over)
             if not isinstance(values[y], str) or over == "map":
@@ -492,6 +504,8 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     text = f"{words(chart.metric)} in per cent"
     if strips is not None and most > 1:
         text += f"; a strip for each {words(strips)}, the number is of the last"
+    if losses:
+        text += "; bold where its 95 % interval lies below 100"
     text = textwrap.fill(text, chart.width // 8)
     figure.supxlabel(plain(text), fontsize=_FONT)
     share, name, worst = min(weakest)
@@ -502,7 +516,7 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     return f"{message} ({name}; {worst})", figure
 
 
-def _level(cell: tuple[Any, float]) -> tuple[bool, Any]:
+def _level(cell: tuple[Any, float, bool]) -> tuple[bool, Any]:
     return isinstance(cell[0], str), cell[0]
 
 

@@ -136,6 +136,35 @@ def test_a_matrix_has_strips_and_the_last_number():
     assert not drawn.legend
 
 
+def test_a_loss_that_is_certain_is_bold():
+    ends = {"snow": (0.5, 0.9), "leaves": (0.5, 1.0), "fog": (math.nan,) * 2}
+    rows = [
+        replace(row(0.7, {"cause": c}, metric=metric), low=low, high=high)
+        for c, (low, high) in ends.items()
+        for metric in ("kept", "auc")
+    ]
+    # Of two results of one cause, neither interval is that of the mean.
+    twice = {"low": 0.6, "high": 0.8}
+    rows += [
+        replace(row(0.7, {"cause": "rain"}, metric="kept", seed=seed), **twice)
+        for seed in (1, 2)
+    ]
+
+    def weights(metric):
+        chart = {"kind": "matrix", "over": "cause", "metric": metric}
+        figure = charts.draw(chart, Results.of(rows)).figure
+        caption = " ".join(figure.get_supxlabel().split())
+        (axes,) = figure.axes
+        return caption, [text.get_fontweight() for text in axes.texts]
+
+    caption, found = weights("kept")
+    assert found == ["bold", "normal", "normal", "normal"]
+    assert caption.endswith("bold where its 95 % interval lies below 100")
+    caption, found = weights("auc")
+    assert found == ["normal"] * 3
+    assert "bold" not in caption
+
+
 @pytest.mark.parametrize(
     ("value", "factor", "text"),
     [
