@@ -433,12 +433,9 @@ def _start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
         x, y: name of what the axis shows; empty for an axis that stays.
     """
     limits = [range_of(name) for name in (x, y)]
-    corner = [
-        0.0 if limit is not None and limit.least == 0.0 else math.nan
-        for limit in limits
-    ]
+    is_least = [limit is not None and limit.least == 0.0 for limit in limits]
     # Markers at 0 are whole.
-    axes.update_datalim([corner], *(not math.isnan(one) for one in corner))
+    axes.update_datalim([(0.0, 0.0)], *is_least)
     axes.autoscale_view()
 
 

@@ -136,6 +136,44 @@ def test_a_matrix_has_strips_and_the_last_number():
     assert not drawn.legend
 
 
+@pytest.mark.parametrize(
+    ("chart", "results", "starts"),
+    [
+        (
+            {"kind": "lines", "over": YEARS, "metric": "auc"},
+            aged().where(method="ring++"),
+            "y",
+        ),
+        (
+            {"kind": "dumbbell", "over": YEARS, "metric": "auc"},
+            aged().where(method="ring++"),
+            "x",
+        ),
+        (
+            {"kind": "scatter", "x": "tcr_sym", "y": "auc"},
+            Results.of(scattered().rows[6:]),
+            "xy",
+        ),
+    ],
+)
+def test_axes_of_shares_start_at_0(chart, results, starts):
+    (axes,) = charts.draw(chart, results).figure.axes
+    for name, limits in (("x", axes.get_xlim()), ("y", axes.get_ylim())):
+        if name in starts:
+            # Markers at 0 are whole.
+            assert -0.06 * limits[1] < limits[0] < 0.0
+
+
+def test_axes_of_differences_keep_their_range():
+    rows = [
+        row(value, {YEARS: year}, metric="difference")
+        for year, value in ((0, -0.5), (10, -0.4))
+    ]
+    chart = {"kind": "lines", "over": YEARS, "metric": "difference"}
+    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    assert axes.get_ylim()[1] < -0.3
+
+
 def test_a_loss_that_is_certain_is_bold():
     ends = {"snow": (0.5, 0.9), "leaves": (0.5, 1.0), "fog": (math.nan,) * 2}
     rows = [
