@@ -1032,6 +1032,8 @@ NOT_RUN = {
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",
     ".venv/bin/cns-drake study docs/examples/anchor": "likewise, for minutes",
+    ".venv/bin/cns-drake study docs/examples/what_changes": "makes four cities "
+    "and drives through them, for half an hour",
     ".venv/bin/cns-drake study docs/examples/robust": "localises in a shipped "
     "city, for half an hour",
     ".venv/bin/cns-eval tcr data/MulRan": "needs data sets that cannot be "
