@@ -41,10 +41,12 @@ from evaluation.results.table import (
 )
 
 CAUSE = "cause"
-# Factor: what updates the map of several drives; its values without updates,
-# and with exact ones.
+# Factor: what updates the map of several drives.
 MAINTAIN = "database.maintain"
-_NOT_MAINTAINED, _EXACTLY = "none", "truth"
+# Its value without updates.
+_NOT_MAINTAINED = "none"
+# Its value with exact updates.
+_EXACTLY = "truth"
 LEVEL = "level"
 NO_CAUSE = "none"
 # Joins the names of causes that come together.

@@ -383,6 +383,7 @@ def test_an_import_carries_traffic(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_things_in_the_lanes_give_way_to_traffic(tmp_path):
     """Parked cars on a lane are there without traffic only."""
     path = write_blocks(tmp_path / "a.osm")

@@ -43,6 +43,7 @@ def frames_of(path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_stages_come_in_turn_from_both_views(tmp_path):
     folder = write_small_map(tmp_path / "town")
     # In stage 04 a roof above the cameras takes the sun.
