@@ -96,6 +96,8 @@ _METRICS = {
     "query_time": "time of a query [s]",
     "build_time": "time to build the database [s]",
     "memory": "memory of the descriptors [bytes]",
+    "success_03m_1deg": "success within 0.3 m and 1 deg",
+    "success_2m_5deg": "success within 2 m and 5 deg",
 }
 # The sign of per cent never begins a line.
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
