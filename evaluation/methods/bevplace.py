@@ -19,7 +19,7 @@ their length. Deliberate differences:
   none.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 import itertools
 import math
 
@@ -29,9 +29,8 @@ from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
 from evaluation.clouds.count_images import count_image
-from evaluation.methods.method import Method, register
-from evaluation.methods.published_networks import NetworkConfig, Weights
-from evaluation.methods.torch_weights import read_weights
+from evaluation.methods.method import register
+from evaluation.methods.published_networks import Network, Weights
 
 _SCALES = 5
 # Turns of the image [deg].
@@ -325,37 +324,17 @@ def _vlad(weights: Weights, x: np.ndarray) -> np.ndarray:
 
 
 @register("bevplace")
-class BevPlace(Method[np.ndarray, np.ndarray]):
+class BevPlace(Network):
     """The place-recognition method BEVPlace.
 
     The descriptor (8192,) of a cloud whose image is empty is NaN.
     """
 
-    Config = NetworkConfig
-    skips_places = True
     sees_images = True
-    config: NetworkConfig
-
-    def __init__(self, config: NetworkConfig | None = None):
-        super().__init__(config)
-        self._weights = read_weights(self.config.weights, SHAPES)
+    shapes = SHAPES
 
     def describe(self, points: np.ndarray) -> np.ndarray:
         image = count_image(points)
         if not image.any():
             return np.full(_CLUSTERS * _CHANNELS, np.nan, np.float32)
         return describe_image(self._weights, image)
-
-    def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
-        return np.stack(places)
-
-    def score(
-        self,
-        query: np.ndarray,
-        database: np.ndarray,
-        *,
-        exhaustive: bool = False,
-    ) -> np.ndarray:
-        del exhaustive  # Always true here.
-        distances = np.linalg.norm(database - query, axis=1)
-        return -distances.astype(np.float64)

@@ -444,12 +444,13 @@ class NetworkConfig(MethodConfig):
         return hashlib.sha256(content).hexdigest()[:16]
 
 
-class _Network(Method[np.ndarray, np.ndarray]):
+class Network(Method[np.ndarray, np.ndarray]):
     """A published network as a place-recognition method.
 
-    The descriptor (256,) of a cloud without points is NaN.
+    Scores are negative distances between descriptors.
 
-    Scores are negative distances.
+    Attributes:
+        shapes: name -> shape of each array of the file of weights.
     """
 
     Config = NetworkConfig
@@ -460,17 +461,6 @@ class _Network(Method[np.ndarray, np.ndarray]):
     def __init__(self, config: NetworkConfig | None = None):
         super().__init__(config)
         self._weights = read_weights(self.config.weights, self.shapes)
-
-    def describe(self, points: np.ndarray) -> np.ndarray:
-        cloud = prepare(points)
-        if len(cloud) == 0:
-            return np.full(256, np.nan)
-        return self.infer(self._weights, cloud).astype(np.float64)
-
-    @staticmethod
-    @abc.abstractmethod
-    def infer(weights: Weights, cloud: np.ndarray) -> np.ndarray:
-        """Returns the descriptor (256,) of a cloud that `prepare` returned."""
 
     def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack(places)
@@ -483,11 +473,30 @@ class _Network(Method[np.ndarray, np.ndarray]):
         exhaustive: bool = False,
     ) -> np.ndarray:
         del exhaustive  # Always true here.
-        return -np.linalg.norm(database - query, axis=1)
+        distances = np.linalg.norm(database - query, axis=1)
+        return -distances.astype(np.float64)
+
+
+class _CloudNetwork(Network):
+    """A network on the points of a cloud.
+
+    The descriptor (256,) of a cloud without points is NaN.
+    """
+
+    def describe(self, points: np.ndarray) -> np.ndarray:
+        cloud = prepare(points)
+        if len(cloud) == 0:
+            return np.full(256, np.nan)
+        return self.infer(self._weights, cloud).astype(np.float64)
+
+    @staticmethod
+    @abc.abstractmethod
+    def infer(weights: Weights, cloud: np.ndarray) -> np.ndarray:
+        """Returns the descriptor (256,) of a cloud that `prepare` returned."""
 
 
 @register("svt-net")
-class SvtNet(_Network):
+class SvtNet(_CloudNetwork):
     """The place-recognition method SVT-Net."""
 
     shapes = _SVT_NET
@@ -495,7 +504,7 @@ class SvtNet(_Network):
 
 
 @register("dpa-net")
-class DpaNet(_Network):
+class DpaNet(_CloudNetwork):
     """The place-recognition method DPA-Net."""
 
     shapes = _DPA_NET
