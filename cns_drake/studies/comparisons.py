@@ -882,7 +882,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 
 
 def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
-    """Returns a hash of two drives and of the cities that they lead through.
+    """Returns a hash of all drives and of the cities that they lead through.
 
     Args:
         compared: the drives.
@@ -892,14 +892,13 @@ def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
     Raises:
         InputError: a file of a world cannot be read.
     """
-    for drive in (compared.database, compared.query):
+    for drive in compared.drives:
         if drive.world_file not in worlds:
             worlds[drive.world_file] = combined_digest(digest_inputs(drive))
-    both = compared.database, compared.query
     return fingerprint(
         {
             "drives": compared.fingerprint(),
-            "worlds": [worlds[drive.world_file] for drive in both],
+            "worlds": [worlds[one.world_file] for one in compared.drives],
         }
     )
 

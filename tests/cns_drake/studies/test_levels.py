@@ -88,6 +88,14 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     assert frozen_print(compared, {}) != before
     # The drives alone do not show it.
     assert compared.fingerprint() == known
+    # Neither does the city of another session hide behind the first one's.
+    former = drive.replaced(stage="01" if drive.stage != "01" else "04")
+    several = Compared(drive, drive, RECORDED_PROTOCOL, beside=(former,))
+    before = frozen_print(several, {})
+    world = former.world_file
+    assert world != drive.world_file
+    world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
+    assert frozen_print(several, {}) != before
 
 
 def test_maps_of_ones_own_are_not_frozen():
