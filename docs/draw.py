@@ -144,11 +144,12 @@ def survival(path: Path) -> str:
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
-    order = [one.method for one in summaries.ranking(rows[False])[0]][::-1]
+    ranked = {gate: summaries.ranking(rows[gate])[0] for gate in rows}
+    order = [one.method for one in ranked[False]][::-1]
     figure = Figure(figsize=(_WIDTH, 5.4), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, gate in zip(panels, (False, True), strict=True):
-        for one in summaries.ranking(rows[gate])[0]:
+        for one in ranked[gate]:
             y = order.index(one.method)
             colour = METHOD_STYLES[one.method][0]
             ends = 100.0 * np.array([one.interval.low, one.interval.high])
@@ -181,7 +182,7 @@ def survival(path: Path) -> str:
         fontsize=12,
     )
     finding = survival_title(
-        {gate: survivors(rows[gate]) for gate in (False, True)}
+        {gate: survivors(some) for gate, some in ranked.items()}
     )
     _head(figure, finding)
     figure.savefig(path, dpi=_DPI)

@@ -10,6 +10,7 @@ import math
 from evaluation.recognition.metrics import compared_by_auc
 from evaluation.results.summaries import (
     LEAST_UNITS,
+    Ranked,
     check_same_queries,
     drive_number,
     ranking,
@@ -105,7 +106,7 @@ def survival(rows: Sequence[Row]) -> str:
             f"{text} Fewer than {LEAST_UNITS} cities do not show whether a"
             f" method survives, that is, retains {least}."
         )
-    found = survivors(rows)
+    found = survivors(ranked)
     which = listed(map(title, found)) if found else "none"
     return (
         f"{text} Methods that survive, because the lower limit is at least"
@@ -113,11 +114,13 @@ def survival(rows: Sequence[Row]) -> str:
     )
 
 
-def survivors(rows: Sequence[Row]) -> list[str]:
-    """Returns the labels of the methods that survive, see `survival`."""
-    return [
-        one.method for one in ranking(rows)[0] if one.interval.low >= SURVIVES
-    ]
+def survivors(ranked: Iterable[Ranked]) -> list[str]:
+    """Returns the labels of the methods that survive, see `survival`.
+
+    Args:
+        ranked: the methods, with their means of `kept_strict`.
+    """
+    return [one.method for one in ranked if one.interval.low >= SURVIVES]
 
 
 def _share(value: float) -> str:
