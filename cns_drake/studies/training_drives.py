@@ -12,6 +12,7 @@ import shutil
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 import yaml
 
 from cns_drake.base import poses
@@ -47,6 +48,21 @@ _SCAN_SPACING = 6.0
 _MAX_RANGE = 100.0
 _STAGES = ("01", "02", "03")
 _PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
+# Classes of what comes and goes with a building, as in the shipped cities.
+_BESIDE = frozenset(
+    {
+        "bicycle",
+        "car",
+        "fence",
+        "other-object",
+        "pole",
+        "traffic-sign",
+        "truck",
+        "vegetation",
+    }
+)
+# It goes with the nearest building if its center is within this distance [m].
+_BESIDE_WITHIN = 20.0
 # Takes the place of a map's name in cities whose streets are drawn.
 DRAWN_STREETS = "drawn"
 # Purpose of the random numbers of streets; cities and drives have the least.
@@ -316,8 +332,9 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     """Returns random stages of a city, as the content of `stages.yaml`.
 
-    Before the last stage, which is the whole city, buildings are missing or
-    lower, and trees are smaller.
+    Before the last stage, which is the whole city, whole buildings are missing,
+    and with each of them what stands, grows or parks nearest to it. Some trees
+    are missing as well. A few buildings and trees are lower.
 
     Args:
         city: the city.
@@ -325,33 +342,37 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
     trees = [s for s in city.structures if s.name.startswith("tree_")]
-    others = [
-        s
-        for s in city.structures
-        if s.semantic_class == "vegetation" and not s.name.startswith("tree_")
-    ]
+    beside = [s for s in city.structures if s.semantic_class in _BESIDE]
+    near = cKDTree([s.xyz[:2] for s in buildings]).query(
+        [s.xyz[:2] for s in beside], distance_upper_bound=_BESIDE_WITHIN
+    )[1]
     stages: dict[str, dict] = {}
     gone: set[str] = set()
     for stage in reversed(_STAGES[:-1]):
+        cleared = set(_nearest(buildings, float(rng.uniform(0.1, 0.5)), rng))
         absent = [
-            *_nearest(buildings, float(rng.uniform(0.05, 0.3)), rng),
+            *(s.name for s in buildings if s.name in cleared),
+            *(
+                s.name
+                for s, k in zip(beside, near, strict=True)
+                if k < len(buildings) and buildings[k].name in cleared
+            ),
             *_some(trees, float(rng.uniform(0.0, 0.4)), rng),
-            *_some(others, float(rng.uniform(0.0, 0.3)), rng),
         ]
-        absent = [name for name in absent if name not in gone]
+        absent = [name for name in dict.fromkeys(absent) if name not in gone]
         gone.update(absent)
         lower = {
             "houses": {
                 "height": float(rng.uniform(4.0, 9.0)),
-                "structures": _some(buildings, rng.uniform(0.2, 0.9), rng),
+                "structures": _some(buildings, rng.uniform(0.0, 0.1), rng),
             },
             "trees": {
                 "height": float(rng.uniform(3.0, 6.0)),
-                "structures": _some(trees, rng.uniform(0.2, 1.0), rng),
+                "structures": _some(trees, rng.uniform(0.0, 0.2), rng),
             },
         }
         stages[stage] = {
-            "story": "Younger, at random.",
+            "story": "Lots that are built on later, at random.",
             "absent": {"": absent} if absent else {},
             "lower": {k: v for k, v in lower.items() if v["structures"]},
         }
