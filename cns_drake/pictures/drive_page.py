@@ -148,7 +148,7 @@ def make_drive_page(
 
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
-    - `/route`: a ribbon from red (start) to blue (end),
+    - `/route`: a ribbon along the route,
     - `/scans/<k>`: LiDAR points coloured by height; each appears when it was
       measured,
     - `/stage_difference/additional/<class>`: parts of the city that are missing
@@ -220,7 +220,7 @@ def make_panel(
         facts=f"{length / 1000.0:.2f} km in {took}",
         points=_gradient(drawing.height_rgb(np.linspace(lowest, highest, 9))),
         heights=f"{lowest:g} to {highest:g} m",
-        route=_gradient([drawing.START_RGB, drawing.END_RGB]),
+        route=_hex(drawing.ROUTE_RGB),
         colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
         changes={
             name: words.format(other=shown.other_name)

@@ -19,8 +19,8 @@ from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 # end of each float compress well.
 _VERTEX_GRID = 2.0**-8
 
-START_RGB = np.array([1.00, 0.10, 0.10])
-END_RGB = np.array([0.10, 0.30, 1.00])
+# One colour, since points have a colour map.
+ROUTE_RGB = (1.0, 0.75, 0.0)
 _ROUTE_WIDTH = 2.0
 # Height of the ribbon at the start and at the end of the route [m]: where a
 # route passes twice, its later part is on top.
@@ -110,7 +110,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 def draw_route(
     meshcat: Meshcat, path: str, X_WBs: Sequence[RigidTransform]
 ) -> None:
-    """Draws a route as a flat ribbon, from red (start) to blue (end).
+    """Draws a route as a flat ribbon of one colour.
 
     Args:
         meshcat: Meshcat's server.
@@ -126,7 +126,6 @@ def draw_route(
     p_WBset[:, 2:] += (1.0 - fraction) * first + fraction * last
     half = _ROUTE_WIDTH / 2.0 * left_W
     vertices = np.concatenate([p_WBset + half, p_WBset - half])
-    rgb = (1.0 - fraction) * START_RGB + fraction * END_RGB
     left = np.arange(len(X_WBs) - 1)
     right = left + len(X_WBs)
     triangles = np.concatenate(
@@ -136,7 +135,7 @@ def draw_route(
         ]
     )
     surface = TriangleSurface(vertices, triangles.astype(np.int32))
-    _draw_mesh(meshcat, path, surface, np.concatenate([rgb, rgb]))
+    _draw_mesh(meshcat, path, surface, Rgba(*ROUTE_RGB))
     meshcat.SetProperty(f"{path}/<object>", "castShadow", False)
 
 

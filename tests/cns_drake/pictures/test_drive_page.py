@@ -99,7 +99,7 @@ def test_page_has_title_length_and_legend(page):
     assert "<h1>a &lt; b</h1>" in text
     # A quarter of a circle of 20 m, in 20 steps of half a second.
     assert "<p>0.03 km in 10 s</p>" in text
-    for line in ("LiDAR points, 0 to 25 m high", "Route, from start to end"):
+    for line in ("LiDAR points, 0 to 25 m high", "Route"):
         assert f">{line}</label>" in text
     for line in (
         "not here, but in stage &lt;02&gt;",
