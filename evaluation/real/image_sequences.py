@@ -35,6 +35,8 @@ from evaluation.study.tasks.task import NamedDrive
 
 # Name of the folder with a folder for each sequence.
 FOLDER = "kitti_bev"
+# The LiDAR of KITTI; simulated scans of this one are judged beside the images.
+UNIT = "hdl-64e"
 _TABLE = "pose.txt"
 # Greatest distance between a query and its match [m].
 RADIUS = 5.0

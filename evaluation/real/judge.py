@@ -13,12 +13,15 @@ Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If
 one of the two sets has no rings, these features are left out.
 
+Bird's-eye images are judged in the same way, as columns of points without
+intensities and rings. The simulated scans first become such images, too.
+
 The module needs the optional packages of the extra `judge`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -27,6 +30,7 @@ from sklearn.model_selection import PredefinedSplit, cross_val_score
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.progress import track
+from evaluation.clouds.count_images import count_image, image_points
 from evaluation.drives import Drive
 
 _PATCHES = 16
@@ -77,7 +81,25 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
     return table[np.isfinite(table[:, :3]).all(axis=1)]
 
 
-def places_of(drives: Iterable[Drive]) -> list[list[np.ndarray]]:
+def image_table(scan: np.ndarray) -> np.ndarray:
+    """Returns the bird's-eye image of a scan as columns of points.
+
+    From the columns of an image, the result is the same columns.
+
+    Args:
+        scan: as for `scan_table`.
+
+    Returns:
+        (N, 5) as from `scan_table`, with NaN as intensity and as ring.
+    """
+    points = image_points(count_image(scan_table(scan)[:, :3]))
+    return np.column_stack([points, np.full((len(points), 2), np.nan)])
+
+
+def places_of(
+    drives: Iterable[Drive],
+    table: Callable[[np.ndarray], np.ndarray] = scan_table,
+) -> list[list[np.ndarray]]:
     """Returns at most 40 scans of each drive, as a list for each place.
 
     A place begins with a scan that is at least 30 m from the first scans of all
@@ -99,7 +121,7 @@ def places_of(drives: Iterable[Drive]) -> list[list[np.ndarray]]:
                 and np.linalg.norm(p_WS - first[1]) < _ONE_PLACE
             )
             place = next(near, (world, tuple(p_WS)))
-            places.setdefault(place, []).append(scan_table(drive.scan(k)))
+            places.setdefault(place, []).append(table(drive.scan(k)))
     return list(places.values())
 
 
@@ -138,7 +160,9 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
-    result = _intensity(bright, tree) | _density(p, ring, tree)
+    result = _density(p, ring, tree)
+    if np.isfinite(bright).all():
+        result |= _intensity(bright, tree)
     low = np.quantile(p[:, 2], 0.05)
     height = p[:, 2] - low
     for part in (0.25, *_QUANTILES, 0.99):

@@ -31,7 +31,9 @@ from evaluation.real.data_sets import (
 from evaluation.real.image_sequences import (
     FOLDER,
     RADIUS,
+    UNIT,
     ImageSequence,
+    ImageSource,
     open_sequences,
 )
 from evaluation.real.sessions import FOLDER as SESSIONS
@@ -120,10 +122,17 @@ def measure_real(
         on_note,
     )
     found = open_data_sets(folder, on_note)
-    _add_images(engine, open_sequences(folder / FOLDER, on_note), choices)
-    for unit in dict.fromkeys(one.data_set.unit for one in found):
+    images = open_sequences(folder / FOLDER, on_note)
+    units = dict.fromkeys(one.data_set.unit for one in found)
+    if images:
+        units[UNIT] = None
+    made_of = {
+        unit: simulated_drives(simulated, unit, on_note) if simulated else []
+        for unit in units
+    }
+    _add_images(engine, images, made_of.get(UNIT, []), choices)
+    for unit, made in made_of.items():
         sets = [one for one in found if one.data_set.unit == unit]
-        made = simulated_drives(simulated, unit, on_note) if simulated else []
         _add_unit(engine, sets, made, choices)
         if not made:
             on_note(f"{unit}: no simulated scan of it to judge")
@@ -149,6 +158,7 @@ def _aligns(name: str) -> bool:
 def _add_images(
     engine: Engine,
     sequences: Sequence[ImageSequence],
+    made: Sequence[NamedDrive],
     choices: Sequence[MethodChoice],
 ) -> None:
     """Adds sequences of bird's-eye images to the engine.
@@ -156,10 +166,12 @@ def _add_images(
     Args:
         engine: the engine.
         sequences: the sequences.
+        made: simulated drives, from whose images a classifier tells them.
         choices: the methods.
     """
     if not sequences:
         return
+    is_judged = bool(made) and _has_judge(FOLDER, engine.on_note)
     able = [one for one in choices if one.make().sees_images]
     if unable := [one.name for one in choices if one not in able]:
         names = ", ".join(dict.fromkeys(unable))
@@ -169,7 +181,8 @@ def _add_images(
     for choice, given in zip(methods, able, strict=True):
         engine.methods[choice.key] = choice, given.columns
     jobs = _RealJobs.of(methods, (), frozenset())
-    for one in sequences if methods else ():
+    judged = _RealJobs.of((), made, frozenset(made))
+    for one in sequences:
         pair = Pair(
             map_name=one.name,
             names=(one.places.name, one.queries.name),
@@ -184,7 +197,17 @@ def _add_images(
             protocol=_IMAGES,
             settings={"sensor_height": 0.0},
         )
-        engine.add([pair], (), jobs, [PlaceTask.name, PoseTask.name])
+        if methods:
+            engine.add([pair], (), jobs, [PlaceTask.name, PoseTask.name])
+        if is_judged:
+            simulated = replace(
+                pair,
+                names=("simulated", one.places.name),
+                key=f"simulated {pair.key}",
+                database=NamedDrive("simulated", made[0].source),
+                query=one.places,
+            )
+            engine.add([simulated], (), judged, [JudgeTask.name])
 
 
 def _add_unit(
@@ -264,13 +287,18 @@ def _can_be_judged(one: RealScans, on_note: OnNote) -> bool:
     if not one.data_set.whole:
         on_note(f"{one.name}: thinned scans, not judged")
         return False
-    if importlib.util.find_spec("sklearn") is None:
-        on_note(
-            f"{one.name}: not judged; a package is not installed (pip install"
-            " 'cns-drake[judge]')"
-        )
-        return False
-    return True
+    return _has_judge(one.name, on_note)
+
+
+def _has_judge(name: str, on_note: OnNote) -> bool:
+    """Returns whether the classifier's package is there; if not, says so."""
+    if importlib.util.find_spec("sklearn") is not None:
+        return True
+    on_note(
+        f"{name}: not judged; a package is not installed (pip install"
+        " 'cns-drake[judge]')"
+    )
+    return False
 
 
 @dataclass
@@ -339,9 +367,11 @@ def judge_scans(
 ) -> dict[str, Any] | None:
     """Returns how well a classifier tells a data set from simulated scans.
 
+    Images are told from images that are made of the simulated scans.
+
     Args:
         reporter: reports notes.
-        source: the data set.
+        source: the data set, or a sequence of images.
         made: the simulated drives.
 
     Returns:
@@ -351,9 +381,11 @@ def judge_scans(
     from evaluation.real import judge
 
     drive = source()
-    places = judge.places_of([drive])
+    is_of_images = isinstance(source, ImageSource)
+    table = judge.image_table if is_of_images else judge.scan_table
+    places = judge.places_of([drive], table)
     if len(places) < 2:
         reporter.note(f"{drive.name}: one place, not judged")
         return None
-    simulated = judge.places_of(one() for one in made)
+    simulated = judge.places_of((one() for one in made), table)
     return judge.judge_draws(places, simulated, _DRAWS)

@@ -1,13 +1,18 @@
 """`cns-eval real` on bird's-eye images with poses."""
 
+from functools import partial
+
 from helpers.eval_program import run
 import numpy as np
 from PIL import Image
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Reporter
+from evaluation.clouds.count_images import image_points
 from evaluation.real import image_sequences
-from evaluation.real.image_sequences import open_sequences
+from evaluation.real.image_sequences import ImageSource, open_sequences
+from evaluation.real.measuring import judge_scans
 from evaluation.results.table import QueryRows, Results
 
 # Heading, x and y of each image: the second half passes the places of the first
@@ -116,6 +121,65 @@ def test_a_sequence_without_a_revisit_is_left_out(tmp_path, capsys):
     assert (status, out) == (2, "")
     assert "no data set that these methods can measure" in err
     assert not (root / "out" / "results.csv").exists()
+
+
+def blocks(seed, share):
+    """Returns an image (151, 151) of blocks; a share of them is filled."""
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(1, 11, (51, 51)) * (rng.random((51, 51)) < share)
+    counts[25, 25] = 10
+    image = np.rint(counts * 25.5).astype(np.uint8)
+    image = np.repeat(np.repeat(image, 3, axis=0), 3, axis=1)[1:152, 1:152]
+    # Nothing lies beyond the reach of an image.
+    image[:12] = image[-12:] = 0
+    image[:, :12] = image[:, -12:] = 0
+    return image
+
+
+class Scanned:
+    """A drive of scans whose images are blocks."""
+
+    world_frame = "world"
+    scenario = None
+
+    def __init__(self, share):
+        self.share = share
+        self.X_WS = np.tile(np.eye(4), (6, 1, 1))
+        self.X_WS[:, 0, 3] = 40.0 * np.arange(6)
+
+    def __len__(self):
+        return 6
+
+    def scan(self, k):
+        """Returns points at random inside their voxels, with intensities."""
+        rng = np.random.default_rng(k)
+        points = image_points(blocks(100 + k, self.share))
+        points = points + rng.uniform(-0.19, 0.19, points.shape)
+        return np.column_stack([points, rng.integers(0, 100, len(points))])
+
+
+@pytest.mark.slow
+def test_images_are_told_from_images_of_scans(tmp_path, monkeypatch):
+    judge = pytest.importorskip("evaluation.real.judge")
+    monkeypatch.setattr(judge, "_TREES", 10)
+    monkeypatch.setattr(judge, "_NEIGHBOURHOODS", 40)
+    folder = tmp_path / "imgs"
+    folder.mkdir()
+    rows = []
+    for k in range(6):
+        Image.fromarray(blocks(k, 0.3)).save(folder / f"{k}.png")
+        rows.append([1, 0, 0, 40 * k, 0, 1, 0, 0, 0, 0, 1, 0])
+    np.savetxt(tmp_path / "pose.txt", rows)
+    source = ImageSource(tmp_path, "images", tuple(range(6)))
+    found = {}
+    for share in (0.3, 0.6):
+        made = (partial(Scanned, share),)
+        result = judge_scans(Reporter(print), source, made)
+        # An image has neither intensities nor rings.
+        assert not {"intensity", "roughness"} & set(result["auc"])
+        found[share] = result["auc"]["all"]
+    assert found[0.3] < 0.75
+    assert found[0.6] > 0.95
 
 
 def test_methods_that_need_scans_measure_nothing(tmp_path, capsys):
