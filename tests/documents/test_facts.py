@@ -130,7 +130,8 @@ def test_the_tutorial_names_the_colours_that_its_page_shows():
         documents.read("docs/tutorial.md").text,
     )
     assert " ".join(said.split()) == (
-        "what stage 02 adds turns red, and what it clears away violet"
+                "structures that stage 02 adds turn red, "
+        "and structures that it clears away turn violet"
     )
 
 
