@@ -130,7 +130,7 @@ def test_the_tutorial_names_the_colours_that_its_page_shows():
         documents.read("docs/tutorial.md").text,
     )
     assert " ".join(said.split()) == (
-                "structures that stage 02 adds turn red, "
+        "structures that stage 02 adds turn red, "
         "and structures that it clears away turn violet"
     )
 
