@@ -240,6 +240,7 @@ RECIPES = {
             "recordings/suburbia_01/metadata.yaml",
             "recordings/suburbia_01/suburbia_01_0.mcap",
         ),
+        by_night=True,
     ),
     "evaluation": Recipe(
         ".venv/bin/cns-eval tcr output/metropolis_01",

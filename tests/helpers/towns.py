@@ -9,7 +9,7 @@ from evaluation.drives import Drive
 LIDAR_HEIGHT = 1.6
 _RANGE = 45.0
 _PERIOD_NS = 50_000_000
-_POINTS_A_SCAN = 3000
+_POINTS_A_SCAN = 1500
 
 
 def make_town(seed=3, gone=()):

@@ -44,7 +44,15 @@ except InputError as error:
 THEIRS = "import evaluation.metrics\nassert evaluation.metrics.MINE\n"
 
 
-@pytest.fixture(params=KINDS)
+# What neither can be imported nor hides a package is left to the night.
+@pytest.fixture(
+    params=[
+        "package",
+        pytest.param("failing", marks=pytest.mark.night),
+        "folder",
+        pytest.param("module", marks=pytest.mark.night),
+    ]
+)
 def folder(request, tmp_path):
     for name, text in KINDS[request.param].items():
         path = tmp_path / name

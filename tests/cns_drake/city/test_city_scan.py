@@ -25,7 +25,7 @@ from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 MAX_RANGE = 120.0
 

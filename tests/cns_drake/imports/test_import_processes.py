@@ -59,7 +59,9 @@ def contents(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("line", ["dressing", "writing"])
+@pytest.mark.parametrize(
+    "line", [pytest.param("dressing", marks=pytest.mark.night), "writing"]
+)
 def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     write_corner(tmp_path / "city.osm")
     process = start(tmp_path / "city.osm", tmp_path / "town")
@@ -72,7 +74,14 @@ def test_an_interrupted_import_leaves_nothing(tmp_path, line):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("line", ["reading", "dressing", "writing"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        pytest.param("reading", marks=pytest.mark.night),
+        pytest.param("dressing", marks=pytest.mark.night),
+        "writing",
+    ],
+)
 def test_an_import_after_a_killed_one_succeeds(tmp_path, line):
     write_corner(tmp_path / "city.osm")
     output = tmp_path / "town"

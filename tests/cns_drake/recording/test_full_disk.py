@@ -98,7 +98,9 @@ def recorded(folder):
     return files
 
 
-@pytest.mark.parametrize("disk", FAULTS)
+@pytest.mark.parametrize(
+    "disk", [pytest.param("tmpfs", marks=pytest.mark.night), "limit"]
+)
 def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     scenario = tiny_scenario(tmp_path)
     file = tmp_path / "tiny_01.yaml"

@@ -13,7 +13,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from evaluation import drives
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 # The first six seconds of the drive, a start from rest, at 10 Hz.
 NUM_FRAMES = 60

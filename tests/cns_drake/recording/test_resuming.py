@@ -43,7 +43,7 @@ def leave(folder, content):
 def test_cut_off_at_any_byte(folder, whole):
     mcap = whole["drive_01_0.mcap"]
     found = []
-    for size in [*range(0, len(mcap), 241), len(mcap) - 1, len(mcap)]:
+    for size in [*range(0, len(mcap), 983), len(mcap) - 1, len(mcap)]:
         leave(folder, mcap[:size])
         found.append(record(folder))
         assert contents(folder) == whole

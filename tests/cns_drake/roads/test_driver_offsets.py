@@ -170,6 +170,7 @@ def test_drivers_keep_clear_of_kerbs(name, seed):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_pairs_of_drives_differ_as_real_ones_do():
     scenario = load_scenario("metropolis_04")
     offsets = []

@@ -72,7 +72,7 @@ def test_the_wheels_of_the_shipped_car_keep_to_their_limits(tmp_path):
     motion = VehicleMotion(plant, vehicle, trajectory)
     context = motion.CreateDefaultContext()
     angles = []
-    for time in np.linspace(0, trajectory.duration, 3000):
+    for time in np.linspace(0, trajectory.duration, 1000):
         context.SetTime(time)
         q = motion.GetOutputPort("position").Eval(context)
         angles.append(q[steering_rows(plant)])

@@ -135,6 +135,7 @@ def test_odometry_is_the_pose_and_the_twist_in_the_body():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_integrating_the_imu_reproduces_the_drive():
     _, _, trajectory = shipped_drive("metropolis_04")
     X_BI = RigidTransform([-1.0, 0, 1.6])

@@ -276,6 +276,7 @@ def test_camera_of_the_command_line():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_an_interrupted_recording_goes_on_to_the_same_bytes(
     recording, tmp_path, monkeypatch
 ):

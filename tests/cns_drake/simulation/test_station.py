@@ -129,7 +129,7 @@ def test_imu_adds_up_to_the_trajectory(scenario):
         )
 
     simulator.Initialize()
-    duration = 160.0
+    duration = 40.0
     sample(simulator.get_context())
     for frame in range(1, round(duration / FRAME_PERIOD) + 1):
         simulator.AdvanceTo(frame * FRAME_PERIOD)
@@ -154,8 +154,8 @@ def test_imu_adds_up_to_the_trajectory(scenario):
     )
     drift = np.linalg.norm(p - p_WI_expected, axis=1)
     way = np.linalg.norm(np.diff(p_WI_expected, axis=0), axis=1).sum()
-    assert way > 1400.0
-    assert drift.max() < 0.05  # Measured: 0.030 m after 1595 m.
+    assert way > 300.0
+    assert drift.max() < 0.05
 
 
 def _integrate(times, force, rate, R_WI, p, v, substeps=10):

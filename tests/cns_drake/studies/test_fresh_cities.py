@@ -89,7 +89,9 @@ def test_stages_keep_what_a_city_has():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+@pytest.mark.parametrize(
+    "turn_deg", [pytest.param(0.0, marks=pytest.mark.night), 30.0]
+)
 def test_a_version_of_a_small_city(tmp_path, turn_deg):
     town = write_small_city(tmp_path / "town")
     roads = load_road_network(town / "roads.yaml")

@@ -53,6 +53,7 @@ def files(scenarios, tmp_path_factory):
     return [write_scenario(scenario, folder) for scenario in scenarios]
 
 
+@pytest.mark.night
 def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     # Ctrl-C reaches every process of the terminal.
     output = tmp_path / "output"

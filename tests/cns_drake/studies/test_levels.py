@@ -37,6 +37,7 @@ def planned(output, *overrides):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_the_levels_are_as_they_were_frozen(tmp_path):
     with (worlds_folder() / TABLE).open() as stream:
         frozen = {

@@ -161,6 +161,7 @@ class Counting(Method):
 """
 
 
+@pytest.mark.night
 @pytest.mark.usefixtures("few_methods")
 def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     """The tables include controls, and come from simulation alone."""

@@ -235,6 +235,7 @@ def crossers(walkers, crossing):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_few_walkers_cross_between_crossings_and_none_is_touched():
     name = "suburbia"
     network = load_road_network(shipped_maps()[name] / "roads.yaml")

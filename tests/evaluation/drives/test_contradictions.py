@@ -106,7 +106,14 @@ print(peak.split()[1])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("topic", ["/odometry", "/lidar/points", "/tf_static"])
+@pytest.mark.parametrize(
+    "topic",
+    [
+        pytest.param("/odometry", marks=pytest.mark.night),
+        "/lidar/points",
+        pytest.param("/tf_static", marks=pytest.mark.night),
+    ],
+)
 def test_a_small_file_takes_little_memory(recording, topic):
     """The messages are nearly all padding, which zstd compresses to nothing."""
     path, messages, attachments = recording

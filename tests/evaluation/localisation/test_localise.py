@@ -115,7 +115,13 @@ def test_the_truth_on_a_perfect_map_stays(method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "method", ["plane-icp", "gicp", "vgicp", "robust-gicp"]
+    "method",
+    [
+        "plane-icp",
+        "gicp",
+        "vgicp",
+        pytest.param("robust-gicp", marks=pytest.mark.night),
+    ],
 )
 def test_another_sample_of_the_same_street_is_found(method):
     found = localiser(street(0), method, default_settings(method))

@@ -91,7 +91,12 @@ def test_equal_sets_are_not_told_apart(judge, program, plain, tmp_path):
     ("options", "group", "feature"),
     [
         ({"texture": 0.0}, "intensity", "spread among 6"),
-        ({"bias": 0.03}, "roughness", "between rings"),
+        pytest.param(
+            {"bias": 0.03},
+            "roughness",
+            "between rings",
+            marks=pytest.mark.night,
+        ),
     ],
 )
 def test_it_finds_the_difference(

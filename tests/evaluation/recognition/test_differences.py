@@ -73,6 +73,7 @@ def test_blocks_follow_the_route():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_equal_methods_differ_at_the_nominal_level():
     rng = np.random.default_rng(8)
     runs = 200

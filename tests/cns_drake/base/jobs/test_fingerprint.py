@@ -233,8 +233,10 @@ def test_of_our_own_code_the_right_modules_count(packages):
     "module",
     [
         SURVEY,
-        "evaluation.study.figures",
-        "cns_drake.simulation.simulated_drive",
+        pytest.param("evaluation.study.figures", marks=pytest.mark.night),
+        pytest.param(
+            "cns_drake.simulation.simulated_drive", marks=pytest.mark.night
+        ),
         "cns_drake.studies.recording",
     ],
 )
