@@ -28,6 +28,7 @@ def share_of(colour, files):
     return (np.abs(pixels - np.array(colour)) < 8).all(axis=1).sum()
 
 
+@pytest.mark.night
 def test_sheets_show_all_of_a_page_and_each_picture(tmp_path, capsys):
     shown = tmp_path / "shown"
     shown.mkdir()

@@ -14,7 +14,7 @@ from helpers.fuzz_targets import find_target
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.night]
 
 _DRAKE = "cns-drake"
 _EVALUATION = "cns-eval"

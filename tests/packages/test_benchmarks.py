@@ -53,7 +53,13 @@ BY_HAND = {
 }
 SHARED = {"processes.py", "stages.py"}
 # It compiles all loops anew, to see how long that takes.
-BY_NIGHT = {"effects.py", "many_houses.py", "start.py"}
+BY_NIGHT = {
+    "effects.py",
+    "many_houses.py",
+    "ray_casting_rates.py",
+    "start.py",
+    "tcr_of_large_maps.py",
+}
 # A process that imports what benchmarks need, and forks for each one. Their own
 # new processes are forks, too: they import nothing anew. Functions are found by
 # name, as new interpreters find them.

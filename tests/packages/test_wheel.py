@@ -51,6 +51,7 @@ def run(*command, **options):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_it_is_small_and_has_its_notices(wheel):
     assert wheel.stat().st_size < 10e6
     with zipfile.ZipFile(wheel) as files:

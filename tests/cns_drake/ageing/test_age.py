@@ -84,6 +84,7 @@ def test_histories_are_nested_and_repeatable(town, long):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_another_seed_is_another_history(town, long):
     other = town.parent / "other"
     age_map(town, [3], 6, _BUSY, other)

@@ -61,6 +61,7 @@ def test_a_city_of_one_s_own_has_no_reference():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_a_study_does_not_load_the_paper():
     code = (
         "import sys\n"

@@ -7,16 +7,13 @@ from helpers import studies
 from helpers.small_towns import drive
 import pytest
 
+from evaluation.methods import shipped_methods
 from evaluation.recognition import costs
-from evaluation.study import chosen_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import StudyFiles
 from evaluation.study.stages_report import StagesReport
 
 pytestmark = pytest.mark.slow
-
-# BTC describes a place by several scans, and SOLiD by one.
-METHODS = ("btc", "solid")
 
 
 @pytest.mark.usefixtures("unrendered_figures")
@@ -24,7 +21,6 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
     # A clock that advances by 1 ms whenever it is read.
     ticks = iter(range(0, 10**12, 10**6))
     monkeypatch.setattr(costs, "process_time_ns", lambda: next(ticks))
-    monkeypatch.setattr(chosen_methods, "shipped_methods", lambda: METHODS)
     for stage, route in (("01", "a"), ("02", "b")):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
     found = find_recordings(tmp_path / "in")
@@ -38,12 +34,12 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
     files = StudyFiles(output)
     described = {
         name: files.survey("town_01").described(name).read()[1]
-        for name in METHODS
+        for name in shipped_methods()
     }
     path = study.assemble(with_tables=True)
     with (output / "costs.csv").open(newline="") as stream:
         rows = {row["method"]: row for row in csv.DictReader(stream)}
-    assert tuple(rows) == METHODS
+    assert tuple(rows) == shipped_methods()
     for name, row in rows.items():
         assert float(row["describe_ms"]) == float(row["query_ms"]) == 1.0
         assert row["scans_per_place"] == ("10" if name == "btc" else "1")

@@ -59,7 +59,7 @@ class Counting(Method):
 
 @pytest.fixture(scope="module", autouse=True)
 def some_methods():
-    """One of each kind; `test_queries` compares all that ship."""
+    """One of each kind; `test_method_costs` compares all that ship."""
     names = ("btc", "layered-overlap", "scan-context++", "solid")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chosen_methods, "shipped_methods", lambda: names)

@@ -484,6 +484,7 @@ def test_where_jobs_run(monkeypatch):
         choose_cluster(1, "tcp://b:2")
 
 
+@pytest.mark.night
 def test_commands_that_need_no_cluster_do_not_load_it():
     script = (
         "import sys\n"
