@@ -35,6 +35,7 @@ def import_all(*packages):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_cities_roads_and_imports_need_no_drake():
     packages = ("city", "imports", "roads")
     done = import_all(*(f"cns_drake.{name}" for name in packages))

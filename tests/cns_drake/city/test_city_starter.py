@@ -110,6 +110,7 @@ def test_options_without_effect_are_refused(town, words):
     assert str(done.exception).startswith(words[0])
 
 
+@pytest.mark.night
 def test_other_seeds_draw_other_towns(tmp_path, town):
     (tmp_path / "roads.yaml").write_text(ROADS)
     start_city(tmp_path, seed=1)

@@ -155,6 +155,7 @@ def test_a_plan_that_has_not_grown_is_left_alone(generated, tmp_path):
     assert (folder / "stages.yaml").read_text() == STAGES
 
 
+@pytest.mark.night
 def test_a_faulty_table_is_no_hindrance_but_to_repair(tmp_path):
     folder = write_small_city(tmp_path / "small")
     (folder / "structures.csv").write_text("instance,name\n1,a\n")

@@ -331,6 +331,7 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     spans = "".join(

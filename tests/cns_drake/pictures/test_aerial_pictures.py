@@ -25,6 +25,7 @@ def test_the_view_shows_every_position_north_up():
     assert np.ptp(pixels[:, 0]) > 380
 
 
+@pytest.mark.night
 def test_drives_are_drawn_over_their_stages(tmp_path):
     folder = write_small_map(tmp_path / "boxes")
     scenarios = {}

@@ -165,7 +165,15 @@ def browser(tmp_path_factory):
         yield browser
 
 
-@pytest.fixture(scope="module", params=SCREENS.values(), ids=SCREENS)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(
+            size, id=name, marks=pytest.mark.night if name == "laptop" else ()
+        )
+        for name, size in SCREENS.items()
+    ],
+)
 def opened(browser, page, request):
     """The page, standing still, with its sheet unfolded."""
     browser.open(page.as_uri(), *request.param)

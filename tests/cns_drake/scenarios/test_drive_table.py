@@ -89,7 +89,14 @@ def test_a_drive_is_measured_again_when_its_base_changes(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", ["", "drive\nboxes_01\n", "\0,\x80"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("", marks=pytest.mark.night),
+        pytest.param("drive\nboxes_01\n", marks=pytest.mark.night),
+        "\0,\x80",
+    ],
+)
 def test_a_spoilt_table_is_measured_anew(folder, text):
     write_table(folder)
     good = MapFolder(folder).drive_table.read_bytes()

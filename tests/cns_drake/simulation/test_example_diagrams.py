@@ -25,7 +25,17 @@ EXAMPLES = {
 }
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "drone_downtown",
+        *(
+            pytest.param(one, marks=pytest.mark.night)
+            for one in EXAMPLES
+            if one != "drone_downtown"
+        ),
+    ],
+)
 def test_an_example_runs_and_shows_its_points(name, small_map, tmp_path):
     duration, path, least = EXAMPLES[name]
     script = tmp_path / "diagrams" / f"{name}.py"

@@ -233,6 +233,7 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
     assert [p.name for p in folder.parent.iterdir()] == ["town_c4"]
 
 
+@pytest.mark.night
 def test_an_interrupted_run_leaves_nothing_and_goes_on(
     town, tmp_path, monkeypatch
 ):

@@ -222,6 +222,7 @@ class InterruptedHereError(Exception):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_an_interrupted_study_goes_on(town, tmp_path, jobs_done, monkeypatch):
     wanted = experiment(town, **STAGES, tasks=["place", "change"])
     measure(wanted, tmp_path / "whole")
@@ -303,6 +304,7 @@ def test_protocols_are_factors(town, tmp_path, jobs_done):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_queries_are_scored_once_for_all_radii(town, tmp_path, jobs_done):
     """The numbers are those of a study of each radius alone."""
     fields = {"tasks": ["place", "pose", "cost"], "methods": ["ring++"]}

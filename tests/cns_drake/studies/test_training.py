@@ -107,6 +107,7 @@ def test_jax_scores_as_the_method_does(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_the_same_seed_and_an_interruption(tmp_path, monkeypatch):
     import jax
 

@@ -322,6 +322,7 @@ def test_help_is_instant_and_modules_stay_apart():
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_nothing_imports_the_simulator():
     code = (
         "import pkgutil, importlib, sys, evaluation\n"

@@ -84,6 +84,7 @@ def test_tcr_has_the_rows_of_a_report(capsys, towns, report, tmp_path):
         np.testing.assert_equal(numbers, expected[key])
 
 
+@pytest.mark.night
 def test_every_command_writes_its_tables_by_the_engine(
     capsys, towns, tmp_path, monkeypatch
 ):

@@ -504,6 +504,7 @@ def test_a_city_of_one_s_own_without_a_control(tmp_path, few_methods):
     assert not (path.parent / "figures" / "survival.png").exists()
 
 
+@pytest.mark.night
 @pytest.mark.usefixtures("unrendered_figures", "few_methods")
 def test_several_cities(tmp_path):
     for stage in ("01", "02"):

@@ -41,6 +41,7 @@ def drive_and_return(folder, stage):
     )
 
 
+@pytest.mark.night
 def test_loop_closure_beside_the_pairs(tmp_path, capsys):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
     drive_and_return(tmp_path / "in" / "metropolis_04", "04")
