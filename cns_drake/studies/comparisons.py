@@ -164,6 +164,8 @@ class Compared:
             `evaluation.recognition.keeping.kept_places`.
         maintain: what updates the maps of older drives by newer ones, see
             `evaluation.map_update.upkeep`.
+        ages: the years by which the city has aged at each of `drives`; empty if
+            it does not age.
     """
 
     database: Scenario
@@ -174,6 +176,7 @@ class Compared:
     beside: tuple[Scenario, ...] = ()
     keep: str | int = KEEP_ALL
     maintain: str = NOT_MAINTAINED
+    ages: tuple[int, ...] = ()
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
@@ -308,7 +311,8 @@ class PairMaker:
         if SESSIONS in sides["database"]:
             self._check_side("database", sides["database"])
         self._check_side("query", sides["query"])
-        database = self._database(sessions, sides, condition, seed)
+        dated = self._database(sessions, sides, condition, seed)
+        database = [drive for _, drive in dated]
         years = _oldest(sides["database"], sessions)
         age = years, sides["database"].get("rates", 1.0)
         drive = self._changed("query", sides["query"], age, seed)
@@ -343,6 +347,7 @@ class PairMaker:
             tuple(database[1:]),
             keep,
             self._maintained(sides["database"], len(database)),
+            (*(when for when, _ in dated), years) if years else (),
         )
 
     def _maintained(self, database: Changes, number: int) -> str:
@@ -424,8 +429,10 @@ class PairMaker:
         sides: Mapping[str, Changes],
         condition: Condition,
         seed: int,
-    ) -> list[Scenario]:
+    ) -> list[tuple[int, Scenario]]:
         """Returns the drives of a database, from older to newer.
+
+        Each has the years by which its city has aged.
 
         `years` says how much older a drive is than another one, through whose
         city these years have passed. So the city of the oldest drive is aged by
@@ -474,7 +481,8 @@ class PairMaker:
                 raise InputError(
                     f"{self.source}: {place}: the same drive as {before}"
                 )
-        return [drive for _, _, drive in sorted(found, key=lambda one: one[0])]
+        found.sort(key=lambda one: one[0])
+        return [(time[0], drive) for time, _, drive in found]
 
     def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
         """Returns those fields of a case that are possible on the map.

@@ -53,6 +53,7 @@ from cns_drake.studies.map_task import DrivenMapTask
 from cns_drake.studies.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import make_maps, redraw_frozen
+from cns_drake.studies.seen_task import SeenTask
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.methods import optional_methods
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -103,6 +104,7 @@ TASKS: Mapping[str, type[Task]] = {
         DrivenMapTask,
         ChangeTask,
         CostTask,
+        SeenTask,
     )
 }
 # Expected time to update a map by one drive [s].
@@ -603,6 +605,7 @@ class Study:
             distractors=compared.distractors,
             beside=tuple(beside),
             keep=compared.keep,
+            ages=compared.ages,
             may_repeat=bool(compared.asked or compared.distractors),
         )
 

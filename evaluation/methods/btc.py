@@ -189,6 +189,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     Config = BtcConfig
     skips_places = True
+    divides = True
     config: BtcConfig
     scans_per_place = 10
 
@@ -243,8 +244,31 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        scores = np.full(len(database.places), np.nan)
         limit = None if exhaustive else self.config.candidates
+        return self._score(query, database, limit)
+
+    @property
+    def num_shortlisted(self) -> int:
+        return self.config.candidates
+
+    def shortlist(
+        self, query: BtcDescription, database: BtcDatabase
+    ) -> np.ndarray:
+        _, of_table = self._matches(query, database)
+        clouds = database.table.clouds[of_table]
+        votes = np.bincount(clouds, minlength=len(database.places))
+        return -np.sort(-votes)[: self.config.candidates]
+
+    def score_best(
+        self, query: BtcDescription, database: BtcDatabase, number: int
+    ) -> np.ndarray:
+        return self._score(query, database, number)
+
+    def _score(
+        self, query: BtcDescription, database: BtcDatabase, limit: int | None
+    ) -> np.ndarray:
+        """Returns the scores (D,) of some candidates; see `_motions`."""
+        scores = np.full(len(database.places), np.nan)
         for place, X_PQ in self._motions(query, database, limit):
             planes = database.places[place].planes
             if len(query.planes) == 0 or len(planes) == 0:
@@ -288,12 +312,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
                 for all.
         """
         table = database.table
-        of_query, of_table = match(
-            query.triangles,
-            table,
-            self.config.side_tolerance,
-            self.config.min_similarity,
-        )
+        of_query, of_table = self._matches(query, database)
         clouds = table.clouds[of_table]
         # Sort by place; matches of a place stay in the order in which they were
         # found.
@@ -309,6 +328,17 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             )
             if X_PQ is not None:
                 yield int(place), X_PQ
+
+    def _matches(
+        self, query: BtcDescription, database: BtcDatabase
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the similar triangles of a query and of all places."""
+        return match(
+            query.triangles,
+            database.table,
+            self.config.side_tolerance,
+            self.config.min_similarity,
+        )
 
 
 def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -184,6 +184,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
 
     Config = LearnedConfig
     skips_places = True
+    divides = True
     config: LearnedConfig
 
     def __init__(self, config: MethodConfig | None = None):

@@ -87,6 +87,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             only a scan has, such as planes or angles of beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
+        divides: whether a database can be searched part by part, because it is
+            too large for the memory. If so, the score and the pose of a place
+            must not depend on other places, except through `shortlist`.
         config: the parameters in use.
 
     Example:
@@ -105,6 +108,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     skips_places: ClassVar[bool] = False
     sees_images: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
+    divides: ClassVar[bool] = False
     # The Python file of a user's own method.
     _file: ClassVar[Path | None] = None
 
@@ -202,6 +206,39 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             As `score`.
         """
         return self.score(queries[-1], database, exhaustive=exhaustive)
+
+    @property
+    def num_shortlisted(self) -> int | None:
+        """Number of entries that a search chooses from the whole database.
+
+        None, the default, if each place is compared.
+        """
+        return None
+
+    def shortlist(self, query: Descriptor, database: Database) -> np.ndarray:
+        """Returns how well the best entries of a part of a database fit.
+
+        The entries may be places, or several for each place. Of all parts, the
+        search compares the `num_shortlisted` best ones, see `score_best`. A
+        method that `divides` and has a search must have both functions.
+
+        Returns:
+            (K,) decreasing, K at most `num_shortlisted`.
+        """
+        raise NotImplementedError
+
+    def score_best(
+        self, query: Descriptor, database: Database, number: int
+    ) -> np.ndarray:
+        """Returns the scores of a part of a database, as `score` does.
+
+        Args:
+            query: see `score`.
+            database: part of a database, made by `build_database`.
+            number: how many of the entries of `shortlist` are compared, the
+                first ones.
+        """
+        raise NotImplementedError
 
     def rerank(
         self,

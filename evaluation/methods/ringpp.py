@@ -143,6 +143,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     Config = RingPlusPlusConfig
     skips_places = True
     sees_images = True
+    divides = True
     config: RingPlusPlusConfig
 
     def describe(self, points: np.ndarray) -> Ring:

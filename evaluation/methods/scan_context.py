@@ -148,6 +148,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     Config = ScanContextConfig
     skips_places = True
     sees_images = True
+    divides = True
     config: ScanContextConfig
 
     def describe(self, points: np.ndarray) -> Contexts:
@@ -189,13 +190,49 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        num_contexts = len(database.places)
-        wanted = self.config.candidates * num_contexts // database.num_places
-        if exhaustive or wanted >= num_contexts:
-            chosen = np.arange(num_contexts)
+        if exhaustive:
+            chosen = np.arange(len(database.places))
         else:
-            _, found = database.tree.query(query.retrieval_keys[0], k=wanted)
-            chosen = np.sort(np.atleast_1d(found))
+            chosen = self._nearest(query, database)[0]
+        return self._score(query, database, chosen)
+
+    @property
+    def num_shortlisted(self) -> int:
+        contexts = {"augmented-polar": 3, "augmented-cart": 2}
+        return self.config.candidates * contexts.get(self.config.variant, 1)
+
+    def shortlist(
+        self, query: Contexts, database: ContextDatabase
+    ) -> np.ndarray:
+        return -self._nearest(query, database)[1]
+
+    def score_best(
+        self, query: Contexts, database: ContextDatabase, number: int
+    ) -> np.ndarray:
+        chosen, _ = self._nearest(query, database)
+        return self._score(query, database, chosen[:number])
+
+    def _nearest(
+        self, query: Contexts, database: ContextDatabase
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the contexts whose retrieval keys are nearest to a query's.
+
+        The tree leaves open which of equally near contexts are found.
+
+        Returns:
+            (C,) indices of contexts, the nearest first; (C,) their distances.
+        """
+        number = min(self.num_shortlisted, len(database.places))
+        distances, found = database.tree.query(
+            query.retrieval_keys[0], k=np.arange(1, number + 1)
+        )
+        return found, distances
+
+    def _score(
+        self, query: Contexts, database: ContextDatabase, chosen: np.ndarray
+    ) -> np.ndarray:
+        """Returns the scores (D,) by some contexts only."""
+        chosen = np.sort(chosen)
         scores = np.full(database.num_places, np.nan)
         for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
             some = chosen[start : start + _CONTEXTS_AT_ONCE]

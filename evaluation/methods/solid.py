@@ -132,6 +132,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
 
     Config = SolidConfig
     skips_places = True
+    divides = True
     config: SolidConfig
 
     def for_lidar(self, field: LidarField | None) -> SolidMethod:

@@ -10,8 +10,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedScans
-from evaluation.recognition.scoring import score_places
+from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.search import Search
 
 # Number of clouds, or of queries, whose time is measured; the time of the first
 # does not count, because it includes loading and compiling.
@@ -64,22 +64,23 @@ class Cost:
 
 
 def measure_search(
-    method: Method, places: DescribedScans, queries: DescribedScans
+    method: Method, places: DescribedScans, queries: DescribedDrive
 ) -> QueryCost:
     """Returns the time and memory that a search in a database needs.
 
     Args:
         method: method to measure.
         places: described places.
-        queries: described queries.
+        queries: drive with described queries.
     """
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    search, times = _searched(method, places, queries)
     return QueryCost(
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
         memory=sum(sizes),
-        build_ms=cpu_ms(method.build_database, places.descriptors),
-        query_ms=query_ms(method, places, queries),
+        build_ms=search.build_ms,
+        query_ms=float(np.median(times[1:])),
     )
 
 
@@ -112,7 +113,7 @@ def measure_cost(
 
 
 def query_ms(
-    method: Method, places: DescribedScans, queries: DescribedScans
+    method: Method, places: DescribedScans, queries: DescribedDrive
 ) -> float:
     """Returns the median CPU time of several queries, on one core [ms].
 
@@ -124,25 +125,23 @@ def query_ms(
     Args:
         method: method to measure.
         places: described places, all of them candidates.
-        queries: described queries.
+        queries: drive with described queries.
     """
-    indexed = method.build_database(places.descriptors)
-    is_known = np.ones(len(places.frames), dtype=bool)
-    rows = np.linspace(0, len(queries.frames) - 1, NUM_TRIALS).astype(int)
-
-    def ask(row: int) -> None:
-        score_places(
-            method,
-            queries.descriptors[: row + 1],
-            queries.clouds[row] if queries.clouds else None,
-            indexed,
-            places.clouds,
-            is_known,
-        )
-
-    with threadpool_limits(limits=1):
-        times = [cpu_ms(ask, row) for row in rows.tolist()]
+    _, times = _searched(method, places, queries)
     return float(np.median(times[1:]))
+
+
+def _searched(
+    method: Method, places: DescribedScans, queries: DescribedDrive
+) -> tuple[Search, np.ndarray]:
+    """Returns a search after some queries, and the CPU time of each [ms]."""
+    search = Search(method, places)
+    last = len(queries.queries.frames) - 1
+    rows = np.linspace(0, last, NUM_TRIALS).astype(int).tolist()
+    is_known = np.ones((len(rows), len(places.frames)), dtype=bool)
+    with threadpool_limits(limits=1):
+        search.scores(queries, rows, is_known)
+    return search, search.query_ms
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:

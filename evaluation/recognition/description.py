@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class DescribedScans:
     frames: np.ndarray
     stamps_ns: np.ndarray
     X_WS: np.ndarray
-    descriptors: list = field(default_factory=list)
+    descriptors: Sequence[Any] = field(default_factory=list)
     clouds: list[np.ndarray] = field(default_factory=list)
     blocks: np.ndarray | None = None
     drive_of: np.ndarray | None = None
@@ -71,7 +71,7 @@ class DescribedScans:
             self.frames[rows],
             self.stamps_ns[rows],
             self.X_WS[rows],
-            [self.descriptors[row] for row in rows],
+            [self.descriptors[row] for row in rows] if self.descriptors else [],
             [self.clouds[row] for row in rows] if self.clouds else [],
             blocks,
             drive_of,
@@ -354,8 +354,10 @@ class _Describing:
         described = {**known, **dict(zip(asked, found, strict=True))}
         drive = self._drive
         scans = drive.places if role == "places" else drive.queries
+        descriptors = scans.descriptors
+        assert isinstance(descriptors, list)
         for frame, cloud in chosen.items():
-            scans.descriptors.append(described[frame])
+            descriptors.append(described[frame])
             if self._method.rerank_best:
                 scans.clouds.append(cloud)
         return described

@@ -10,17 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.drives.drive import Drive, check_same_world
-from cns_drake.base.progress import track
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive, describe_drive
 from evaluation.recognition.overlap_truth import overlap_matrix
-from evaluation.recognition.pose_errors import (
-    PoseErrors,
-    checked_pose,
-    pose_error,
-)
+from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.scoring import gated, ranked_places, score_places
+from evaluation.recognition.scoring import (
+    gated_at,
+    ranked_places,
+    tested_places,
+)
+from evaluation.recognition.search import Search
 from evaluation.recognition.sequences import along_the_way
 
 
@@ -165,27 +165,9 @@ def compare_with_gates(
     queries = query.queries
     if is_known is None:
         is_known = _known_places(database, query, protocol)
-    indexed = method.build_database(places.descriptors)
-    alone = np.empty(is_known.shape)
-    scores = [np.empty(is_known.shape) for _ in gate_radii]
-    errors = [PoseErrors.unknown(len(queries.frames)) for _ in gate_radii]
-    distances = np.empty(is_known.shape)
-    rows = track(
-        range(len(queries.frames)),
-        f"querying {query.name}",
-        len(queries.frames),
-        "queries",
-    )
-    for row in rows:
-        alone[row] = score_places(
-            method,
-            queries.descriptors[: row + 1],
-            queries.clouds[row] if queries.clouds else None,
-            indexed,
-            places.clouds,
-            is_known[row],
-            where=f"{query.name}: query at frame {queries.frames[row]}",
-        )
+    search = Search(method, places)
+    rows = range(len(queries.frames))
+    alone = search.scores(query, rows, is_known)
     if length := method.config.sequence:
         alone = along_the_way(
             alone,
@@ -195,24 +177,23 @@ def compare_with_gates(
             length,
             places.drive_of,
         )
+    radii = [one for one in gate_radii if one is not None]
+    tested = [tested_places(one)[: None if radii else 1] for one in alone]
+    poses = search.poses(query, tested)
+    scores = [np.empty(is_known.shape) for _ in gate_radii]
+    errors = [PoseErrors.unknown(len(rows)) for _ in gate_radii]
+    distances = np.empty(is_known.shape)
     for row, ungated in enumerate(alone):
-        descriptor = queries.descriptors[row]
         offsets = queries.p_WSs[row] - places.p_WSs
         distances[row] = np.linalg.norm(offsets, axis=1)
-        radii = [one for one in gate_radii if one is not None]
-        by_gate = iter(gated(method, descriptor, indexed, ungated, radii))
-        poses: dict[int, np.ndarray | None] = {}
+        by_gate = iter(gated_at(ungated, poses[row], radii))
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated if radius is None else next(by_gate)
             kept[row] = found
             if np.isnan(found).all():
                 continue
             best = int(ranked_places(found)[0])
-            if best not in poses:
-                poses[best] = checked_pose(
-                    method, method.relative_pose(descriptor, indexed, best)
-                )
-            if (X_PQ := poses[best]) is not None:
+            if (X_PQ := poses[row][best]) is not None:
                 error.translation[row], error.rotation_deg[row] = pose_error(
                     X_PQ, places.X_WS[best], queries.X_WS[row]
                 )

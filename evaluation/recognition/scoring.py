@@ -1,6 +1,6 @@
 """Checks a method's scores, verifies places by their poses, ranks them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import contextlib
 from typing import Any
 
@@ -79,18 +79,43 @@ def gated(
     Raises:
         InputError: if the method returns something other than poses.
     """
-    num_candidates = int((~np.isnan(scores)).sum())
-    order = ranked_places(scores)
-    best = order[: min(NUM_GATED, num_candidates)]
+    best = tested_places(scores)
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
     found = method.relative_poses(query, database, best.tolist())
     check_number(method, "relative_poses", found, len(best))
     poses = [checked_pose(method, X_PQ) for X_PQ in found]
-    if all(X_PQ is None for X_PQ in poses):
+    return gated_at(scores, dict(zip(best.tolist(), poses, strict=True)), radii)
+
+
+def tested_places(scores: np.ndarray) -> np.ndarray:
+    """Returns the places that geometric verification tests, best first.
+
+    Args:
+        scores: (D,) scores; NaN for a place that is no candidate.
+    """
+    num_candidates = int((~np.isnan(scores)).sum())
+    return ranked_places(scores)[: min(NUM_GATED, num_candidates)]
+
+
+def gated_at(
+    scores: np.ndarray,
+    poses: Mapping[int, np.ndarray | None],
+    radii: Sequence[float],
+) -> list[np.ndarray]:
+    """Returns scores after geometric verification, see `gated`.
+
+    Args:
+        scores: (D,) scores; NaN for a place that is no candidate.
+        poses: place -> the query's pose X_PQ (4, 4) there, or None, for each of
+            `tested_places`.
+        radii: radii of a match [m].
+    """
+    if all(X_PQ is None for X_PQ in poses.values()):
         return [scores for _ in radii]
+    best = np.array(list(poses))
     distance = np.array(
-        [0.0 if X is None else np.linalg.norm(X[:3, 3]) for X in poses]
+        [0.0 if X is None else np.linalg.norm(X[:3, 3]) for X in poses.values()]
     )
     results = []
     for radius in radii:
@@ -140,7 +165,7 @@ def score_places(
 
     def ask(exhaustive: bool) -> np.ndarray:
         found = method.score_in_drive(queries, database, exhaustive=exhaustive)
-        return _checked(method, "score", found, len(is_known))
+        return checked_scores(method, "score", found, len(is_known))
 
     scores = ask(exhaustive or not is_known.all())
     if np.isnan(scores).any() and not method.skips_places:
@@ -175,11 +200,11 @@ def _reranked(
         # Later queries are compared with the same clouds.
         clouds = [read_only(places[place]) for place in best]
         found = method.rerank(read_only(query), clouds, scores[best])
-        result[best] = _checked(method, "rerank", found, len(best))
+        result[best] = checked_scores(method, "rerank", found, len(best))
     return result
 
 
-def _checked(
+def checked_scores(
     method: Method, function: str, scores: object, number: int
 ) -> np.ndarray:
     """Returns scores (number,) as float64; refuses anything else.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 import math
 from typing import NamedTuple, TypeAlias
 
@@ -26,6 +27,7 @@ from evaluation.recognition.retrieval import (
     compare_with_gates,
     matches_within_radius,
 )
+from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
 from evaluation.study.surveys import (
@@ -102,7 +104,6 @@ def shown_overlaps(
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
         ]
-    kept += [scan for scans, _ in beside for scan in scans.read()]
     searched = crowded(
         database,
         (),
@@ -110,24 +111,38 @@ def shown_overlaps(
         [places for _, places in beside],
         keep,
         protocol.place_spacing,
+        divides=True,
     )
     database = searched.described
-    kept = [kept[row] for row in searched.rows]
-    names = [""] * len(kept)
+    names = searched.drives
     allowed = _others(query, names) if leaves_out_itself else True
-    return {
-        radius: best_overlaps(
-            kept,
-            database.places.X_WS,
-            asked,
-            query.queries.X_WS,
-            matches_within_radius(
-                database, query, replace(protocol, radius=radius)
-            )
-            & allowed,
+    matches = {
+        radius: matches_within_radius(
+            database, query, replace(protocol, radius=radius)
         )
+        & allowed
         for radius in radii
     }
+    found = {radius: np.full(len(asked), math.nan) for radius in radii}
+    # The scans of one drive are in memory at a time.
+    first = 0
+    for source in (None, *(scans for scans, _ in beside)):
+        scans_here = kept if source is None else source.read()
+        of = (searched.rows >= first) & (
+            searched.rows < first + len(scans_here)
+        )
+        chosen = [scans_here[k] for k in searched.rows[of] - first]
+        first += len(scans_here)
+        for radius in radii:
+            shown = best_overlaps(
+                chosen,
+                database.places.X_WS[of],
+                asked,
+                query.queries.X_WS,
+                matches[radius][:, of],
+            )
+            found[radius] = np.fmax(found[radius], shown)
+    return found
 
 
 def measure_method(
@@ -176,6 +191,7 @@ def measure_method(
             beside,
             keep,
             protocol.place_spacing,
+            divides=method.divides,
         ),
         asked,
         (protocol, radii),
@@ -256,7 +272,10 @@ def measure_places(
         outcomes += _compare(
             (choice, method),
             crowded(
-                mapped, [parts[k] for parts in distractors], num_distractors
+                mapped,
+                [parts[k] for parts in distractors],
+                num_distractors,
+                divides=method.divides,
             ),
             asked,
             (protocol, radii),
@@ -344,7 +363,7 @@ def _takes_long(
     database: DescribedDrive,
     query: DescribedDrive,
 ) -> bool:
-    one_ms = query_ms(method, database.places, query.queries)
+    one_ms = query_ms(method, database.places, query)
     return one_ms * len(query.queries.frames) > _LONGEST_MS
 
 
@@ -376,6 +395,8 @@ def crowded(
     beside: Sequence[Part] = (),
     keep: str | int = KEEP_ALL,
     cell: float = math.inf,
+    *,
+    divides: bool = False,
 ) -> Searched:
     """Returns a database to which places of other drives are added.
 
@@ -393,22 +414,47 @@ def crowded(
             those of other cities.
         keep: which places in this world are kept, see `kept_places`.
         cell: side of the cells by which places are kept [m].
+        divides: whether descriptors are read while they are searched, if they
+            are too large for the memory; see `Method.divides`.
     """
-    known = [database, *(part.read()[1] for part in beside)]
-    here = joined_scans([one.places for one in known], [0] * len(known))
-    lengths = [len(one.places.frames) for one in known]
-    drive_of = np.repeat(np.arange(len(known)), lengths)
-    rows = np.flatnonzero(kept_places(here.p_WSs, drive_of, keep, cell))
-    names = [known[k].name for k in drive_of[rows]]
-    every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
-    most = len(rows) + num_others
-    for part in distractors:
-        if len(names) >= most:
-            break
-        other = part.read()[1]
-        every.append(other.places)
-        names += [other.name] * len(other.places.frames)
-    places = joined_scans(every, range(len(every)), most)
-    return Searched(
-        replace(database, places=places), names[:most], len(rows), rows
+    parts = [*beside, *distractors]
+    store = StoredDrives(
+        [lambda: database, *(partial(_described_in, one) for one in parts)],
+        [0, *(one.size() for one in parts)],
+        MOST_BYTES if divides else math.inf,
     )
+    num_near = 1 + len(beside)
+    near = [store.undescribed(k) for k in range(num_near)]
+    here = joined_scans(near, [0] * num_near)
+    lengths = [len(one.frames) for one in near]
+    drive_of = np.repeat(np.arange(num_near), lengths)
+    own_row = np.concatenate([np.arange(length) for length in lengths])
+    rows = np.flatnonzero(kept_places(here.p_WSs, drive_of, keep, cell))
+    every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
+    stored = [drive_of[rows]]
+    stored_rows = [own_row[rows]]
+    most = len(rows) + num_others
+    for k in range(num_near, len(parts) + 1):
+        if sum(map(len, stored)) >= most:
+            break
+        every.append(store.undescribed(k))
+        stored_rows.append(np.arange(len(every[-1].frames)))
+        stored.append(np.full(len(stored_rows[-1]), k))
+    places = joined_scans(every, range(len(every)), most)
+    of = np.concatenate(stored)[:most]
+    return Searched(
+        replace(
+            database,
+            places=store.described(
+                places, of, np.concatenate(stored_rows)[:most]
+            ),
+        ),
+        [store.name(k) for k in of.tolist()],
+        len(rows),
+        rows,
+    )
+
+
+def _described_in(part: Part) -> DescribedDrive:
+    """Returns the drive with a method's descriptions in a file."""
+    return part.read()[1]

@@ -378,6 +378,17 @@ class Part:
                 data = zstandard.ZstdDecompressor().decompress(data)
             return decode(data)
 
+    def size(self) -> int:
+        """Returns the size of the value in memory, about [bytes].
+
+        Raises:
+            InputError: if there is no such file, or it is damaged.
+        """
+        with self._opened() as (header, stream):
+            if {"stored", _SPENT} & header.keys():
+                return header["bytes"]
+            return zstandard.frame_content_size(stream.read(18))
+
     def fits(self, hint: object) -> bool:
         """Returns whether the value in the file can be of a given type.
 

@@ -210,11 +210,18 @@ def measure_costs(
         track(methods, "measuring methods", len(methods), "methods")
     ):
         method = choice.make()
-        mapped = database[k].read()[1]
         others = [parts[k] for parts in distractors]
         near = [parts[k] for parts in beside]
-        searched = crowded(mapped, others, num_distractors, near, keep, cell)
-        asked = query[k].read()[1].queries
+        searched = crowded(
+            database[k].read()[1],
+            others,
+            num_distractors,
+            near,
+            keep,
+            cell,
+            divides=method.divides,
+        )
+        asked = query[k].read()[1]
         found[choice.key] = measure_search(
             method, searched.described.places, asked
         )

@@ -101,6 +101,8 @@ class Pair:
             database, from older to newer.
         keep: which places of these drives and of the database drive are kept,
             see `evaluation.recognition.keeping.kept_places`.
+        ages: for an aged city, the years that it has aged by at each drive of
+            the database and at the query; empty if the city does not age.
         leaves_out_itself: whether a drive is compared with itself, and each
             scan with all scans but itself.
         may_repeat: whether the pair can repeat drives of another pair,
@@ -130,6 +132,7 @@ class Pair:
     distractors: int = 0
     beside: tuple[NamedDrive, ...] = ()
     keep: str | int = KEEP_ALL
+    ages: tuple[int, ...] = ()
     leaves_out_itself: bool = False
     may_repeat: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from helpers.small_towns import drive
 import pytest
 
 from evaluation.methods import shipped_methods
-from evaluation.recognition import costs
+from evaluation.recognition import costs, search
 from evaluation.study.collection import find_recordings
 from evaluation.study.parts import StudyFiles
 from evaluation.study.stages_report import StagesReport
@@ -20,7 +20,8 @@ pytestmark = pytest.mark.slow
 def test_costs_in_the_report(tmp_path, monkeypatch):
     # A clock that advances by 1 ms whenever it is read.
     ticks = iter(range(0, 10**12, 10**6))
-    monkeypatch.setattr(costs, "process_time_ns", lambda: next(ticks))
+    for module in (costs, search):
+        monkeypatch.setattr(module, "process_time_ns", lambda: next(ticks))
     for stage, route in (("01", "a"), ("02", "b")):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
     found = find_recordings(tmp_path / "in")

@@ -1,0 +1,208 @@
+"""Searches a database, which may be larger than the memory."""
+
+from collections.abc import Iterator, Sequence
+from time import process_time_ns
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.progress import track
+from evaluation.methods.method import Method, check_number
+from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.pose_errors import checked_pose
+from evaluation.recognition.scoring import checked_scores, score_places
+from evaluation.recognition.stored_places import StoredDescriptors
+
+
+class Search:
+    """A method's search in a database, one group of its places after another.
+
+    If the descriptors are a list, or the method does not divide databases,
+    there is one group. Results are those of one search in the whole database,
+    bit for bit, if the method compares each place by itself (see
+    `Method.divides`).
+
+    Attributes:
+        build_ms: CPU time to build the database of each group so far [ms].
+        query_ms: (Q,) CPU time of each query of the last call of `scores` [ms].
+    """
+
+    def __init__(self, method: Method, places: DescribedScans):
+        self._method = method
+        self._places = places
+        descriptors = places.descriptors
+        self._groups = [slice(0, len(places.frames))]
+        if method.divides and isinstance(descriptors, StoredDescriptors):
+            self._groups = descriptors.groups
+        self._built: tuple[int, Any] | None = None
+        self._build_ms: dict[int, float] = {}
+        self.query_ms = np.zeros(0)
+
+    @property
+    def build_ms(self) -> float:
+        return sum(self._build_ms.values())
+
+    def scores(
+        self,
+        query: DescribedDrive,
+        rows: Sequence[int],
+        is_known: np.ndarray,
+    ) -> np.ndarray:
+        """Returns the scores of some queries, (R, D) float64.
+
+        They are before geometric verification; NaN for a place that is no
+        candidate.
+
+        Args:
+            query: drive with described queries.
+            rows: R queries.
+            is_known: (R, D) bool, which places may be candidates.
+
+        Raises:
+            InputError: the method returns something other than scores.
+        """
+        self.query_ms = np.zeros(len(rows))
+        shares = self._shares(query, rows, is_known)
+        scores = np.empty(is_known.shape)
+        for number, group, database in self._each():
+            for k in self._tracked(query, rows):
+                start = process_time_ns()
+                scores[k, group] = self._score(
+                    query,
+                    rows[k],
+                    database,
+                    is_known[k],
+                    group,
+                    None if shares is None else int(shares[k, number]),
+                )
+                self.query_ms[k] += (process_time_ns() - start) * 1e-6
+        return scores
+
+    def poses(
+        self, query: DescribedDrive, wanted: Sequence[np.ndarray]
+    ) -> list[dict[int, np.ndarray | None]]:
+        """Returns the poses of queries at places.
+
+        Args:
+            query: drive with Q described queries.
+            wanted: Q arrays with the places at which to estimate the pose of
+                each query.
+
+        Returns:
+            For each query, place -> X_PQ (4, 4), or None if the method
+            estimates no pose.
+
+        Raises:
+            InputError: the method returns something other than poses.
+        """
+        method = self._method
+        found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
+        for _, group, database in self._each():
+            for row, places in enumerate(wanted):
+                here = places[(group.start <= places) & (places < group.stop)]
+                if len(here) == 0:
+                    continue
+                poses = method.relative_poses(
+                    query.queries.descriptors[row],
+                    database,
+                    (here - group.start).tolist(),
+                )
+                check_number(method, "relative_poses", poses, len(here))
+                for place, X_PQ in zip(here.tolist(), poses, strict=True):
+                    found[row][place] = checked_pose(method, X_PQ)
+        return found
+
+    def _shares(
+        self,
+        query: DescribedDrive,
+        rows: Sequence[int],
+        is_known: np.ndarray,
+    ) -> np.ndarray | None:
+        """Returns how many entries of each group a search chooses, (R, G).
+
+        The result is None if there is one group, or the method compares each
+        place.
+        """
+        method = self._method
+        most = method.num_shortlisted
+        if len(self._groups) == 1 or most is None:
+            return None
+        lists: list[list[np.ndarray]] = [
+            [np.empty(0)] * len(self._groups) for _ in rows
+        ]
+        for number, _, database in self._each():
+            for k in self._tracked(query, rows):
+                if not is_known[k].all():
+                    continue
+                start = process_time_ns()
+                lists[k][number] = method.shortlist(
+                    query.queries.descriptors[rows[k]], database
+                )
+                self.query_ms[k] += (process_time_ns() - start) * 1e-6
+        shares = np.zeros((len(rows), len(self._groups)), np.int64)
+        for k, some in enumerate(lists):
+            of = np.repeat(np.arange(len(some)), [len(one) for one in some])
+            # Of equal entries, those of the first group come first.
+            best = np.argsort(-np.concatenate(some), kind="stable")[:most]
+            shares[k] = np.bincount(of[best], minlength=len(some))
+        return shares
+
+    def _score(
+        self,
+        query: DescribedDrive,
+        row: int,
+        database: Any,
+        is_known: np.ndarray,
+        group: slice,
+        share: int | None,
+    ) -> np.ndarray:
+        """Returns the scores of a query in a group; see `_shares`."""
+        queries = query.queries
+        method = self._method
+        is_whole = bool(is_known.all())
+        if share is not None and is_whole:
+            found = method.score_best(queries.descriptors[row], database, share)
+            number = group.stop - group.start
+            return checked_scores(method, "score_best", found, number)
+        return score_places(
+            method,
+            queries.descriptors[: row + 1],
+            queries.clouds[row] if queries.clouds else None,
+            database,
+            self._places.clouds,
+            is_known[group],
+            exhaustive=not is_whole,
+            where=f"{query.name}: query at frame {queries.frames[row]}",
+        )
+
+    def _each(self) -> Iterator[tuple[int, slice, Any]]:
+        """Yields the number, the places and the database of each group.
+
+        The group that is in memory comes first.
+        """
+        numbers = range(len(self._groups))
+        if self._built is not None and self._built[0] == numbers[-1]:
+            numbers = numbers[::-1]
+        for number in numbers:
+            group = self._groups[number]
+            if self._built is None or self._built[0] != number:
+                self._built = None
+                descriptors = self._places.descriptors[group]
+                start = process_time_ns()
+                database = self._method.build_database(descriptors)
+                passed_ms = (process_time_ns() - start) * 1e-6
+                self._build_ms[number] = passed_ms
+                self._built = number, database
+            yield number, group, self._built[1]
+
+    def _tracked(
+        self, query: DescribedDrive, rows: Sequence[int]
+    ) -> Iterator[int]:
+        return iter(
+            track(
+                range(len(rows)),
+                f"querying {query.name}",
+                len(rows),
+                "queries",
+            )
+        )

@@ -1,0 +1,125 @@
+"""Places whose descriptors are read from files, some drives at a time."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evaluation.recognition.description import DescribedDrive, DescribedScans
+
+# Greatest size of the descriptors that are in memory at a time, unless those of
+# a single drive are larger [bytes].
+MOST_BYTES = 400_000_000
+
+
+class StoredDrives:
+    """Described drives that are read again whenever they are needed.
+
+    Successive drives form a group. Only the drives of one group are in memory,
+    so reading drive by drive, in order, reads each only once.
+
+    Attributes:
+        group_of: (N,) non-decreasing, the group of each drive.
+    """
+
+    def __init__(
+        self,
+        readers: Sequence[Callable[[], DescribedDrive]],
+        sizes: Sequence[float],
+        most_bytes: float,
+    ):
+        """Divides drives into groups.
+
+        Args:
+            readers: a function for each of N drives, which reads it.
+            sizes: (N,) size of each drive in memory [bytes].
+            most_bytes: greatest size of a group of several drives.
+        """
+        self._readers = readers
+        self._held: dict[int, DescribedDrive] = {}
+        self._names: dict[int, str] = {}
+        groups: list[int] = []
+        group, held = 0, 0.0
+        for size in sizes:
+            if held > 0.0 and held + size > most_bytes:
+                group, held = group + 1, 0.0
+            held += size
+            groups.append(group)
+        self.group_of = np.array(groups, np.int64)
+
+    def drive(self, number: int) -> DescribedDrive:
+        """Returns a drive; drives of other groups leave the memory."""
+        group = self.group_of[number]
+        if any(self.group_of[one] != group for one in self._held):
+            self._held = {}
+        if number not in self._held:
+            self._held[number] = self._readers[number]()
+            self._names[number] = self._held[number].name
+        return self._held[number]
+
+    def name(self, number: int) -> str:
+        """Returns the name of a drive that has been read."""
+        return self._names[number]
+
+    def described(
+        self, places: DescribedScans, drive_of: np.ndarray, rows: np.ndarray
+    ) -> DescribedScans:
+        """Returns places with their descriptors, and clouds if there are some.
+
+        Args:
+            places: D places of these drives without descriptors.
+            drive_of: (D,) number of the drive of each place, non-decreasing.
+            rows: (D,) number of each place among those of its drive.
+        """
+        stored = StoredDescriptors(self, drive_of, rows)
+        if len(stored.groups) > 1:
+            return replace(places, descriptors=stored)
+        clouds = []
+        for k, row in zip(drive_of.tolist(), rows.tolist(), strict=True):
+            if known := self.drive(k).places.clouds:
+                clouds.append(known[row])
+        return replace(places, descriptors=stored[:], clouds=clouds)
+
+    def undescribed(self, number: int) -> DescribedScans:
+        """Returns the places of a drive, without descriptors and clouds."""
+        return replace(self.drive(number).places, descriptors=[], clouds=[])
+
+
+class StoredDescriptors(Sequence[Any]):
+    """The descriptors of D places of stored drives, as a sequence.
+
+    Read it in order: a place of another group takes the place of the group in
+    memory.
+    """
+
+    def __init__(
+        self, drives: StoredDrives, drive_of: np.ndarray, rows: np.ndarray
+    ):
+        """Chooses places.
+
+        Args:
+            drives: the drives.
+            drive_of: (D,) number of the drive of each place, non-decreasing.
+            rows: (D,) number of each place among those of its drive.
+        """
+        self._drives = drives
+        self._drive_of = drive_of
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        drive = self._drives.drive(int(self._drive_of[index]))
+        return drive.places.descriptors[self._rows[index]]
+
+    @property
+    def groups(self) -> list[slice]:
+        """The places of each group that is in memory at a time."""
+        group = self._drives.group_of[self._drive_of]
+        starts = np.flatnonzero(np.diff(group, prepend=-1)).tolist()
+        ends = [*starts[1:], len(self)]
+        return [slice(*both) for both in zip(starts, ends, strict=True)]
