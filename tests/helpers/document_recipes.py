@@ -1032,6 +1032,8 @@ NOT_RUN = {
     "shipped drive, for minutes; test_real has recordings",
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",
+    ".venv/bin/cns-drake study docs/examples/nclt_prediction": "likewise, and "
+    "needs an extra",
     ".venv/bin/cns-drake study docs/examples/anchor": "likewise, for minutes",
     ".venv/bin/cns-drake study docs/examples/what_changes": "makes four cities "
     "and drives through them, for half an hour",
