@@ -125,6 +125,7 @@ print(thrice(2), thrice.stats.cache_misses.total())
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_equal_sources_share_the_code_wherever_they_lie(tmp_path):
     """Age and place of the source do not count; content of a sibling does."""
 

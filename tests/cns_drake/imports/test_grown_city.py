@@ -83,6 +83,7 @@ def test_the_lot_is_that_of_the_seed(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_a_city_without_years_has_two_stages_and_two_drives(tmp_path):
     source = write_blocks(tmp_path / "blocks.json", years=False)
     result = run("import", source, "--output", tmp_path / "town")

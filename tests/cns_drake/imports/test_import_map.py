@@ -161,6 +161,7 @@ def test_the_same_file_gives_the_same_map(blocks, tmp_path):
             assert twin.read_bytes() == path.read_bytes(), path
 
 
+@pytest.mark.night
 def test_the_command_from_end_to_end(tmp_path):
     source = write_blocks(tmp_path / "blocks.json")
     output = tmp_path / "town"

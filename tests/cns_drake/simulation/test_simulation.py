@@ -177,6 +177,8 @@ def test_unwritable_page_is_found_before_the_drive(scenario, tmp_path):
     assert not (tmp_path / "metropolis_04").exists()
 
 
+@pytest.mark.slow
+@pytest.mark.night
 def test_jobs_record_side_by_side_and_skip_finished_ones(small_map, tmp_path):
     scenarios = [
         make_scenario(

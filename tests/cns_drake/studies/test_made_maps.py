@@ -143,6 +143,7 @@ def test_versions_that_cannot_be(town, tmp_path, version):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_an_older_city_is_made_once_and_anew_when_its_inputs_change(
     town, tmp_path, monkeypatch
 ):

@@ -123,14 +123,14 @@ def test_an_ornstein_uhlenbeck_process_is_measured_as_it_is():
     length = 50.0
     step = 0.5
     decay = math.exp(-step / length)
-    noise = rng.normal(size=200_000) * spread * math.sqrt(1 - decay**2)
+    noise = rng.normal(size=100_000) * spread * math.sqrt(1 - decay**2)
     values = np.empty(len(noise))
     values[0] = rng.normal() * spread
     for k in range(1, len(noise)):
         values[k] = decay * values[k - 1] + noise[k]
     found = compare_drives(
-        straight("a", lambda s: 0.0, length=100_000.0),
-        straight("b", lambda s: values, length=100_000.0),
+        straight("a", lambda s: 0.0, length=50_000.0),
+        straight("b", lambda s: values, length=50_000.0),
     )
     assert found.wander == pytest.approx(spread, rel=0.06)
     assert found.wander_length == pytest.approx(length, rel=0.15)
