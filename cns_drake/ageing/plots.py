@@ -439,7 +439,7 @@ def balconies_on(
 def renewed(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
-    """Returns a building with renovated walls: they get another colour.
+    """Returns a building with renovated walls: plaster of another colour.
 
     A building without coloured walls stays the same.
 
@@ -459,7 +459,10 @@ def renewed(
         mesh = model.meshes.get(getattr(part.shape, "mesh", ""))
         sizes[part.rgb] += 12 if mesh is None else mesh.num_triangles
     old, new = max(sizes, key=lambda rgb: sizes[rgb]), _colour(rng)
-    parts = [replace(p, rgb=new) if p.rgb == old else p for p in model.parts]
+    parts = [
+        replace(p, rgb=new, material=None) if p.rgb == old else p
+        for p in model.parts
+    ]
     if moves:
         x0, y0, x1, y1 = model.footprint.bounds
         share = 1.0 + 4.0 * _INSULATION / (x1 - x0 + y1 - y0)

@@ -25,10 +25,11 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.json_text import parse_json
+from cns_drake.city.geometry import Finish
 from cns_drake.imports import foreign_city
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.faces import face_triangles, joined
-from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
+from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.options import ImportFaults
 
 # Direction of an axis -> its row among east, north and up, and its sign.
@@ -207,11 +208,10 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
-# Beginnings of types that are water.
-_WATERS = ("Waterway", "WaterBody")
-# Beginning of a type -> its class, and a colour if that of the class would
+_WATER = Finish(foreign_city.WATER, "water")
+# Beginning of a type -> its class, and a finish if that of the class would
 # mislead.
-_CLASSES: dict[str, tuple[str, Rgb | None]] = {
+_CLASSES: dict[str, tuple[str, Finish | None]] = {
     "Building": ("building", None),
     "Bridge": ("other-structure", None),
     "Tunnel": ("other-structure", None),
@@ -221,10 +221,10 @@ _CLASSES: dict[str, tuple[str, Rgb | None]] = {
     "TransportSquare": ("road", None),
     "Square": ("road", None),
     "Track": ("road", None),
-    "Waterway": ("other-ground", foreign_city.WATER),
-    "WaterBody": ("other-ground", foreign_city.WATER),
+    "Waterway": ("other-ground", _WATER),
+    "WaterBody": ("other-ground", _WATER),
     "LandUse": ("other-ground", None),
-    "PlantCover": ("terrain", foreign_city.LAWN),
+    "PlantCover": ("terrain", Finish(foreign_city.LAWN)),
     "SolitaryVegetationObject": ("vegetation", None),
     "TINRelief": ("terrain", None),
     "CityFurniture": ("other-object", None),
@@ -787,7 +787,7 @@ def import_structures(
             city.faults.add(f"{kind}, left out", root)
             continue
         name = names[root]
-        semantic_class, rgb = _class_of(first.kind)
+        semantic_class, finish = _class_of(first.kind)
         years = [
             construction_year(one.attributes, year_attribute, name, city.faults)
             for one in members
@@ -798,9 +798,8 @@ def import_structures(
                 semantic_class,
                 first.kind,
                 surfaces,
-                {"body": rgb, "roof": foreign_city.RED_ROOF},
+                {"body": finish, "roof": foreign_city.RED_ROOF},
                 next((year for year in years if year is not None), None),
-                material="water" if first.kind.startswith(_WATERS) else None,
                 tags={
                     key: str(value)
                     for one in reversed(members)
@@ -950,7 +949,7 @@ def _volume(faces: list[np.ndarray]) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-def _class_of(kind: str) -> tuple[str, Rgb | None]:
+def _class_of(kind: str) -> tuple[str, Finish | None]:
     for beginning, look in _CLASSES.items():
         if kind.startswith(beginning):
             return look

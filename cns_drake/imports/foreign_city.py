@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from cns_drake.city.geometry import (
+    Finish,
     Mesh,
     MeshShape,
     Model,
@@ -22,7 +23,8 @@ from cns_drake.imports.options import ImportFaults
 Rgb = tuple[float, float, float]
 # Sharpest turn from one street into another that drives take.
 SHARPEST_TURN_DEG = 125.0
-RED_ROOF: Rgb = (0.55, 0.30, 0.24)
+# A roof of clay tiles.
+RED_ROOF = Finish((0.55, 0.30, 0.24), "brick")
 _GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
 WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
@@ -228,12 +230,11 @@ def make_imported(
     semantic_class: str,
     kind: str,
     surfaces: Mapping[str, np.ndarray],
-    colours: Mapping[str, Rgb | None],
+    finishes: Mapping[str, Finish | None],
     year: int | None = None,
     until: int | None = None,
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
-    material: str | None = None,
 ) -> Imported:
     """Returns a structure made of triangles in the world.
 
@@ -243,26 +244,22 @@ def make_imported(
         kind: type of the object in its file.
         surfaces: part of the surface -> triangles (M, 3, 3) [m]. Empty parts
             are left out; at least one part must not be empty.
-        colours: part of the surface -> colour. Parts without an entry have the
-            colour of the class.
+        finishes: part of the surface -> its colour and material. Parts without
+            an entry have those of the class.
         year: year in which the structure was built; None if unknown.
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object; 0 if unknown.
-        material: name of the material; by default the usual one of the class.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
+    parts = []
+    for part in filled:
+        rgb, material = finishes.get(part) or (None, None)
+        shape = MeshShape(f"{name}_{part}")
+        parts.append(Part(part, shape, rgb=rgb, material=material))
     model = Model(
-        tuple(
-            Part(
-                part,
-                MeshShape(f"{name}_{part}"),
-                rgb=colours.get(part),
-                material=material,
-            )
-            for part in filled
-        ),
+        tuple(parts),
         {f"{name}_{part}": to_mesh(some) for part, some in filled.items()},
         hull_of(triangles.reshape(-1, 3)[:, :2]),
     )

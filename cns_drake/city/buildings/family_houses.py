@@ -265,11 +265,11 @@ def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
     details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
     if full and p.floor > 0.3:
         y = reach - 0.15
-        rgb = p.colours["trim"]
+        trim = p.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (a, b) in enumerate(runs):
             part = f"railing_{k}"
-            details.add_railing(p, part, wall, (a, y), (b, y), p.floor, rgb)
+            details.add_railing(p, part, wall, (a, y), (b, y), p.floor, trim)
 
 
 def _add_wing(p: DetachedHouse, wing: Wing) -> None:

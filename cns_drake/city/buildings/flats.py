@@ -79,7 +79,7 @@ class CourtBlock(Building):
         self.add(
             "mansard",
             *_mansard(self, plan, top, self.rng),
-            rgb=self.colours["roof"],
+            finish=self.colours["roof"],
         )
 
 
@@ -277,7 +277,7 @@ def _add_walk_up_ground(
     room = _FRONT_M - p.bay_reach * (not stairs) - 0.05
     for edge in doors:
         pieces += _steps(p, details.WallFrame(plan, edge), room)
-    p.add("steps", *pieces, rgb=p.colours["base"])
+    p.add("steps", *pieces, finish=p.colours["base"])
     return tiers.add_ground(
         p, plan, Facade(h, bands, layout, (p.recess,), blind)
     )
@@ -323,7 +323,7 @@ def _add_top(
         return
     eaves = (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45, 0.45)
     solid = roofs.hip(body, z0 - 0.02, p.height, eaves, 0.3)
-    p.add("roof", solid, rgb=p.colours["roof"])
+    p.add("roof", solid, finish=p.colours["roof"])
     (ax, ay), (bx, by) = body[0], body[2]
     for k, share in enumerate((0.35, 0.65)):
         x, y = ax + share * (bx - ax), ay + 0.5 * (by - ay)
@@ -460,10 +460,10 @@ def _add_verandas(
         lid = (a - 0.1, b + 0.1, -0.05, reach + 0.1, top - 0.25, top)
         frame.append(wall.box(*lid))
     part = f"house_{number}"
-    rgb = p.colours["trim"]
+    trim = p.colours["trim"]
     mesh = merge_meshes(*pieces)
     shape = MeshShape(p.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):
         at = (0.0, 0.0, _FLOOR + k * storey)
-        p.place(f"{part}_verandas_{k}", shape, at, rgb=rgb)
-    p.add(f"{part}_posts", *frame, rgb=rgb)
+        p.place(f"{part}_verandas_{k}", shape, at, finish=trim)
+    p.add(f"{part}_posts", *frame, finish=trim)

@@ -372,7 +372,7 @@ class WaterfrontHall(Building):
         ]  # fmt: skip
         self.add("walls", *pieces)
         self.add_glass("glass", walls.glass_mesh(plan, facade))
-        self.add("roof", _roof(self, plan), rgb=self.colours["roof"])
+        self.add("roof", _roof(self, plan), finish=self.colours["roof"])
 
 
 def _walls(p: WaterfrontHall) -> walls.Facade:

@@ -28,7 +28,13 @@ from pydantic import BaseModel
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.dice import Rgb
 from cns_drake.city.facades.assembly import Building
-from cns_drake.city.geometry import Mesh, MeshShape, read_mesh, triple
+from cns_drake.city.geometry import (
+    Finish,
+    Mesh,
+    MeshShape,
+    read_mesh,
+    triple,
+)
 
 _MODELS = Path(__file__).parent / "landmark_models"
 _Triple = tuple[float, float, float]
@@ -97,7 +103,8 @@ class Landmark(Building):
                 scale = triple(np.round(along * part.scale, 4))
                 shape = self.shared(part.mesh, scale)
             xyz = middle + stretch * part.xyz
-            self.place(part.name, shape, xyz, part.yaw, part.rgb, part.material)
+            finish = Finish(part.rgb, part.material)
+            self.place(part.name, shape, xyz, part.yaw, finish)
 
 
 @cache

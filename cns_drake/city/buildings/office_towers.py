@@ -19,7 +19,7 @@ from cns_drake.city.facades import (
     massing,
     tiers,
 )
-from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
+from cns_drake.city.geometry import Finish, Mesh, MeshShape, merge_meshes
 
 
 class BandedTower(Building):
@@ -171,7 +171,7 @@ def _stack(
     def place(z0: float, number: int) -> float:
         at = (0.0, 0.0, z0)
         part = f"stack_{number}"
-        p.place(f"{part}_glass", glass, at, rgb=p.glass_rgb, material="glass")
+        p.place(f"{part}_glass", glass, at, finish=p.glass)
         p.place(f"{part}_soffit", soffit, at)
         for k in range(groups):
             z = z0 + k * step
@@ -300,8 +300,8 @@ def _add_plant_floor(p: GridTower, plan: np.ndarray, z0: float) -> float:
     return top
 
 
-_STEEL = (0.52, 0.53, 0.55)
-_TIMBER = (0.72, 0.58, 0.38)
+_STEEL = Finish((0.52, 0.53, 0.55))
+_TIMBER = Finish((0.72, 0.58, 0.38))
 _SLAB_M = 0.28
 # Room for scaffolds around the frame [m].
 _SCAFFOLD_M = 1.7
@@ -420,7 +420,7 @@ def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
         massing.skirt(form, form, high - 2.6, high),
         massing.flat(form, high - 2.6, up=False),
         massing.roof_pan(form, high - 0.6, high, 0.3),
-        rgb=_TIMBER,
+        finish=_TIMBER,
     )
 
 
@@ -437,13 +437,13 @@ def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
     walls = [facade_mesh(outer, facade), backs, rim]
     panes = [glass_mesh(outer, facade)]
     groups, step = p.clad // p.group, p.group * p.storey
-    for part, pieces, rgb, material in (
-        ("cladding", walls, p.colours["clad"], None),
-        ("cladding_glass", panes, p.glass_rgb, "glass"),
+    for part, pieces, finish in (
+        ("cladding", walls, p.colours["clad"]),
+        ("cladding_glass", panes, p.glass),
     ):
         mesh = _repeated(pieces, p.group, p.storey)
-        p.stack(part, mesh, 0.0, step, groups, rgb, material)
-    p.add("foot", massing.foundation(outer), rgb=p.colours["clad"])
+        p.stack(part, mesh, 0.0, step, groups, finish)
+    p.add("foot", massing.foundation(outer), finish=p.colours["clad"])
 
 
 def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
@@ -456,7 +456,7 @@ def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
         for y in (y0 + 1.2, y1 - 1.2):
             shaft = massing.regular_polygon(0.06, 4, (x, y))
             props.append(massing.skirt(shaft, shaft, low - 0.02, high))
-    p.add("props", *props, rgb=_STEEL)
+    p.add("props", *props, finish=_STEEL)
 
 
 def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
@@ -488,9 +488,9 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
                 nets.append(wall.box(*spot, low, high))
     stack = _repeated(levels, per_group, _LIFT_M)
-    p.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL)
-    p.add("standards", *standards, rgb=_STEEL)
-    p.add("nets", *nets, rgb=p.colours["net"])
+    p.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, finish=_STEEL)
+    p.add("standards", *standards, finish=_STEEL)
+    p.add("nets", *nets, finish=p.colours["net"])
 
 
 def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
@@ -507,7 +507,7 @@ def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
         pieces.append(wall.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
     z = round(0.55 * top, 1)
     cage = wall.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
-    p.add("hoist", *pieces, cage, rgb=(0.80, 0.62, 0.16))
+    p.add("hoist", *pieces, cage, finish=Finish((0.80, 0.62, 0.16)))
 
 
 def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:

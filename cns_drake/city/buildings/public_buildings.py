@@ -98,7 +98,7 @@ def _add_classes(p: School, bar: np.ndarray) -> float:
     top = tiers.add_storeys(p, bar, walls, 0.0, p.storeys, 1)
     if p.roof == "hip":
         roof = roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
-        p.add("hip", roof, rgb=p.colours["roof"])
+        p.add("hip", roof, finish=p.colours["roof"])
         return top
     rim = 0.7
     crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))

@@ -206,7 +206,7 @@ class BalconyFlats(Building):
         stairs = []
         for k, wall in enumerate(walls):
             stairs += _stair(self, wall, high, k == 0)
-        self.add("stairs", *stairs, rgb=self.colours["rail"])
+        self.add("stairs", *stairs, finish=self.colours["rail"])
 
 
 def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
@@ -279,7 +279,7 @@ def _add_balconies(
     if pieces:
         mesh = merge_meshes(*pieces)
         step = per_group * storey
-        p.stack("balconies", mesh, z0, step, groups, rgb=p.colours["rail"])
+        p.stack("balconies", mesh, z0, step, groups, finish=p.colours["rail"])
 
 
 def _stair(
@@ -480,7 +480,7 @@ def _add_galleries(
                 u = p.uniform(a + 0.2, b - 1.8)
                 spot = (round(u, 2), round(u + 1.5, 2), reach, reach + 0.06)
                 screens.append(wall.box(*spot, z + 0.1, z + storey - 0.15))
-    p.add("screens", *screens, rgb=p.colours["panel"])
+    p.add("screens", *screens, finish=p.colours["panel"])
 
 
 def _add_gallery_flats_stair(p: GalleryFlats, shaft: np.ndarray) -> None:
@@ -488,4 +488,4 @@ def _add_gallery_flats_stair(p: GalleryFlats, shaft: np.ndarray) -> None:
     entry = bays.window(1.6, 0.0, p.height - 1.0, 0.25)
     walls = tiers.shaft_walls(p.height, entry, slit, 2.4, (0.4, 0.08))
     body = tiers.block(shaft, walls, 0.0)
-    p.add("stair", massing.foundation(shaft), body, rgb=p.colours["panel"])
+    p.add("stair", massing.foundation(shaft), body, finish=p.colours["panel"])

@@ -15,10 +15,13 @@ from cns_drake.city.facades import (
     massing,
     tiers,
 )
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import Mesh
 
 # Taller houses have their fire stairs inside.
 _MOST_FLIGHTS = 8
+# Of fire stairs.
+_IRON = Finish((0.2, 0.2, 0.22))
 
 
 class BrickBlock(Building):
@@ -134,7 +137,7 @@ def _add_fire_stairs(
     for k in range(round((top - bottom) / storey) - 1):
         spot = (x, y, bottom + k * storey)
         part = f"fire_stairs_{k}"
-        p.place(part, shape, spot, wall.heading, rgb=(0.2, 0.2, 0.22))
+        p.place(part, shape, spot, wall.heading, finish=_IRON)
 
 
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
@@ -196,7 +199,7 @@ class CornerBuilding(Building):
             self.add("pilasters", strips)
         eaves = Facade(2.2, tiers.cornice(1.4, self.cornice_reach), plain=blind)
         roof = tiers.add_crown(self, plan, eaves, top, 0.8)
-        self.add("dome", *_dome(self, plan, roof), rgb=self.colours["roof"])
+        self.add("dome", *_dome(self, plan, roof), finish=self.colours["roof"])
         x0, y0, x1, y1 = site.bounds
         if y1 - y0 - 2 * self.radius > 5.0:
             free = massing.rectangle(x0, y0 + 2 * self.radius, x1, y1)
@@ -462,7 +465,7 @@ class CornerStore(Building):
             top = tiers.add_storeys(self, plan, walls, top, groups, per_group)
         _add_parapet(self, plan, front, top, blind)
         wall = details.WallFrame(plan, front)
-        self.add("sign", *_corner_sign(self, wall), rgb=self.colours["sign"])
+        self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
 
 
 def _plan(p: CornerStore, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
@@ -505,7 +508,7 @@ def _add_shop(
         shape = (0.2, 0.95, 2.4, head + 0.05)
         shades += details.awnings(wall, cells, p.rng, p.awnings, shape)
     tiers.add_awnings(p, shades)
-    p.add("boards", *boards, rgb=p.colours["sign"])
+    p.add("boards", *boards, finish=p.colours["sign"])
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.3,), blind))
 
 

@@ -13,6 +13,7 @@ from cns_drake.city.facades import (
     massing,
     tiers,
 )
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 
@@ -129,8 +130,8 @@ class GlassSkyscraper(Building):
         ]
         walls, glass = (self.kind.choices[part] for part in ("walls", "glass"))
         tint = self.whole(0, len(walls))
-        self.rgb = walls[tint]
-        self.glass_rgb = glass[tint]
+        self.walls = walls[tint]
+        self.glass = glass[tint]
         wanted = self.pick(("plain", "chamfered", "notched", "rounded"))
         self.corners = wanted if edges == 4 else "plain"
         self.lobby_height = self.uniform(6.0, 9.0, 2)
@@ -343,7 +344,7 @@ def _add_sign(p: Hotel, plan: np.ndarray) -> None:
         front.box(x - 0.08, x + 0.08, 0.0, 0.4, z, z + 0.15)
         for z in (low + 0.5, high - 0.7)
     )
-    p.add("sign", blade, *arms, rgb=(0.55, 0.16, 0.14))
+    p.add("sign", blade, *arms, finish=Finish((0.55, 0.16, 0.14)))
 
 
 _PODIUM_TOWER_ROOF_ITEMS = (
@@ -364,8 +365,8 @@ class PodiumTower(Building):
             self.kind.choices[part] for part in ("podium", "tower")
         )
         cladding = self.whole(0, len(podium))
-        self.rgb = podium[cladding]
-        self.tower_rgb = tower[cladding]
+        self.walls = podium[cladding]
+        self.tower_walls = tower[cladding]
         # Share of the podium that the tower covers along x and y.
         self.tower = self.rng.uniform(0.5, 0.68, 2).tolist()
         run = 2 * (self.tower[0] * site.width + self.tower[1] * site.depth)
@@ -405,7 +406,7 @@ class PodiumTower(Building):
         _add_garden(self, plan, roof)
         if self.chamfer:
             plan = massing.chamfered(plan, self.chamfer)
-        self.rgb = self.tower_rgb
+        self.walls = self.tower_walls
         _add_tower(self, plan, roof)
 
 
@@ -478,7 +479,7 @@ def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
         garden = _garden(b - a, d - c).moved((a, c, z))
     else:
         garden = _garden(d - c, b - a).moved((b, c, z), math.pi / 2)
-    p.add("garden", garden, rgb=(0.45, 0.40, 0.33))
+    p.add("garden", garden, finish=Finish((0.45, 0.40, 0.33)))
 
 
 def _garden(length: float, width: float) -> Mesh:

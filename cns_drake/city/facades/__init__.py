@@ -1,6 +1,5 @@
 """Parts of facades: walls, windows, doors, balconies and roofs."""
 
-from cns_drake.city.dice import Rgb
 from cns_drake.city.facades.assembly import Assembly, Building, Site
 from cns_drake.city.facades.details import add_railing
 from cns_drake.city.facades.roofs import add_chimney, equip_roof
@@ -26,7 +25,6 @@ __all__ = [
     "Openings",
     "Patch",
     "Relief",
-    "Rgb",
     "Roof",
     "Site",
     "Wing",

@@ -5,16 +5,18 @@ from __future__ import annotations
 import abc
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel
+from pydantic import BaseModel, BeforeValidator
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.dice import Dice, Rgb
+from cns_drake.city.dice import Dice
 from cns_drake.city.facades import massing
 from cns_drake.city.geometry import (
+    Finish,
     Mesh,
     MeshShape,
     Model,
@@ -150,6 +152,9 @@ class Site:
         return (*outline[0].tolist(), *outline[2].tolist())
 
 
+GivenFinish = Annotated[Finish, BeforeValidator(Finish.given)]
+
+
 class Archetype(BaseModel, frozen=True, extra="forbid"):
     """A kind of building: one entry of `buildings/archetypes.yaml`.
 
@@ -179,11 +184,12 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
     overhang: float = 1.5
     any_outline: bool = False
     party_walls: bool = False
-    colours: dict[str, tuple[Rgb, ...] | str] = {}
-    choices: dict[str, tuple[Rgb, ...]] = {}
+    colours: dict[str, tuple[GivenFinish, ...] | str] = {}
+    choices: dict[str, tuple[GivenFinish, ...]] = {}
     materials: tuple[str, ...] = ()
 
 
+_GLASS = Finish((0.20, 0.26, 0.31), "glass")
 # Plinths and pilasters may stand this far outside the footprint [m].
 GROUND_OVERHANG_M = 0.35
 # Above this height, the archetype's own overhang applies [m].
@@ -197,16 +203,16 @@ class Assembly(Dice):
     `add` makes one part from the given meshes. `add_to` collects meshes by
     material, and `paint` sets the materials' colours: each material becomes one
     part, so that a building of many small pieces has few visuals. Parts without
-    a colour of their own have the colour `rgb`.
+    a finish of their own have that of the `walls`.
     """
 
     site: Site
     rng: np.random.Generator
-    rgb: Rgb | None = None
-    glass_rgb: Rgb = (0.20, 0.26, 0.31)
+    walls: Finish | None = None
+    glass: Finish = _GLASS
     parts: list[Part] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)
-    _colours: dict[str, Rgb] = field(default_factory=dict)
+    _colours: dict[str, Finish] = field(default_factory=dict)
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
@@ -221,8 +227,7 @@ class Assembly(Dice):
         part: str,
         *meshes: Mesh,
         z: float = 0.0,
-        rgb: Rgb | None = None,
-        material: str | None = None,
+        finish: Finish | None = None,
     ) -> None:
         """Merges meshes into one part, raised by `z` [m], and adds it.
 
@@ -232,13 +237,13 @@ class Assembly(Dice):
         mesh = merge_meshes(*meshes)
         if mesh.faces:
             shape = MeshShape(self.define(part, mesh))
-            self.place(part, shape, (0.0, 0.0, z), rgb=rgb, material=material)
+            self.place(part, shape, (0.0, 0.0, z), finish=finish)
 
     def add_glass(self, part: str, *meshes: Mesh, z: float = 0.0) -> None:
         """Merges panes into one part, raised by `z` [m], and adds it."""
-        self.add(part, *meshes, z=z, rgb=self.glass_rgb, material="glass")
+        self.add(part, *meshes, z=z, finish=self.glass)
 
-    def paint(self, **colours: Rgb) -> None:
+    def paint(self, **colours: Finish) -> None:
         """Declares the building's materials: name=colour, as keywords.
 
         Call it before `add_to`, which adds meshes to the part of a declared
@@ -274,9 +279,7 @@ class Assembly(Dice):
         `footprint` is the ground of the building in its frame S [m].
         """
         for material, pieces in self._pieces.items():
-            rgb = self._colours[material]
-            known = "glass" if material == "glass" else None
-            self.add(material, *pieces, rgb=rgb, material=known)
+            self.add(material, *pieces, finish=self._colours[material])
         return Model(tuple(self.parts), self.meshes, footprint)
 
     def define(self, key: str, mesh: Mesh) -> str:
@@ -300,8 +303,7 @@ class Assembly(Dice):
         z0: float,
         step: float,
         count: int,
-        rgb: Rgb | None = None,
-        material: str | None = None,
+        finish: Finish | None = None,
     ) -> None:
         """Adds a mesh, and places several copies of it above one another.
 
@@ -312,15 +314,14 @@ class Assembly(Dice):
             z0: height of the lowest copy [m].
             step: vertical distance from one copy to the next [m].
             count: number of copies.
-            rgb: colour; by default the building's.
-            material: name of the material; by default that of walls.
+            finish: colour and material; by default those of the walls.
         """
         shape = MeshShape(self.define(part, mesh))
         for k in range(count):
             z = z0 + k * step
             name = f"{part}_{k:02d}"
             at = (0.0, 0.0, z)
-            self.place(name, shape, at, rgb=rgb, material=material)
+            self.place(name, shape, at, finish=finish)
 
     def shared(
         self, mesh: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -339,8 +340,7 @@ class Assembly(Dice):
         shape: Shape,
         xyz: Iterable[float],
         yaw: float = 0.0,
-        rgb: Rgb | None = None,
-        material: str | None = None,
+        finish: Finish | None = None,
     ) -> None:
         """Adds one part to the building: a shape at a place.
 
@@ -349,12 +349,11 @@ class Assembly(Dice):
             shape: the shape.
             xyz: position of the shape in the building's frame [m].
             yaw: heading of the shape [rad].
-            rgb: colour; by default the building's.
-            material: name of the material; by default that of walls.
+            finish: colour and material; by default those of the walls.
         """
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))
-        rgb = rgb or self.rgb
+        rgb, material = finish or self.walls or (None, None)
         self.parts.append(Part(part, shape, (x, y, z), rpy, rgb, material))
 
 
@@ -379,16 +378,17 @@ class Building(Assembly, abc.ABC):
         self.kind = kind
         self.height = height
         self.draw()
-        self.colours: dict[str, Rgb] = {}
-        for part, rgbs in kind.colours.items():
-            if isinstance(rgbs, str):
-                self.colours[part] = self.colours[rgbs]
+        self.colours: dict[str, Finish] = {}
+        for part, finishes in kind.colours.items():
+            if isinstance(finishes, str):
+                self.colours[part] = self.colours[finishes]
             else:
-                drawn = self.pick(rgbs) if len(rgbs) > 1 else rgbs[0]
+                several = len(finishes) > 1
+                drawn = self.pick(finishes) if several else finishes[0]
                 self.colours[part] = drawn
-        if self.rgb is None and self.colours:
-            self.rgb = next(iter(self.colours.values()))
-        self.glass_rgb = self.colours.setdefault("glass", self.glass_rgb)
+        if self.walls is None and self.colours:
+            self.walls = next(iter(self.colours.values()))
+        self.glass = self.colours.setdefault("glass", self.glass)
         self.paint(**{part: self.colours[part] for part in kind.materials})
 
     @abc.abstractmethod

@@ -10,9 +10,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.dice import Rgb
 from cns_drake.city.facades import bays, massing, roofs, walls
 from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
 # Height of the shared mesh of fire stairs, which is scaled to the storey [m].
@@ -486,7 +486,7 @@ def add_railing(
     start: tuple[float, float],
     end: tuple[float, float],
     z: float,
-    rgb: Rgb,
+    finish: Finish,
 ) -> None:
     """Places the shared mesh of a railing between two points at a wall.
 
@@ -497,7 +497,7 @@ def add_railing(
         start: first point: distances along the wall and out of it [m].
         end: last point: distances along the wall and out of it [m].
         z: height of the floor [m].
-        rgb: colour.
+        finish: colour and material.
     """
     p, q = wall.point(*start), wall.point(*end)
     length = float(np.hypot(*(q - p)))
@@ -506,7 +506,7 @@ def add_railing(
         out.shared("railing_panel", (round(length / RAILING_M, 3), 1.0, 1.0)),
         (*((p + q) / 2), z),
         math.atan2(*(q - p)[::-1]),
-        rgb=rgb,
+        finish=finish,
     )
 
 

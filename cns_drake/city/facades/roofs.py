@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely.geometry import Point, Polygon
 
-from cns_drake.city.dice import Rgb
 from cns_drake.city.facades import bays, massing
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.walls import Patch
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
@@ -256,7 +256,7 @@ def add_chimney(
     out: Assembly,
     part: str,
     xyz: tuple[float, float, float],
-    rgb: Rgb,
+    finish: Finish,
     *,
     item: str = "chimney",
     yaw: float = 0.0,
@@ -269,12 +269,12 @@ def add_chimney(
         part: name of the part.
         xyz: position of its foot, below the roof's surface, in the building's
             frame [m].
-        rgb: colour.
+        finish: colour and material.
         item: `chimney` or `chimney_row`.
         yaw: heading of the chimney [rad].
         scale: scale factors along x, y and z.
     """
-    out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, rgb=rgb)
+    out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, finish=finish)
 
 
 def equip_roof(

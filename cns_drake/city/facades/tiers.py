@@ -26,8 +26,8 @@ def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
     is added.
     """
     if pieces:
-        rgb = p.pick(p.kind.choices["awnings"])
-        p.add("awnings", *pieces, rgb=rgb)
+        finish = p.pick(p.kind.choices["awnings"])
+        p.add("awnings", *pieces, finish=finish)
 
 
 def divided(
@@ -112,9 +112,7 @@ def add_storeys(
         out.add_glass(f"{part}_glass", glass)
     elif facade.glass:
         glass = glass_mesh(outline, facade.stacked(per_group))
-        out.stack(
-            f"{part}_glass", glass, z0, step, groups, out.glass_rgb, "glass"
-        )
+        out.stack(f"{part}_glass", glass, z0, step, groups, out.glass)
     return top
 
 

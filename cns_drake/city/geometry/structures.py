@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import inspect
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
-from cns_drake.scene.materials import OF_CLASSES
+from cns_drake.scene.materials import MATERIALS, OF_CLASSES
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,38 @@ class SphereShape:
 
 
 Shape = MeshShape | BoxShape | CylinderShape | SphereShape
+
+
+class Finish(NamedTuple):
+    """The finish of a surface: its colour, and what it is made of.
+
+    Attributes:
+        rgb: colour.
+        material: name of the material, a key of
+            `cns_drake.scene.materials.MATERIALS`; None for the usual one of the
+            structure's semantic class.
+    """
+
+    rgb: tuple[float, float, float]
+    material: str | None = None
+
+    @classmethod
+    def given(cls, value: Any) -> "Finish":
+        """Reads a finish of a file: a colour, or a material with its colour.
+
+        For example `[0.8, 0.7, 0.6]`, or `{brick: [0.5, 0.3, 0.2]}`.
+
+        Raises:
+            ValueError: it is neither, or there is no such material.
+        """
+        rgb, material = value, None
+        if isinstance(value, dict) and len(value) == 1:
+            ((material, rgb),) = value.items()
+            if material not in MATERIALS:
+                raise ValueError(f"{material!r} is no material")
+        if not isinstance(rgb, list) or len(rgb) != 3:
+            raise ValueError(f"{value!r} is neither a colour nor a finish")
+        return cls(triple(rgb), material)
 
 
 @dataclass(frozen=True)
@@ -123,17 +155,9 @@ class Structure:
 
     @property
     def materials(self) -> dict[str, str]:
-        """Name of each part -> name of its material.
-
-        Reddish walls and roofs of buildings are of brick, unless the part says
-        otherwise.
-        """
+        """Name of each part -> name of its material."""
         usual = OF_CLASSES[self.semantic_class]
-        return {
-            part.name: part.material
-            or ("brick" if usual == "plaster" and _is_brick(part) else usual)
-            for part in self.model.parts
-        }
+        return {part.name: part.material or usual for part in self.model.parts}
 
     @property
     def footprint_W(self) -> BaseGeometry:
@@ -202,11 +226,6 @@ class Builder:
             if name not in known:
                 raise TypeError(f"there is no parameter {name}")
         return self.make(rng, **parameters)
-
-
-def _is_brick(part: Part) -> bool:
-    red, green, blue = part.rgb or (0.0, 0.0, 0.0)
-    return red > 1.35 * blue and red > 1.15 * green
 
 
 def post(

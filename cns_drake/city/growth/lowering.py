@@ -13,8 +13,9 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.facades import Assembly, Rgb, Site, equip_roof
+from cns_drake.city.facades import Assembly, Site, equip_roof
 from cns_drake.city.geometry import (
+    Finish,
     Mesh,
     MeshShape,
     Model,
@@ -64,7 +65,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
     ground = box(*model.footprint.bounds)
     site = Site(ground, f"{name}_at_{round(10 * height)}")
-    assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(placed))
+    assembly = Assembly(site, np.random.default_rng(seed), _walls(placed))
     parts: list[Part] = []
     edges: list[np.ndarray] = []
     for part, mesh in placed:
@@ -241,11 +242,12 @@ def _is_shared(part: Part) -> bool:
     return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
 
 
-def _wall_rgb(placed: Sequence[tuple[Part, Mesh]]) -> Rgb | None:
-    """Returns the colour of the building's largest part that is not glass."""
+def _walls(placed: Sequence[tuple[Part, Mesh]]) -> Finish | None:
+    """Returns the finish of the building's largest part that is not glass."""
 
     def extent(one: tuple[Part, Mesh]) -> float:
         return float(np.prod(np.ptp(one[1].vertices, axis=0)))
 
     walls = [one for one in placed if one[0].material != "glass"]
-    return max(walls, key=extent)[0].rgb
+    largest, _ = max(walls, key=extent)
+    return largest.rgb and Finish(largest.rgb, largest.material)

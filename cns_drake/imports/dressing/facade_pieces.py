@@ -26,7 +26,7 @@ from cns_drake.city.facades import (
     lifted,
     single_wall,
 )
-from cns_drake.city.geometry import Mesh, triangulate, upper_sides
+from cns_drake.city.geometry import Finish, Mesh, triangulate, upper_sides
 from cns_drake.imports.dressing.styles import Style
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
@@ -573,7 +573,7 @@ _ITEMS = {
     "house": "vents dish",
 }
 _CHIMNEYS = ("house", "flats", "public")
-_BRICK = (0.45, 0.27, 0.22)
+_BRICK = Finish((0.45, 0.27, 0.22), "brick")
 # Depth of a chimney's foot below the ridge [m].
 _BELOW_RIDGE = 0.35
 # Scale of a chimney relative to the shared mesh.

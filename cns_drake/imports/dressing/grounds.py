@@ -10,6 +10,7 @@ from shapely.geometry import LineString, MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import (
+    Finish,
     Mesh,
     MeshShape,
     Part,
@@ -386,7 +387,7 @@ _DASH_HEIGHT = 0.01
 # Length before a junction that stays free, in addition to half the street's
 # width [m].
 _BEFORE_JUNCTION = 4.0
-_WHITE: Rgb = (0.86, 0.86, 0.84)
+_WHITE = Finish((0.86, 0.86, 0.84), "markings")
 
 
 def lane_marks(
@@ -421,7 +422,6 @@ def lane_marks(
                     "Lane mark",
                     {"paint": np.concatenate(dashes)},
                     {"paint": _WHITE},
-                    material="markings",
                 )
 
 

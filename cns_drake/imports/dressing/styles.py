@@ -9,7 +9,8 @@ from matplotlib.colors import to_rgb
 import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.city.dice import Dice, Rgb
+from cns_drake.city.dice import Dice
+from cns_drake.city.geometry import Finish, triple
 from cns_drake.imports.openstreetmap.tags import count
 
 _USE_KEYS = (
@@ -53,7 +54,7 @@ class Style:
         sill: height of a window's lower edge above the floor.
         height: height of a window.
         depth: depth of a window's recess.
-        wall, roof, glass, frame, trim, door, sign: colours of these parts.
+        wall, roof, glass, frame, trim, door, sign: finishes of these parts.
         shops: whether the ground floor may have shops on the street.
         balconies: whether every other window may have a balcony.
         plinth: height of the plinth; 0 for none.
@@ -69,13 +70,13 @@ class Style:
     sill: float
     height: float
     depth: float
-    wall: Rgb
-    roof: Rgb
-    glass: Rgb
-    frame: Rgb
-    trim: Rgb
-    door: Rgb
-    sign: Rgb
+    wall: Finish
+    roof: Finish
+    glass: Finish
+    frame: Finish
+    trim: Finish
+    door: Finish
+    sign: Finish
     shops: bool
     balconies: bool
     plinth: float
@@ -108,22 +109,23 @@ def building_use(
     return "flats", False
 
 
-def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
-    """Returns the colour of a part by its tags; None without such a tag.
+def tagged_finish(tags: Mapping[str, str], part: str) -> Finish | None:
+    """Returns the finish of a part that its tags name; None without tags.
 
     `part` is the beginning of the tags' keys, `building` or `roof`.
     """
+    word = tags.get(f"{part}:material", "").strip().lower()
+    given = _LOOKS["materials"].get(word)
+    finish = None if given is None else Finish.given(given)
     for key in (f"{part}:colour", f"{part}:color"):
         text = tags.get(key, "").strip().lower()
         for name in (text, re.sub(r"[\s_-]", "", text)):
             try:
-                red, green, blue = to_rgb(name)
+                rgb = to_rgb(name)
             except ValueError:
                 continue
-            return red, green, blue
-    material = tags.get(f"{part}:material", "").strip().lower()
-    rgb = _LOOKS["materials"].get(material)
-    return None if rgb is None else (rgb[0], rgb[1], rgb[2])
+            return Finish(rgb, finish and finish.material)
+    return finish
 
 
 def make_style(
@@ -153,8 +155,8 @@ def make_style(
         float(rng.uniform(*look[size]))
         for size in ("storey", "pitch", "width", "height")
     )
-    drawn_wall = _colour(rng, *look["walls"].split())
-    drawn_roof = _colour(rng, "felts" if is_flat else "tiles")
+    drawn_wall = _finish(rng, *look["walls"].split())
+    drawn_roof = _finish(rng, "felts" if is_flat else "tiles")
     tint = float(rng.uniform(0.92, 1.06))
     is_old = float(rng.random()) < 0.6
     if year is not None:
@@ -168,7 +170,7 @@ def make_style(
         by_tag.add("levels")
     storey = max(height / numbered, _STOREYS[0])
     window = min(window, 0.58 * storey)
-    wall, roof = tagged_colour(tags, "building"), tagged_colour(tags, "roof")
+    wall, roof = tagged_finish(tags, "building"), tagged_finish(tags, "roof")
     by_tag |= {"wall"} if wall else set()
     by_tag |= {"roof"} if roof else set()
     wall = wall or _tinted(drawn_wall, tint)
@@ -188,11 +190,11 @@ def make_style(
         depth=0.22 if is_old else 0.14,
         wall=wall,
         roof=roof or drawn_roof,
-        glass=_colour(rng, "glass"),
-        frame=_colour(rng, "frames"),
+        glass=_finish(rng, "glass"),
+        frame=_finish(rng, "frames"),
         trim=_tinted(wall, 1.16 if is_old else 0.82),
-        door=_colour(rng, "doors"),
-        sign=_colour(rng, "signs"),
+        door=_finish(rng, "doors"),
+        sign=_finish(rng, "signs"),
         shops=bool(shops),
         balconies=bool(use == "flats" and numbered >= 3 and chances[1] < 0.45),
         plinth=0.0 if use == "shed" else round(0.3 + 0.4 * chances[2], 2),
@@ -209,13 +211,12 @@ def _cornice(use: str, is_flat: bool, is_old: bool, chance: float) -> float:
     return round((0.35 if is_old else 0.18) + 0.2 * chance, 2)
 
 
-def _tinted(rgb: Rgb, factor: float) -> Rgb:
-    red, green, blue = np.clip(np.multiply(rgb, factor), 0.0, 1.0).round(3)
-    return float(red), float(green), float(blue)
+def _tinted(finish: Finish, factor: float) -> Finish:
+    rgb = np.clip(np.multiply(finish.rgb, factor), 0.0, 1.0).round(3)
+    return finish._replace(rgb=triple(rgb))
 
 
-def _colour(rng: np.random.Generator, *palettes: str) -> Rgb:
-    """Returns a random colour of some palettes."""
-    colours = [rgb for name in palettes for rgb in _LOOKS["palettes"][name]]
-    red, green, blue = Dice(rng).pick(colours)
-    return red, green, blue
+def _finish(rng: np.random.Generator, *palettes: str) -> Finish:
+    """Returns a random finish of some palettes."""
+    found = [one for name in palettes for one in _LOOKS["palettes"][name]]
+    return Finish.given(Dice(rng).pick(found))

@@ -25,7 +25,7 @@ from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
-from cns_drake.city.geometry import Structure, polygons_of, triangulate
+from cns_drake.city.geometry import Finish, Structure, polygons_of, triangulate
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
@@ -233,8 +233,10 @@ def road_marks(
             "road",
             "Road mark",
             surfaces,
-            {colour: _COLOURS[colour] for colour in surfaces},
-            material="markings",
+            {
+                colour: Finish(_COLOURS[colour], "markings")
+                for colour in surfaces
+            },
         ).structure
 
 

@@ -16,6 +16,7 @@ from shapely import STRtree
 from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.geometry import Finish
 from cns_drake.imports import faces
 from cns_drake.imports.foreign_city import (
     LAWN,
@@ -49,7 +50,7 @@ _PARAPET_HEIGHT = 1.0
 _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 _KERB = 0.12
-_WHITE = (0.86, 0.86, 0.84)
+_WHITE = Finish((0.86, 0.86, 0.84), "markings")
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
 # Length of the stripes [m].
@@ -194,15 +195,10 @@ def _made(
     name: str, look: Look, part: str, triangles: Sequence[np.ndarray]
 ) -> Imported:
     surfaces = {part: np.concatenate(triangles)}
-    colours = {part: look.rgb}
     material = "water" if look.kind == "WaterBody" else None
+    finish = look.rgb and Finish(look.rgb, material)
     return make_imported(
-        name,
-        look.semantic_class,
-        look.kind,
-        surfaces,
-        colours,
-        material=material,
+        name, look.semantic_class, look.kind, surfaces, {part: finish}
     )
 
 
@@ -370,7 +366,6 @@ def crossing_stripes(
                 "Crossing",
                 {"stripes": np.concatenate(surface)},
                 {"stripes": _WHITE},
-                material="markings",
             )
 
 

@@ -56,7 +56,7 @@ def test_two_colours_that_belong_together_are_drawn_together(
     choices = ARCHETYPES[name].choices
     pairs = set(zip(choices[one], choices[other], strict=True))
     found = {
-        (p.rgb, p.glass_rgb if other == "glass" else p.tower_rgb)
+        (p.walls, p.glass if other == "glass" else p.tower_walls)
         for p in drawn(name, *size, height)
     }
     assert found == pairs

@@ -13,6 +13,7 @@ from cns_drake.city.facades.wings import (
     add_roof,
     free_stretches,
 )
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import box_mesh
 
 HALL = Wing.at((0, 0, 20, 8), 6.0, 9.0, Roof())
@@ -25,8 +26,8 @@ GROUND = box(0, 0, 9, 9)
 
 def assembly(name, **colours):
     site = Site(GROUND, name)
-    result = Assembly(site, np.random.default_rng(0), rgb=(9, 9, 9))
-    result.paint(**colours)
+    result = Assembly(site, np.random.default_rng(0), walls=Finish((9, 9, 9)))
+    result.paint(**{part: Finish(rgb) for part, rgb in colours.items()})
     return result
 
 

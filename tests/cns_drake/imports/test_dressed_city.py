@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import yaml
 
 from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
@@ -27,7 +28,7 @@ from cns_drake.imports.dressing.facade_pieces import (
 from cns_drake.imports.dressing.styles import (
     building_use,
     make_style,
-    tagged_colour,
+    tagged_finish,
 )
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
 from cns_drake.imports.drives.search import WaypointDrive
@@ -190,9 +191,22 @@ def test_uses(tags, use):
      ("nonsense", None)],
 )  # fmt: skip
 def test_colours(value, rgb):
-    told = tagged_colour({"roof:colour": value}, "roof")
-    assert told == (rgb if rgb is None else pytest.approx(rgb))
-    assert tagged_colour({"building:material": "wood"}, "building") is not None
+    told = tagged_finish({"roof:colour": value}, "roof")
+    assert (told and told.rgb) == (rgb and pytest.approx(rgb))
+    assert told is None or told.material is None
+
+
+@pytest.mark.parametrize(
+    ("tags", "part", "material"),
+    [({"building:material": "brick"}, "building", "brick"),
+     ({"roof:material": "roof_tiles"}, "roof", "brick"),
+     ({"building:material": "wood"}, "building", None)],
+)  # fmt: skip
+def test_a_tag_tells_the_material_whatever_the_colour(tags, part, material):
+    assert tagged_finish(tags, part).material == material
+    painted = tagged_finish({**tags, f"{part}:colour": "white"}, part)
+    assert painted == Finish((1.0, 1.0, 1.0), material)
+    assert tagged_finish({f"{part}:material": "jelly"}, part) is None
 
 
 @pytest.mark.slow
@@ -359,7 +373,7 @@ def test_a_gable_keeps_its_slopes():
     assert {o.row for o in plan.openings} == {0, 1, 2}
     out = Assembly(Site(Polygon(), "a"), np.random.default_rng(1))
     names = ("body", "doors", "frames", "glass", "sign", "trim")
-    out.paint(**dict.fromkeys(names, (0.5, 0.5, 0.5)))
+    out.paint(**dict.fromkeys(names, Finish((0.5, 0.5, 0.5))))
     counts = add_facade(out, plan, out.rng)
     # The upper row leaves the gable.
     assert counts == {"windows": 6}

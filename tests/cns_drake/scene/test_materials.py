@@ -4,6 +4,7 @@ from shapely.geometry import box
 
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.geometry.structures import (
+    Finish,
     Model,
     Part,
     SphereShape,
@@ -113,21 +114,54 @@ def test_windows_of_buildings_are_of_glass(name):
     assert set(building.materials.values()) <= {"glass", "plaster", "brick"}
 
 
-@pytest.mark.parametrize(
-    ("rgb", "material"),
-    [
-        ((0.56, 0.33, 0.27), "brick"),
-        ((0.80, 0.79, 0.74), "plaster"),
-        (None, "plaster"),
-    ],
-)
-def test_reddish_walls_are_of_brick(rgb, material):
+def test_a_part_is_of_its_own_material_or_the_usual_one_of_the_class():
     parts = (
-        Part("wall", SphereShape(1.0), rgb=rgb),
-        Part("door", SphereShape(1.0), rgb=rgb, material="metal"),
+        Part("wall", SphereShape(1.0), rgb=(0.56, 0.33, 0.27)),
+        Part("door", SphereShape(1.0), material="metal"),
     )
     model = Model(parts, {}, box(0, 0, 1, 1))
-    house = Structure("house", "building", model, (0.0, 0.0, 0.0))
-    assert house.materials == {"wall": material, "door": "metal"}
-    shed = Structure("shed", "fence", model, (0.0, 0.0, 0.0))
-    assert shed.materials == {"wall": "metal", "door": "metal"}
+    for kind, usual in (("building", "plaster"), ("fence", "metal")):
+        one = Structure("one", kind, model, (0.0, 0.0, 0.0))
+        assert one.materials == {"wall": usual, "door": "metal"}
+
+
+def test_walls_are_of_brick_where_the_palette_says_so():
+    found = set()
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        model = sample("corner_store", box(0, 0, 14, 14), 9.0, rng)
+        shop = Structure("one", "building", model, (0.0, 0.0, 0.0))
+        rgbs = {part.name: part.rgb for part in model.parts}
+        (sign,) = (name for name in rgbs if "sign" in name)
+        # A red sign is not of brick, but a red wall is.
+        assert shop.materials[sign] == "plaster"
+        walls = Finish(model.parts[0].rgb, model.parts[0].material)
+        found.add(walls)
+        assert {
+            material for name, material in shop.materials.items()
+            if rgbs[name] == walls.rgb
+        } == {walls.material or "plaster"}  # fmt: skip
+    assert found == set(ARCHETYPES["corner_store"].colours["walls"])
+    assert {walls.material for walls in found} == {"brick", None}
+
+
+@pytest.mark.parametrize(
+    ("value", "finish"),
+    [
+        ([0.5, 0.3, 1], Finish((0.5, 0.3, 1.0))),
+        ({"brick": [0.5, 0.3, 0.2]}, Finish((0.5, 0.3, 0.2), "brick")),
+        ({"glass": [0, 0, 0]}, Finish((0.0, 0.0, 0.0), "glass")),
+    ],
+)
+def test_a_finish_of_a_file(value, finish):
+    assert Finish.given(value) == finish
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[0.5, 0.3], "brick", {"brik": [0.5, 0.3, 0.2]}, {"brick": "red"}, {},
+     {"brick": [0, 0, 0], "glass": [0, 0, 0]}],
+)  # fmt: skip
+def test_what_is_no_finish(value):
+    with pytest.raises(ValueError, match=r"is no material|neither a colour"):
+        Finish.given(value)
