@@ -399,11 +399,11 @@ def _write_maps(
         return
     with uninterrupted():
         from cns_drake.base.files import check_new_folder
-        from cns_drake.studies.map_truth import open_survey, write_truth
+        from cns_drake.studies.map_truth import open_labelled, write_truth
         from evaluation.map_update.sessions import Label
 
     check_new_folder(output)
-    first, second = open_survey(a), open_survey(b)
+    first, second = open_labelled(a), open_labelled(b)
     counts, table = write_truth(first, second, output, spacing)
     result: dict[str, Any] = {"output": str(output)}
     for side, found in counts.items():

@@ -16,7 +16,7 @@ from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import find_free_space
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.ground import bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
@@ -172,7 +172,7 @@ def _import_roads(
     source: Path,
     output: Path,
     options: ImportOptions,
-    own: Sequence[WaypointDrive] | None,
+    own: Sequence[WaypointRoute] | None,
     finish: Finish,
 ) -> ImportReport:
     with uninterrupted():  # This imports the whole city generator.
@@ -199,7 +199,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
     return import_openstreetmap(source, options.year_attribute, options.dressed)
 
 
-def drive_along(path: Path) -> WaypointDrive:
+def drive_along(path: Path) -> WaypointRoute:
     """Returns the drive along the waypoints in a CSV file; heights are ignored.
 
     Raises:
@@ -215,4 +215,4 @@ def drive_along(path: Path) -> WaypointDrive:
             f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
             f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
         )
-    return WaypointDrive(points[:, :2], control)
+    return WaypointRoute(points[:, :2], control)

@@ -22,7 +22,7 @@ from cns_drake.city.generation.generate import (
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
 from cns_drake.imports.options import (
@@ -235,7 +235,7 @@ def draw_overview(
     path: Path,
     structures: Sequence[Imported],
     space: FreeSpace | None,
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
 ) -> None:
     """Draws a map's structures, the free space for a car and the drives.
 

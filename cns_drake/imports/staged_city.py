@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import Mesh, MeshShape
 from cns_drake.imports.building_years import stands_today
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import (
     ForeignCity,
     Imported,
@@ -139,7 +139,7 @@ class StagedCity:
 
     def near(
         self,
-        drives: Sequence[WaypointDrive],
+        drives: Sequence[WaypointRoute],
         distance: float,
         faults: ImportFaults,
     ) -> StagedCity:

@@ -19,7 +19,7 @@ from cns_drake.base.progress import doing
 _POINTS = 100_000
 _REFERENCE = 0.29
 _REPEATS = 3
-# Most memory of a job that records or surveys a shipped drive [bytes].
+# Most memory of a job that records or reads a shipped drive [bytes].
 _JOB_MEMORY = 1.2e9
 
 

@@ -27,7 +27,7 @@ class _ReadFile:
 
 
 @dataclass(frozen=True)
-class _ShownDrive:
+class _PictureInput:
     """Input of a job: a scenario and the content of its files."""
 
     scenario: Scenario
@@ -50,7 +50,8 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     source = MapFolder(folder.resolve())
     pictures = pictures.absolute()
     drives = tuple(
-        _ShownDrive(load_scenario(file)) for file in source.recordable_drives()
+        _PictureInput(load_scenario(file))
+        for file in source.recordable_drives()
     )
     drawn: dict[str, tuple] = {"drives": (picture_drives, drives)}
     if source.views.is_file():
@@ -77,7 +78,7 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
 
 
 def picture_drives(
-    reporter: Reporter, drives: tuple[_ShownDrive, ...], picture: Path
+    reporter: Reporter, drives: tuple[_PictureInput, ...], picture: Path
 ) -> None:
     """Draws the drives of a map from above, and writes the image file."""
     scenarios = [one.scenario for one in drives]

@@ -120,7 +120,7 @@ _MOST_ROWS = 200
 
 
 @dataclass(frozen=True)
-class Survey:
+class LabelledDrive:
     """A drive whose map is labelled, with the simulation of its world.
 
     Attributes:
@@ -148,7 +148,7 @@ class Survey:
         return still_scene(world, X_WS, simulated.pattern)
 
 
-def open_survey(place: str | Path) -> Survey:
+def open_labelled(place: str | Path) -> LabelledDrive:
     """Opens a drive whose world is known, for exact labels of its map.
 
     Args:
@@ -162,7 +162,7 @@ def open_survey(place: str | Path) -> Survey:
     """
     path = Path(place)
     if not path.exists() or not holds_mcap(path):
-        return simulate_survey(load_scenario(place))
+        return simulate_labelled(load_scenario(place))
     folder = path if path.is_dir() else path.parent
     if not (folder / "scenario.yaml").is_file():
         raise InputError(
@@ -182,22 +182,22 @@ def open_survey(place: str | Path) -> Survey:
         raise InputError(
             f"{path}: its poses are not those of its scenario.yaml"
         )
-    return Survey(drive, simulated, scenario)
+    return LabelledDrive(drive, simulated, scenario)
 
 
-def simulate_survey(scenario: Scenario) -> Survey:
+def simulate_labelled(scenario: Scenario) -> LabelledDrive:
     """Returns a drive that is simulated while its scans are read.
 
     Raises:
         InputError: the scenario cannot be run.
     """
     simulated = SimulatedDrive(scenario)
-    return Survey(simulated, simulated, scenario)
+    return LabelledDrive(simulated, simulated, scenario)
 
 
 def write_truth(
-    a: Survey,
-    b: Survey,
+    a: LabelledDrive,
+    b: LabelledDrive,
     output: Path,
     spacing: float = SPACING,
     *,
@@ -232,8 +232,8 @@ def write_truth(
             raise InputError(f"{output}: exists already; give a new folder")
     with draft_folder(output) as draft:
         sessions, frames = [], []
-        for side, survey in zip(SIDES, (a, b), strict=True):
-            session, taken = write_session(survey.drive, draft / side, spacing)
+        for side, one in zip(SIDES, (a, b), strict=True):
+            session, taken = write_session(one.drive, draft / side, spacing)
             sessions.append(session)
             frames.append(taken)
         pair = Pair(*sessions)
@@ -243,8 +243,8 @@ def write_truth(
         )
         for session, labels in zip(pair, truth, strict=True):
             write_labels(session.folder / "truth.npy", labels)
-        names = [survey.drive.instances or {} for survey in (a, b)]
-        present = [survey.simulated.structures for survey in (a, b)]
+        names = [one.drive.instances or {} for one in (a, b)]
+        present = [one.simulated.structures for one in (a, b)]
         table = write_structures(
             draft / "structures.csv", pair, truth, names, present
         )
@@ -263,7 +263,7 @@ def write_truth(
 
 
 def label_points(
-    session: Session, other: Survey, frames: np.ndarray
+    session: Session, other: LabelledDrive, frames: np.ndarray
 ) -> np.ndarray:
     """Returns the exact label of each point of a drive's map, (N,) uint8.
 
@@ -455,7 +455,7 @@ def _check_unchanged(drive: McapDrive, path: Path, scenario: Scenario) -> None:
         )
 
 
-def _check_same_map(a: Survey, b: Survey) -> None:
+def _check_same_map(a: LabelledDrive, b: LabelledDrive) -> None:
     """Refuses drives of different map folders, even of the same name.
 
     For worlds without a map folder this cannot be checked; the user must make

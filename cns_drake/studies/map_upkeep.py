@@ -11,11 +11,11 @@ from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.map_truth import (
-    Survey,
+    LabelledDrive,
     is_there,
     label_points,
-    open_survey,
-    simulate_survey,
+    open_labelled,
+    simulate_labelled,
 )
 from evaluation.map_update.baselines import run_baseline
 from evaluation.map_update.scores import Labels, nearest
@@ -27,7 +27,10 @@ from evaluation.map_update.upkeep import (
     UpkeptMap,
 )
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource, RecordingSource
+from evaluation.study.sources import (
+    DriveSource,
+    RecordingSource,
+)
 
 # Distance driven between two scans of a map, as in the task `map` [m].
 _SPACING = 5.0
@@ -71,14 +74,14 @@ def update_maps(
         sources: sources of the drives, from older to newer.
         maintain: name of a change detector; or `TRUTH`, for exact labels.
     """
-    surveys: list[Survey] = []
+    labelled: list[LabelledDrive] = []
     frames: list[np.ndarray] = []
 
     def detect(pair: Pair, number: int) -> Labels:
         if maintain != TRUTH:
             return run_baseline(maintain, pair)
-        survey, taken = surveys[-1], frames[-1]
-        gone = label_points(pair.A, survey, taken)
+        before, taken = labelled[-1], frames[-1]
+        gone = label_points(pair.A, before, taken)
         far = nearest(pair.B.points, pair.A.points, _KNOWN_WITHIN)
         new = np.where(np.isinf(far), Label.NEW, Label.KEPT)
         return Labels(gone, new.astype(np.uint8))
@@ -88,23 +91,23 @@ def update_maps(
         kept = UpkeptMap(folder / "A", detect)
         for source in sources:
             if maintain == TRUTH:
-                surveys[:] = [survey_of(source)]
-                drive = surveys[0].drive
+                labelled[:] = [labelled_of(source)]
+                drive = labelled[0].drive
             else:
                 drive = source()
             session, taken = write_session(drive, folder / "B", _SPACING)
             frames[:] = [taken]
             stands = np.ones(len(session.points), bool)
-            if maintain == TRUTH and not surveys[0].scenario.traffic.is_off:
-                stands = is_there(session.points, surveys[0].still())
+            if maintain == TRUTH and not labelled[0].scenario.traffic.is_off:
+                stands = is_there(session.points, labelled[0].still())
             kept.add(session, stands)
             shutil.rmtree(folder / "B")
     return kept.finish()
 
 
-def survey_of(source: DriveSource) -> Survey:
+def labelled_of(source: DriveSource) -> LabelledDrive:
     """Returns a drive with its world, for exact labels of its map."""
     if isinstance(source, SimulationSource):
-        return simulate_survey(source.scenario)
+        return simulate_labelled(source.scenario)
     assert isinstance(source, RecordingSource)
-    return open_survey(source.path)
+    return open_labelled(source.path)

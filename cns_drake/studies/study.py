@@ -73,9 +73,9 @@ from evaluation.study.chosen_methods import (
     choose_methods,
 )
 from evaluation.study.collection import (
-    City,
+    MapDrives,
+    drives_by_map,
     find_recordings,
-    group_cities,
 )
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.parts import MakePart, StudyFiles
@@ -123,13 +123,13 @@ _FORMER = (
 
 
 @dataclass(frozen=True)
-class _Drives:
+class _MapPairs:
     """The pairs of drives of one map, before a condition changes them."""
 
     map_name: str
     factors: Mapping[str, Any]
     pairs: Sequence[tuple[Scenario, Scenario]] = ()
-    city: City | None = None
+    city: MapDrives | None = None
 
     @property
     def drive_names(self) -> set[str]:
@@ -345,7 +345,7 @@ class Study:
             found[choice.key] = choice, columns
         return found
 
-    def _drives(self, maps: Sequence[str]) -> Iterator[_Drives]:
+    def _drives(self, maps: Sequence[str]) -> Iterator[_MapPairs]:
         """Yields the drives of all maps; makes aged and imported maps."""
         made = {
             one.name: one
@@ -384,12 +384,12 @@ class Study:
                 known |= names
                 yield some
 
-    def _drives_of(self, one: str | MadeMap) -> Iterator[_Drives]:
+    def _drives_of(self, one: str | MadeMap) -> Iterator[_MapPairs]:
         if isinstance(one, MadeMap):
             folder = self.output / "cities" / one.name
             step = made_map_step(one, self.experiment, folder, shipped_maps())
             make_maps([step], folder.parent, self.cluster)
-            yield _Drives(one.name, {}, self._pairs(folder))
+            yield _MapPairs(one.name, {}, self._pairs(folder))
             return
         path = shipped_maps().get(one, Path(one))
         versions = self.experiment.frozen_redraws
@@ -402,13 +402,15 @@ class Study:
                 self.source,
             )
             for number, folder in zip(sorted(versions), cities, strict=True):
-                yield _Drives(one, {FROZEN_REDRAW: number}, self._pairs(folder))
+                yield _MapPairs(
+                    one, {FROZEN_REDRAW: number}, self._pairs(folder)
+                )
             return
         if path.is_dir() and not MapFolder(path).drives():
-            for city in group_cities(find_recordings(path, self.on_note)):
-                yield _Drives(city.name, {}, city=city)
+            for city in drives_by_map(find_recordings(path, self.on_note)):
+                yield _MapPairs(city.name, {}, city=city)
             return
-        yield _Drives(path.name, {}, self._pairs(recordable_map(one)))
+        yield _MapPairs(path.name, {}, self._pairs(recordable_map(one)))
 
     def _pairs(self, folder: Path) -> list[tuple[Scenario, Scenario]]:
         """Returns the pairs of drives of a map: database and query."""
@@ -435,7 +437,7 @@ class Study:
             pairs += [(query, one) for one, _ in pairs]
         return pairs
 
-    def _plan(self, drives: Iterable[_Drives]) -> Engine:
+    def _plan(self, drives: Iterable[_MapPairs]) -> Engine:
         """Returns the engine with all pairs in all conditions.
 
         Raises:
@@ -479,7 +481,7 @@ class Study:
         return engine
 
     def _distractors(
-        self, some: _Drives, found: Iterable[Pair]
+        self, some: _MapPairs, found: Iterable[Pair]
     ) -> list[NamedDrive]:
         """Returns the drives whose places are added to databases."""
         most = max((one.distractors for one in found), default=0)
@@ -504,7 +506,7 @@ class Study:
     def _named(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
         if is_recorded(drive, self.output):
-            from evaluation.study.surveys import RecordingSource
+            from evaluation.study.sources import RecordingSource
 
             return NamedDrive(
                 drive.name, RecordingSource(self.output / drive.name)
@@ -512,7 +514,7 @@ class Study:
         return NamedDrive(drive.name, SimulationSource(drive))
 
     def _simulated(
-        self, some: _Drives, *, made: bool = True
+        self, some: _MapPairs, *, made: bool = True
     ) -> Iterator[tuple[Pair, Compared]]:
         """Yields the pairs of a map in all conditions that it allows.
 
@@ -537,7 +539,7 @@ class Study:
             )
 
     def _built(
-        self, some: _Drives, *, made: bool
+        self, some: _MapPairs, *, made: bool
     ) -> Iterator[tuple[tuple[str, str], Scenario, Compared, Condition, int]]:
         """Yields names, query, changed drives, condition and seed of pairs."""
         noted: dict[str, None] = {}
@@ -636,7 +638,7 @@ class Study:
             for number, one in enumerate(drives)
         ]
 
-    def _recorded(self, city: City) -> Iterator[Pair]:
+    def _recorded(self, city: MapDrives) -> Iterator[Pair]:
         """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
         return recorded_comparisons(
@@ -655,7 +657,7 @@ class Study:
             both_ways=self.experiment.drives == "both-ways",
         )
 
-    def _check_recordable(self, city: City) -> None:
+    def _check_recordable(self, city: MapDrives) -> None:
         """Checks that conditions vary only the stage, as recordings require."""
         for condition in self._conditions:
             sides = {n: condition.changes.get(n, {}) for n in SIDES}

@@ -45,7 +45,7 @@ _SAME_ROUTE = 1.0
 
 
 @dataclass(frozen=True)
-class Surveyed:
+class DriveMap:
     """A map, with the drive that made it.
 
     Attributes:
@@ -143,21 +143,21 @@ class ChangeReport:
         return json_values(values)
 
 
-def survey(path: Path) -> Surveyed:
+def read_map(path: Path) -> DriveMap:
     """Reads a drive or map file, and returns its voxel map.
 
     Raises:
         InputError: if the path can be read neither as a drive nor as a map.
     """
-    return _survey(open_source(path))
+    return _map_of(open_source(path))
 
 
-def survey_in_one_world(
+def maps_in_one_world(
     paths: list[Path],
     when: When,
     lidar: str | None = None,
     columns: int | None = None,
-) -> tuple[list[Surveyed], list[AlignmentReport]]:
+) -> tuple[list[DriveMap], list[AlignmentReport]]:
     """Returns the maps of drives or map files, all in one world.
 
     Args:
@@ -196,11 +196,11 @@ def survey_in_one_world(
                 drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
     return [
-        _survey(drives.get(i, one), columns) for i, one in enumerate(opened)
+        _map_of(drives.get(i, one), columns) for i, one in enumerate(opened)
     ], reports
 
 
-def change_between(source: Surveyed, target: Surveyed) -> ChangeReport:
+def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
     """Returns the change between two maps, without its context.
 
     Raises:
@@ -218,8 +218,8 @@ def change_between(source: Surveyed, target: Surveyed) -> ChangeReport:
 
 
 def spread_over_grids(
-    source: Surveyed,
-    target: Surveyed,
+    source: DriveMap,
+    target: DriveMap,
     change: TemporalChange,
     grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> tuple[float, float]:
@@ -236,8 +236,8 @@ def spread_over_grids(
 
 
 def _change(
-    source: Surveyed,
-    target: Surveyed,
+    source: DriveMap,
+    target: DriveMap,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[TemporalChange, list[np.ndarray]]:
     """Returns the change on a grid shifted by [m], and centroids of A and B."""
@@ -261,21 +261,21 @@ def open_source(
     return open_drive(path, lidar, columns)
 
 
-def _survey(source: Drive | Path, columns: int | None = None) -> Surveyed:
+def _map_of(source: Drive | Path, columns: int | None = None) -> DriveMap:
     if isinstance(source, Drive):
         voxels = map_drive(source, CELL_SIZE)
         positions = source.X_WS[:, :3, 3]
-        return Surveyed(source.name, voxels, positions, source, source.notes)
+        return DriveMap(source.name, voxels, positions, source, source.notes)
     accumulator = VoxelAccumulator(CELL_SIZE)
     notes: list[str] = []
     for points in read_blocks(source, columns, notes.append):
         accumulator.add(points)
-    return Surveyed(source.name, accumulator.to_map(), notes=tuple(notes))
+    return DriveMap(source.name, accumulator.to_map(), notes=tuple(notes))
 
 
 def same_stage_partner(
-    source: Surveyed, target: Surveyed, control: Surveyed
-) -> Surveyed:
+    source: DriveMap, target: DriveMap, control: DriveMap
+) -> DriveMap:
     """Returns which of two drives is in the control's stage.
 
     It is the drive whose route the control does not follow.

@@ -122,15 +122,13 @@ def tcr(
     from evaluation.study.tasks.change import ChangeTask
 
     named = [path for path in (source, target, control) if path is not None]
-    surveys, alignments = change.survey_in_one_world(
-        named, align, lidar, columns
-    )
-    before, after, *controls = surveys
+    maps, alignments = change.maps_in_one_world(named, align, lidar, columns)
+    before, after, *controls = maps
     compared = [(before, after)] + [
         (one, change.same_stage_partner(before, after, one)) for one in controls
     ]
     pairs = [
-        one_pair.pair_of_surveys(
+        one_pair.pair_of_drive_maps(
             both,
             (before.name, after.name),
             factors={STAGE: stage} if controls else {},
@@ -150,7 +148,7 @@ def tcr(
         spread=change.spread_over_grids(before, after, report.change),
         alignment=alignments[0] if alignments else None,
     )
-    for one in surveys:
+    for one in maps:
         for note in one.notes:
             terminal.note(note)
         ignored = one.voxels.num_ignored

@@ -5,8 +5,8 @@ from typing import Any
 
 from cns_drake.base.drives.drive import (
     Drive,
+    DriveNames,
     Placed,
-    PlacedDrive,
     check_same_world,
 )
 from cns_drake.base.errors import InputError
@@ -15,8 +15,8 @@ from cns_drake.base.progress import doing
 
 __all__ = [
     "Drive",
+    "DriveNames",
     "Placed",
-    "PlacedDrive",
     "check_same_world",
     "open",
     "open_drive",

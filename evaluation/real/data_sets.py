@@ -24,7 +24,7 @@ from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions
 from evaluation.real import image_sequences, sessions
-from evaluation.study.surveys import RecordingSource
+from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.task import NamedDrive
 
 # Folders that other modules read.

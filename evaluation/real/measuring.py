@@ -49,7 +49,7 @@ from evaluation.results.table import QueryRows, Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.engine import Engine
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.surveys import DriveSource
+from evaluation.study.sources import DriveSource
 from evaluation.study.tasks.localise import SHIPPED, LocaliseTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result, Task

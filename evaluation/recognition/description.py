@@ -113,7 +113,7 @@ def joined_scans(
 
 
 @dataclass(frozen=True)
-class DescribedDrive:
+class DriveDescriptors:
     """A method's descriptors of a drive.
 
     Attributes:
@@ -134,7 +134,7 @@ def describe_drive(
     protocol: RetrievalProtocol = RECORDED_PROTOCOL,
     visit: Callable[[int, np.ndarray], None] | None = None,
     further: Iterable[Request] = (),
-) -> list[DescribedDrive]:
+) -> list[DriveDescriptors]:
     """Describes the places and queries of a drive.
 
     Each cloud is made only once for all methods. A frame that is both a place
@@ -288,7 +288,7 @@ class _Describing:
             )
             if role in roles:
                 self._members[role] = set(frames.tolist())
-        self._drive = DescribedDrive(drive.name, **scans)
+        self._drive = DriveDescriptors(drive.name, **scans)
 
     @property
     def frames(self) -> set[int]:
@@ -315,7 +315,7 @@ class _Describing:
         if len(self._waiting) >= self._method.batch_size:
             self._flush()
 
-    def finish(self) -> DescribedDrive:
+    def finish(self) -> DriveDescriptors:
         self._flush()
         return self._drive
 

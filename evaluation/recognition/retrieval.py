@@ -11,7 +11,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedDrive, describe_drive
+from evaluation.recognition.description import DriveDescriptors, describe_drive
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
@@ -134,8 +134,8 @@ def retrieve(
 
 def compare_with_gates(
     method: Method,
-    database: DescribedDrive,
-    query: DescribedDrive,
+    database: DriveDescriptors,
+    query: DriveDescriptors,
     protocol: RetrievalProtocol,
     gate_radii: Collection[float | None],
     overlaps: np.ndarray | None = None,
@@ -219,8 +219,8 @@ def compare_with_gates(
 
 
 def matches_within_radius(
-    database: DescribedDrive,
-    query: DescribedDrive,
+    database: DriveDescriptors,
+    query: DriveDescriptors,
     protocol: RetrievalProtocol,
 ) -> np.ndarray:
     """Returns which places are true matches of each query, (Q, D) bool.
@@ -236,8 +236,8 @@ def matches_within_radius(
 
 
 def _known_places(
-    database: DescribedDrive,
-    query: DescribedDrive,
+    database: DriveDescriptors,
+    query: DriveDescriptors,
     protocol: RetrievalProtocol,
 ) -> np.ndarray:
     """Returns which places are allowed for each query, (Q, D) bool."""

@@ -15,7 +15,10 @@ from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns
 from evaluation.drives.kitti import holds_kitti
-from evaluation.study.surveys import DriveSource, RecordingSource
+from evaluation.study.sources import (
+    DriveSource,
+    RecordingSource,
+)
 from evaluation.study.tasks.task import NamedDrive
 
 # The names of drives that state map and stage, the first ones as those of NCLT,
@@ -88,7 +91,7 @@ Recordings = tuple[RecordingInfo, RecordingInfo]
 
 
 @dataclass(frozen=True)
-class City:
+class MapDrives:
     """The drives through one map.
 
     Attributes:
@@ -204,7 +207,7 @@ def find_recordings(
     return found
 
 
-def nothing_to_compare(cities: Iterable[City]) -> list[str]:
+def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
     """Returns a note for the user on each map with drives in one stage only."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
@@ -218,7 +221,7 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
     ]
 
 
-def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
+def drives_by_map(recordings: Iterable[RecordingInfo]) -> list[MapDrives]:
     """Groups recordings by map, and sorts the maps by name.
 
     Raises:
@@ -235,7 +238,7 @@ def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
             )
         paths[one.name] = one.path
     return [
-        _make_city(name, [r for r in recordings if r.map_name == name])
+        _drives_of_map(name, [r for r in recordings if r.map_name == name])
         for name in sorted({recording.map_name for recording in recordings})
     ]
 
@@ -347,7 +350,7 @@ def _place(
     )
 
 
-def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
+def _drives_of_map(name: str, recordings: list[RecordingInfo]) -> MapDrives:
     stages = {}
     stages_there = {recording.stage for recording in recordings}
     for stage in sorted(stages_there, key=natural_key):
@@ -362,4 +365,4 @@ def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
         stages[stage] = (named or candidates)[0]
     chosen = {recording.name for recording in stages.values()}
     others = tuple(r for r in recordings if r.name not in chosen)
-    return City(name, stages, others)
+    return MapDrives(name, stages, others)

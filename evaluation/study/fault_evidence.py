@@ -26,8 +26,8 @@ from evaluation.recognition.place_outcome import NEARLY, PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import KeptScans
 from evaluation.study.parts import Part
-from evaluation.study.surveys import KeptScans
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5

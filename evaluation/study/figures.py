@@ -21,12 +21,12 @@ from evaluation.report.page_data import (
     make_drive,
 )
 from evaluation.results.drawing import PIXELS
-from evaluation.study.collection import City, Recordings
+from evaluation.study.collection import MapDrives, Recordings
+from evaluation.study.feature_extraction import DriveSummary
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.recorded import ExtractionJobs
-from evaluation.study.surveys import (
+from evaluation.study.sources import (
     DriveSource,
-    DriveSummary,
     RecordingSource,
 )
 from evaluation.study.tasks.task import job_name
@@ -60,9 +60,9 @@ def draw_city(
     views = []
     routes = []
     drives = {}
-    for done, (name, surveyed, fine, source) in enumerate(stages):
+    for done, (name, summary, fine, source) in enumerate(stages):
         doing("drawing the maps", done, len(stages), "drives")
-        drive = surveyed.read()
+        drive = summary.read()
         view = figures.top_view(fine.read(), drive.positions)
         names.append(name)
         views.append(view)
@@ -108,7 +108,7 @@ def draw_stages(
     report: ChangeReport
     report, *controls = (part.read() for part in changes)
     read: list[DriveSummary] = [part.read() for part in drives]
-    earlier, later = (one.surveyed for one in read)
+    earlier, later = (one.drive_map for one in read)
     spread = spread_over_grids(earlier, later, report.change)
     report = replace(report, spread=spread)
     for control in controls:
@@ -126,24 +126,25 @@ def draw_stages(
 
 
 def drawing_job(
-    city: City, files: StudyFiles, planned: ExtractionJobs
+    city: MapDrives, files: StudyFiles, planned: ExtractionJobs
 ) -> tuple[Part, Job]:
     """Returns the job that draws a city, and the file of its result.
 
     Args:
         city: the city.
         files: files of the study.
-        planned: adds the surveys that are drawn.
+        planned: adds the features that are drawn.
     """
     needs: list[str] = []
-    surveys = [
-        (one, planned.survey(one.named, needs)) for one in city.stages.values()
+    features = [
+        (one, planned.features(one.named, needs))
+        for one in city.stages.values()
     ]
     stem = files.figures / routes_stem(city)
     part = files.part("pages", city.name)
     shown = tuple(
         (drive.stage, one.drive, one.fine, drive.source)
-        for drive, one in surveys
+        for drive, one in features
     )
     step = MakePart(
         part, draw_city, (city.name, shown, stem), figure_files(stem)
@@ -152,7 +153,7 @@ def drawing_job(
 
 
 def change_job(
-    city: City,
+    city: MapDrives,
     pair: Recordings,
     changes: tuple[Part, ...],
     files: StudyFiles,
@@ -166,10 +167,10 @@ def change_job(
         changes: files with the change of the pair, and with that of its
             control, if there is one; see `ChangeTask`.
         files: files of the study.
-        planned: adds the surveys that are drawn.
+        planned: adds the features that are drawn.
     """
     needs = [job_name(one) for one in changes]
-    surveys = [planned.survey(one.named, needs) for one in pair]
+    features = [planned.features(one.named, needs) for one in pair]
     earlier, later = pair
     stems = tuple(files.figures / name for name in change_stems(city, pair))
     part = files.part("changes", earlier.name, later.name)
@@ -180,8 +181,8 @@ def change_job(
             city.name,
             (earlier.stage, later.stage),
             changes,
-            (surveys[0].drive, surveys[1].drive),
-            (surveys[0].fine, surveys[1].fine),
+            (features[0].drive, features[1].drive),
+            (features[0].fine, features[1].fine),
             stems,
         ),
         figure_files(*stems),
@@ -199,7 +200,7 @@ def figure_files(*stems: Path) -> tuple[Path, ...]:
     )
 
 
-def routes_stem(city: City) -> str:
+def routes_stem(city: MapDrives) -> str:
     """Returns the file name of the figure with a city's routes.
 
     The name has no ending.
@@ -207,7 +208,7 @@ def routes_stem(city: City) -> str:
     return file_name(f"routes_{city.name}")
 
 
-def change_stems(city: City, pair: Recordings) -> tuple[str, str]:
+def change_stems(city: MapDrives, pair: Recordings) -> tuple[str, str]:
     """Returns the file names, without ending, of the two figures of a change.
 
     The first figure shows which points changed, the second figure the sets of
@@ -229,7 +230,7 @@ def change_stems(city: City, pair: Recordings) -> tuple[str, str]:
     return change, sets
 
 
-def curves_stem(city: City) -> str:
+def curves_stem(city: MapDrives) -> str:
     """Returns the file name of a city's figure of precision-recall curves.
 
     The name has no ending.
@@ -238,7 +239,7 @@ def curves_stem(city: City) -> str:
 
 
 def illustrations(
-    city: City, folder: Path, *, with_curves: bool
+    city: MapDrives, folder: Path, *, with_curves: bool
 ) -> list[Illustration]:
     """Returns the figures of a city, in the order of the report.
 

@@ -15,7 +15,7 @@ from evaluation.drives.sampling import gather
 from evaluation.methods.method import Method
 from evaluation.recognition.costs import query_ms
 from evaluation.recognition.description import (
-    DescribedDrive,
+    DriveDescriptors,
     Role,
     joined_scans,
 )
@@ -29,11 +29,9 @@ from evaluation.recognition.retrieval import (
 )
 from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import describe_recording
 from evaluation.study.parts import Part
-from evaluation.study.surveys import (
-    DriveSource,
-    describe_recording,
-)
+from evaluation.study.sources import DriveSource
 
 
 class Searched(NamedTuple):
@@ -47,7 +45,7 @@ class Searched(NamedTuple):
             through the query's world.
     """
 
-    described: DescribedDrive
+    described: DriveDescriptors
     drives: list[str]
     num_here: int
     rows: np.ndarray
@@ -256,8 +254,8 @@ def measure_places(
         def shown(
             radius: float,
             matches: np.ndarray,
-            mapped: DescribedDrive = mapped,
-            asked: DescribedDrive = asked,
+            mapped: DriveDescriptors = mapped,
+            asked: DriveDescriptors = asked,
         ) -> np.ndarray:
             if radius not in overlaps:
                 overlaps[radius] = best_overlaps(
@@ -290,7 +288,7 @@ def measure_places(
 def _compare(
     chosen: tuple[MethodChoice, Method],
     database: Searched,
-    query: DescribedDrive,
+    query: DriveDescriptors,
     asked: tuple[RetrievalProtocol, tuple[float, ...]],
     shown: Callable[[float, np.ndarray], np.ndarray | None],
     reporter: Reporter,
@@ -353,15 +351,15 @@ def _compare(
     return outcomes
 
 
-def _others(query: DescribedDrive, drives: Sequence[str]) -> np.ndarray:
+def _others(query: DriveDescriptors, drives: Sequence[str]) -> np.ndarray:
     """Returns (Q, D) bool, all places but that of the query's own scan."""
     return ~np.eye(len(query.queries.frames), len(drives), dtype=bool)
 
 
 def _takes_long(
     method: Method,
-    database: DescribedDrive,
-    query: DescribedDrive,
+    database: DriveDescriptors,
+    query: DriveDescriptors,
 ) -> bool:
     one_ms = query_ms(method, database.places, query)
     return one_ms * len(query.queries.frames) > _LONGEST_MS
@@ -373,7 +371,7 @@ def _describe(
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
     reporter: Reporter,
-) -> tuple[list[np.ndarray], Callable[[int], DescribedDrive]]:
+) -> tuple[list[np.ndarray], Callable[[int], DriveDescriptors]]:
     """Returns a drive's scans, and a function that returns its descriptions.
 
     The function takes the number of a method. Call it only once for each
@@ -389,7 +387,7 @@ def _describe(
 
 
 def crowded(
-    database: DescribedDrive,
+    database: DriveDescriptors,
     distractors: Sequence[Part],
     num_others: int,
     beside: Sequence[Part] = (),

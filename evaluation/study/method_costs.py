@@ -9,14 +9,14 @@ from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
-from evaluation.study.surveys import DriveSource
+from evaluation.study.sources import DriveSource
 from evaluation.study.tasks.place import measure_costs
 
 
 def measure_method_costs(
     reporter: Reporter,
     source: DriveSource,
-    surveyed: Part,
+    summary: Part,
     methods: tuple[MethodChoice, ...],
     described: tuple[tuple[Part, ...], tuple[Part, ...]],
     protocol: RetrievalProtocol,
@@ -29,7 +29,7 @@ def measure_method_costs(
     Args:
         reporter: reports progress.
         source: opens the query drive.
-        surveyed: file with the `DriveSummary` of the query drive, from which
+        summary: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
         methods: the methods.
         described: files with the descriptions of a database, and of the
@@ -38,7 +38,7 @@ def measure_method_costs(
     """
     searches = measure_costs(reporter, *described, (), 0, methods)
     drive = source()
-    known = surveyed.read()
+    known = summary.read()
     # A recording would be unpacked as a whole for its poses.
     drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
     costs = []

@@ -12,7 +12,7 @@ from typing import Any
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import Surveyed
+from evaluation.change.drive_change import DriveMap
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
@@ -36,12 +36,12 @@ class OpenSource:
         opened: the drive, or the path of a point cloud.
         columns: number of values per point in `.bin` files; by default guessed
             from the values.
-        surveyed: its map, if it was made already.
+        drive_map: its map, if it was made already.
     """
 
     opened: Drive | Path
     columns: int | None = None
-    surveyed: Surveyed | None = None
+    drive_map: DriveMap | None = None
 
     def __call__(self) -> Any:
         """Returns the open drive, or the path of the point cloud."""
@@ -69,8 +69,8 @@ class JobsAtOnce(Jobs):
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]
     ) -> Result:
-        if isinstance(drive.source, OpenSource) and drive.source.surveyed:
-            return Held(drive.source.surveyed)
+        if isinstance(drive.source, OpenSource) and drive.source.drive_map:
+            return Held(drive.source.drive_map)
         return super().mapped(drive, spacing, needs)
 
     def add(
@@ -178,14 +178,16 @@ def pair_of(
     return Pair(**{**values, **more})
 
 
-def pair_of_surveys(
-    both: tuple[Surveyed, Surveyed], names: tuple[str, str], **more: Any
+def pair_of_drive_maps(
+    both: tuple[DriveMap, DriveMap], names: tuple[str, str], **more: Any
 ) -> Pair:
     """Returns a pair of drives or map files whose voxel maps are known.
 
     The other arguments are those of `pair_of`.
     """
-    database, query = (OpenSource(Path(one.name), surveyed=one) for one in both)
+    database, query = (
+        OpenSource(Path(one.name), drive_map=one) for one in both
+    )
     drive = both[1].drive
     map_name = drive if isinstance(drive, Drive) else query.opened
     return pair_of(database, query, names, map_name=_map_of(map_name), **more)

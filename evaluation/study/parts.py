@@ -551,11 +551,12 @@ class FeatureFiles:
     def described(self, key: str) -> Part:
         """Returns the file with a method's descriptions of the drive.
 
-        The file contains a `PlacedDrive` and a `DescribedDrive`.
+        The file contains a `DriveNames` and a `DriveDescriptors`.
 
         Args:
             key: `MethodChoice.key` of the method. For descriptions by a second
-                protocol, what `evaluation.study.surveys.described_key` returns.
+                protocol, what `described_key` of
+                `evaluation.study.feature_extraction` returns.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
@@ -586,9 +587,9 @@ class StudyFiles:
         """The folder of all figures."""
         return self.output / "figures"
 
-    def survey(self, recording: str) -> FeatureFiles:
+    def features(self, recording: str) -> FeatureFiles:
         """Returns the files with a recording's map and descriptions."""
-        folder = self.output / "parts" / "surveys"
+        folder = self.output / "parts" / "features"
         return FeatureFiles(folder / file_name(recording))
 
     def part(self, kind: str, *names: str) -> Part:

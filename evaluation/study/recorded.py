@@ -12,10 +12,13 @@ from cns_drake.base.jobs.running import Job
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
-from evaluation.study.collection import City
+from evaluation.study.collection import MapDrives
+from evaluation.study.feature_extraction import (
+    FeatureExtraction,
+    Further,
+)
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import FeatureFiles
-from evaluation.study.surveys import FeatureExtraction, Further
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result
 
 # Expected seconds: for the maps of a drive of 3000 scans, and for its places or
@@ -42,7 +45,7 @@ class RecordedCondition(NamedTuple):
 
 
 def recorded_comparisons(
-    city: City,
+    city: MapDrives,
     conditions: Iterable[RecordedCondition],
     seed: int,
     on_note: Callable[[str], None],
@@ -98,9 +101,9 @@ def recorded_comparisons(
 class ExtractionJobs(Jobs):
     """Jobs of a study that read each drive once.
 
-    One job surveys a drive: it maps the drive, describes its places and its
-    queries by all methods, and keeps their scans. If pairs describe drives by
-    several protocols, this is so for the first one only.
+    One job extracts the features of a drive: it maps the drive, describes its
+    places and its queries by all methods, and keeps their scans. If pairs
+    describe drives by several protocols, this is so for the first one only.
 
     Attributes:
         with_map: whether a map is made.
@@ -109,7 +112,7 @@ class ExtractionJobs(Jobs):
 
     with_map: bool = True
     further: Mapping[str, tuple[Further, ...]] = field(default_factory=dict)
-    # Drive -> its roles. They are known before the first survey is added.
+    # Drive -> its roles. They are known before the first job is added.
     _roles: dict[str, set[Role]] = field(default_factory=dict)
     _protocol: RetrievalProtocol | None = None
 
@@ -118,7 +121,7 @@ class ExtractionJobs(Jobs):
         if self._protocol is None:
             self._protocol = pair.protocol
         for drive, role in pair.roles:
-            if self._is_surveyed(pair.protocol):
+            if self._is_extracted(pair.protocol):
                 self._roles.setdefault(drive.name, set()).add(role)
 
     def described(
@@ -130,9 +133,9 @@ class ExtractionJobs(Jobs):
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        if not self._is_surveyed(protocol):
+        if not self._is_extracted(protocol):
             return super().described(drive, role, protocol, needs, kept=kept)
-        files = self.survey(drive, needs)
+        files = self.features(drive, needs)
         return (
             files.scans,
             *(files.described(one.key) for one in self.methods),
@@ -143,18 +146,18 @@ class ExtractionJobs(Jobs):
     ) -> Result:
         if spacing is not None:
             return super().mapped(drive, spacing, needs)
-        return self.survey(drive, needs).drive
+        return self.features(drive, needs).drive
 
-    def survey(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
-        """Returns the files of a drive's survey, and adds its job.
+    def features(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
+        """Returns the files of a drive's features, and adds their job.
 
         Args:
             drive: the drive.
             needs: list to which the name of the job is appended.
         """
-        name = f"survey {drive.name}"
+        name = f"features of {drive.name}"
         needs.append(name)
-        files = self.files.survey(drive.name)
+        files = self.files.features(drive.name)
         if name not in self.jobs:
             roles = frozenset(self._roles.get(drive.name, ()))
             step = FeatureExtraction(
@@ -172,7 +175,7 @@ class ExtractionJobs(Jobs):
             self.jobs[name] = Job(name, step, drive.needs, cost)
         return files
 
-    def _is_surveyed(self, protocol: RetrievalProtocol) -> bool:
-        """Returns whether surveys describe queries and places by a protocol."""
+    def _is_extracted(self, protocol: RetrievalProtocol) -> bool:
+        """Returns whether these jobs describe drives by a protocol."""
         assert self._protocol is not None
         return protocol.described() == self._protocol.described()

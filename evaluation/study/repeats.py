@@ -9,9 +9,9 @@ from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import described_key
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import StudyFiles
-from evaluation.study.surveys import described_key
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
 
 
@@ -61,7 +61,7 @@ class Repeat:
 
 @dataclass
 class _RepeatJobs(Jobs):
-    """Jobs that read descriptions, which surveys of the first runs make.
+    """Jobs that read descriptions, which jobs of the first runs make.
 
     The overlaps of queries with their matches stay unknown.
     """
@@ -79,8 +79,8 @@ class _RepeatJobs(Jobs):
         kept: bool = False,
     ) -> DescribedSource:
         assert self.repeat is not None
-        needs.append(f"survey {drive.name}")
-        files = self.files.survey(drive.name)
+        needs.append(f"features of {drive.name}")
+        files = self.files.features(drive.name)
         return files.scans, files.described(self.repeat.described(role))
 
 

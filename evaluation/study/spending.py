@@ -10,8 +10,8 @@ from pathlib import Path
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Steps
+from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.surveys import FeatureExtraction
 
 
 def spend(jobs: Iterable[Job]) -> None:
@@ -39,7 +39,7 @@ def restore(jobs: Collection[Job]) -> None:
     ):
         return
     names = {job.name for job in jobs}
-    # Files that will be written, and folders of surveys of new recordings.
+    # Files that will be written, and folders of features of new recordings.
     stale: set[Path] = set()
     needed: list[Part] = []
     for job in jobs:

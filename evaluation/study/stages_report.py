@@ -24,15 +24,16 @@ from evaluation.results.table import LAST, OWN, STAGE, Results
 from evaluation.study import figures
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
-    City,
+    MapDrives,
     RecordingInfo,
     Recordings,
+    drives_by_map,
     find_recordings,
-    group_cities,
     nothing_to_compare,
 )
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.fault_evidence import explain_faults
+from evaluation.study.feature_extraction import Further
 from evaluation.study.method_costs import measure_method_costs
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.recorded import (
@@ -42,7 +43,6 @@ from evaluation.study.recorded import (
 )
 from evaluation.study.repeats import Repeat, repeats_of
 from evaluation.study.spending import restore, spend
-from evaluation.study.surveys import Further
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Pair, Result, Task
@@ -89,13 +89,13 @@ class StagesReport:
     reference: Reference = NO_REFERENCE
 
     @cached_property
-    def cities(self) -> list[City]:
+    def cities(self) -> list[MapDrives]:
         """The recordings of the study, grouped by map.
 
         Raises:
             InputError: two recordings have the same map and stage.
         """
-        return group_cities(self.recordings)
+        return drives_by_map(self.recordings)
 
     @cached_property
     def engine(self) -> Engine:
@@ -157,10 +157,10 @@ class StagesReport:
 
     def _cost_job(self, pair: Recordings, needs: tuple[str, ...]) -> Job:
         """Returns the job that measures costs, after all other jobs."""
-        places, queries = (self.files.survey(one.name) for one in pair)
+        places, queries = (self.files.features(one.name) for one in pair)
         described = tuple(
-            tuple(survey.described(one.key) for one in self.methods)
-            for survey in (places, queries)
+            tuple(files.described(one.key) for one in self.methods)
+            for files in (places, queries)
         )
         source = pair[1].source
         drive = queries.drive
@@ -263,7 +263,7 @@ class _CityReport:
             draw, explain wrong answers and repeat published runs.
     """
 
-    def __init__(self, study: StagesReport, city: City):
+    def __init__(self, study: StagesReport, city: MapDrives):
         """Adds the pairs of the city to the engine of the study."""
         self._study = study
         self._city = city
@@ -361,12 +361,12 @@ class _CityReport:
         """Returns the job that finds out why answers of a pair are wrong."""
         own = self._own(pair)
         assert own is not None
-        surveys = [self._files.survey(one.name) for one in pair]
+        features = [self._files.features(one.name) for one in pair]
         step = MakePart(
             self._evidence(pair),
             explain_faults,
             (
-                (surveys[0].scans, surveys[1].scans),
+                (features[0].scans, features[1].scans),
                 self._study.methods,
                 own.parts["place"],
                 self._study.protocol,
@@ -436,9 +436,9 @@ class _CityReport:
             if control is not None:
                 drives |= {one.name for one, _ in control.roles}
             for name in sorted(drives - report.tracks.keys()):
-                survey = self._files.survey(name).drive.read()
+                drive = self._files.features(name).drive.read()
                 report.tracks[name] = result_tables.DriveTrack(
-                    survey.stamps_ns, survey.X_WS
+                    drive.stamps_ns, drive.X_WS
                 )
         if compared:
             stem = self._files.figures / figures.curves_stem(city)

@@ -17,7 +17,7 @@ from evaluation.drives.sampling import gather
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import make_method
 from evaluation.recognition.retrieval import retrieve
-from evaluation.study.surveys import MappedDrive
+from evaluation.study.feature_extraction import MappedDrive
 
 
 def measure(label: str, work: Callable, number: int = 1):

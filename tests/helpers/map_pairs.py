@@ -1,7 +1,7 @@
 """Two drives past walls, as sessions with labels by rays."""
 
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.map_truth import Survey
+from cns_drake.studies.map_truth import LabelledDrive
 from helpers.small_map import box_visual, world_text
 from helpers.tiny_drive import tiny_scenario
 
@@ -15,7 +15,7 @@ def wall_at(offset):
     return box_visual("wall/body", (0, 15.5 + offset, 3, 0, 0, 0), (30, 1, 6))
 
 
-def survey(folder, visuals, frames=40, **lidar):
+def labelled_drive(folder, visuals, frames=40, **lidar):
     """The drive of `tiny_scenario` in a world of these visuals, simulated."""
     folder.mkdir(parents=True)
     world = folder / "world.sdf"
@@ -29,4 +29,4 @@ def survey(folder, visuals, frames=40, **lidar):
         frames=frames,
     )
     simulated = SimulatedDrive(scenario)
-    return Survey(simulated, simulated, scenario)
+    return LabelledDrive(simulated, simulated, scenario)

@@ -12,7 +12,7 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from evaluation.change.drive_change import (
     ChangeReport,
-    Surveyed,
+    DriveMap,
     change_between,
     same_stage_partner,
     spread_over_grids,
@@ -68,9 +68,9 @@ def place_outcome(
 
 
 def compare_maps(
-    source: Surveyed,
-    target: Surveyed,
-    control: Surveyed | None = None,
+    source: DriveMap,
+    target: DriveMap,
+    control: DriveMap | None = None,
     grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> ChangeReport:
     """Returns the change between two maps A and B.

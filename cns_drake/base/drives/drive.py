@@ -301,7 +301,7 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 
 
 @dataclass(frozen=True)
-class PlacedDrive:
+class DriveNames:
     """Name, world frame and map of a drive, without its scans.
 
     Use this object instead of an open drive to check whether two drives have
@@ -314,7 +314,7 @@ class PlacedDrive:
     scenario: Mapping | None
 
     @classmethod
-    def of(cls, drive: Drive) -> PlacedDrive:
+    def of(cls, drive: Drive) -> DriveNames:
         """Returns the name, the world frame and the map of a drive."""
         scenario = drive.scenario
         if scenario is not None:
@@ -323,7 +323,7 @@ class PlacedDrive:
 
 
 # Drives, open or not, whose poses are in a named world frame.
-Placed = Drive | PlacedDrive
+Placed = Drive | DriveNames
 
 
 def check_same_world(

@@ -35,7 +35,7 @@ from cns_drake.imports.dressing.wall_panels import (
     find_panels,
     is_upright,
 )
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     ForeignCity,
@@ -151,7 +151,7 @@ class DriveViews:
 
     def __init__(
         self,
-        drives: Sequence[WaypointDrive],
+        drives: Sequence[WaypointRoute],
         ground: Ground,
         solids: np.ndarray,
     ):
@@ -280,7 +280,7 @@ class DressedBuildings:
 
 def dress_buildings(
     structures: Sequence[Imported],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
@@ -365,7 +365,7 @@ def _dressed(
 
 def _plans(
     bare: Sequence[Bare],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     streets: Sequence[Street],
     ground: Ground,
     views: DriveViews,
@@ -470,7 +470,7 @@ class Dressing:
 def dress_city(
     staged: StagedCity,
     city: ForeignCity,
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     ground: Ground,
     seed: int,
 ) -> Dressing:

@@ -18,7 +18,7 @@ from cns_drake.city.geometry import (
     looks_up,
     turned_up,
 )
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import flat_surface, joined, parts_of
 from cns_drake.imports.foreign_city import (
     Imported,
@@ -114,7 +114,7 @@ def _outer_edges(triangles: np.ndarray) -> np.ndarray:
 
 
 def near_drives(
-    structures: Sequence[Imported], drives: Sequence[WaypointDrive]
+    structures: Sequence[Imported], drives: Sequence[WaypointRoute]
 ) -> list[Imported]:
     """Returns the structures that are at most 80 m from a drive."""
     paths = MultiLineString([drive.path for drive in drives])
@@ -129,7 +129,7 @@ def near_drives(
 def missing_sidewalks(
     structures: Sequence[Imported],
     streets: Sequence[Street],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
 ) -> Iterator[Imported]:
     """Yields sidewalks for streets whose tags do not mention sidewalks.
 
@@ -215,7 +215,7 @@ _ABOVE = 0.02
 
 def guessed_streets(
     structures: Sequence[Imported],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     ground: Ground,
 ) -> Iterator[Imported]:
     """Yields structures for a carriageway and sidewalks along drives.
@@ -292,7 +292,7 @@ _SQUARE = 50.0
 
 
 def paved_gaps(
-    structures: Sequence[Imported], drives: Sequence[WaypointDrive]
+    structures: Sequence[Imported], drives: Sequence[WaypointRoute]
 ) -> Iterator[Imported]:
     """Yields additional sidewalks, which fill gaps beside existing ones.
 
@@ -391,7 +391,7 @@ _WHITE = Finish((0.86, 0.86, 0.84), "markings")
 
 
 def lane_marks(
-    streets: Sequence[Street], drives: Sequence[WaypointDrive]
+    streets: Sequence[Street], drives: Sequence[WaypointRoute]
 ) -> Iterator[Imported]:
     """Yields dashed lines in the middle of the larger streets near drives.
 

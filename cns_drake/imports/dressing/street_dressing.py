@@ -30,7 +30,7 @@ from cns_drake.city.geometry import (
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (
     Imported,
@@ -191,7 +191,7 @@ class StreetRoom:
     def __init__(
         self,
         structures: Sequence[Imported],
-        drives: Sequence[WaypointDrive],
+        drives: Sequence[WaypointRoute],
         ground: Ground,
         bottom: Sequence[Structure],
         found: StreetThings,
@@ -462,7 +462,7 @@ def dress_streets(
     structures: Sequence[Imported],
     things: Sequence[Thing],
     streets: Sequence[Street],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     ground: Ground,
     bottom: Sequence[Structure],
     seed: int,
@@ -510,7 +510,7 @@ def dress_streets(
 
 
 def _rows(
-    streets: Sequence[Street], drives: Sequence[WaypointDrive]
+    streets: Sequence[Street], drives: Sequence[WaypointRoute]
 ) -> Iterator[Row]:
     """Yields the streets; without streets, drives as middles of streets."""
     for street in streets:

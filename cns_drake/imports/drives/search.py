@@ -78,8 +78,8 @@ _MOST_REACHED = 400_000
 
 
 @dataclass(frozen=True)
-class WaypointDrive:
-    """A drive through an imported city.
+class WaypointRoute:
+    """The route of a drive through an imported city.
 
     Attributes:
         waypoints: (N, 2) or (N, 3) places through which the car drives [m].
@@ -99,7 +99,7 @@ class WaypointDrive:
 
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
-) -> WaypointDrive | Obstacle:
+) -> WaypointRoute | Obstacle:
     """Returns the drive along waypoints, or the place (2,) where it fails.
 
     A drive fails at an obstacle, or at a bend that is too tight for the car. If
@@ -127,7 +127,7 @@ def steerable_drive(
     missing = None if room is None else room(driven)
     if missing is not None:
         return missing
-    drive = WaypointDrive(waypoints, points)
+    drive = WaypointRoute(waypoints, points)
     return drive if drive.length >= SHORTEST else points[len(points) // 2]
 
 
@@ -219,7 +219,7 @@ class WayGraph(ABC):
         """
 
     @abstractmethod
-    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         """Returns the drive along a way, or the place (2,) where it fails [m].
 
         A drive fails at an obstacle or a bend that is too tight, see
@@ -266,7 +266,7 @@ class WayGraph(ABC):
         return coo_array((costs[kept], pairs), size).tocsr()
 
 
-def find_drives(graph: WayGraph) -> list[WaypointDrive]:
+def find_drives(graph: WayGraph) -> list[WaypointRoute]:
     """Returns two drives that share a part of their paths, if there are any.
 
     If no second drive is found, the list has one drive; if no drive is found,
@@ -277,14 +277,14 @@ def find_drives(graph: WayGraph) -> list[WaypointDrive]:
         if graph.length(way) < SHORTEST:
             return []
         first = graph.drive(way)
-        if isinstance(first, WaypointDrive):
+        if isinstance(first, WaypointRoute):
             break
         graph.is_open[graph.blocked(way, first)] = False
     else:
         return []
     for candidate in islice(_seconds(graph, way), _MOST_TRIES):
         second = graph.drive(candidate)
-        if isinstance(second, WaypointDrive):
+        if isinstance(second, WaypointRoute):
             return [first, second]
     return [first]
 
@@ -562,7 +562,7 @@ class CellGraph(WayGraph):
     def is_simple(self, way: Sequence[int]) -> bool:
         return len(set(way)) == len(way)
 
-    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         return simplified_drive(self._xy[list(way)], self._space)
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
@@ -575,7 +575,7 @@ def simplified_drive(
     xy: np.ndarray,
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
-) -> WaypointDrive | Obstacle:
+) -> WaypointRoute | Obstacle:
     """Returns a drive with few waypoints along a line, if one is possible.
 
     The tolerances are tried one after the other, until a drive stays in the
@@ -588,7 +588,7 @@ def simplified_drive(
         space: the free space.
         tolerances: distances by which the drive may deviate from the line [m].
     """
-    found: WaypointDrive | Obstacle = xy[len(xy) // 2]
+    found: WaypointRoute | Obstacle = xy[len(xy) // 2]
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
         if len(xy) < 4 * straightened:
             break
@@ -600,7 +600,7 @@ def simplified_drive(
         found = steerable_drive(
             _densified(np.array(line.coords)), space.obstacle
         )
-        if isinstance(found, WaypointDrive):
+        if isinstance(found, WaypointRoute):
             break
     return found
 
@@ -651,7 +651,7 @@ class StreetGraph(WayGraph):
         passed = [lane.begin for lane in lanes] + [lanes[-1].end]
         return len(set(passed)) == len(passed)
 
-    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         rows = lane_path([self.lanes[k] for k in way], _LANE_SPACING)
         middle = uniform_filter1d(
             rows[:, :2], _CORNER_WINDOW, axis=0, mode="nearest"
@@ -663,13 +663,13 @@ class StreetGraph(WayGraph):
         reach = int(_TURN_REACH / _LANE_SPACING)
         near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
         right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
-        found: WaypointDrive | Obstacle = middle[len(middle) // 2]
+        found: WaypointRoute | Obstacle = middle[len(middle) // 2]
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
             aside = rows[:, 2] * np.where(near, share, 1.0)
             aside = uniform_filter1d(aside, _OFFSET_WINDOW, mode="nearest")
             places = middle + aside[:, None] * right
             found = simplified_drive(places, self._space, (tolerance,))
-            if isinstance(found, WaypointDrive):
+            if isinstance(found, WaypointRoute):
                 break
         return found
 
@@ -684,10 +684,10 @@ class StreetGraph(WayGraph):
 
 
 def lifted(
-    drives: Iterable[WaypointDrive],
+    drives: Iterable[WaypointRoute],
     height: Callable[[np.ndarray], np.ndarray],
     faults: ImportFaults,
-) -> list[WaypointDrive]:
+) -> list[WaypointRoute]:
     """Returns drives whose waypoints have the heights of the ground.
 
     A drive that a car cannot steer on its slopes is left out and counted.
@@ -702,7 +702,7 @@ def lifted(
     for drive in drives:
         xy = np.round(drive.waypoints, 3)
         waypoints = np.column_stack([xy, height(xy)])
-        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointDrive):
+        if isinstance(steerable_drive(waypoints, margin=1.0), WaypointRoute):
             found.append(replace(drive, waypoints=waypoints))
         else:
             faults.add("drive too tight on its slope, left out", "drive")

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.angles import wrapped
 from cns_drake.imports.drives import search
-from cns_drake.imports.drives.search import Obstacle, WaypointDrive
+from cns_drake.imports.drives.search import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
@@ -105,15 +105,15 @@ class BandGraph(search.WayGraph):
             last = place
         return True
 
-    def drive(self, way: Sequence[int]) -> WaypointDrive | Obstacle:
+    def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         line = np.concatenate([self.lines[k] for k in way])
         points = search.evenly_spaced(_forwards(line), _SPACING)[
             : int(search.LONGEST / _SPACING) + 1
         ]
-        found: WaypointDrive | Obstacle = points[0, :2]
+        found: WaypointRoute | Obstacle = points[0, :2]
         for window in _SMOOTHING:
             found = search.steerable_drive(_smoothed(points, window))
-            if isinstance(found, WaypointDrive):
+            if isinstance(found, WaypointRoute):
                 some = [self.bands[k] for k in way]
                 return replace(found, limit=_usual_limit(some))
         return found
@@ -126,7 +126,7 @@ class BandGraph(search.WayGraph):
         return np.array([way[int(np.argmin(distances))]])
 
 
-def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointDrive]:
+def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointRoute]:
     """Returns two drives along lanes; a part of their paths is the same.
 
     The result is one drive or an empty list if no more drives are found.

@@ -33,7 +33,7 @@ from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
 from cns_drake.imports import map_files
 from cns_drake.imports.drives import search
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
 from cns_drake.imports.opendrive import imported_streets, lane_drives
@@ -389,7 +389,7 @@ class Town:
     city: City
     stages: Stages
     streets: ImportedStreets
-    drives: list[WaypointDrive]
+    drives: list[WaypointRoute]
     lanes: str | None
     kinds: dict[str, int]
     faults: ImportFaults
@@ -398,7 +398,7 @@ class Town:
 def build_town(
     source: Path,
     options: ImportOptions,
-    own: Sequence[WaypointDrive] | None = None,
+    own: Sequence[WaypointRoute] | None = None,
 ) -> Town:
     """Returns a town, built at random along the roads of an OpenDRIVE file.
 
@@ -428,7 +428,7 @@ def _build(
     roads: RoadMap,
     faults: ImportFaults,
     options: ImportOptions,
-    own: Sequence[WaypointDrive] | None,
+    own: Sequence[WaypointRoute] | None,
 ) -> Town:
     with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
@@ -528,7 +528,7 @@ def _build(
 
 def _near_drives(
     city: City,
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     distance: float,
     faults: ImportFaults,
 ) -> City:

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from cns_drake.base.angles import wrapped
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import (
     SHARPEST_TURN_DEG,
     Imported,
@@ -561,7 +561,7 @@ def lanes_of_streets(
     places: StreetPlaces,
     structures: Sequence[Imported],
     added: Sequence[Imported],
-    drives: Sequence[WaypointDrive],
+    drives: Sequence[WaypointRoute],
     drive_on: DriveOn,
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.

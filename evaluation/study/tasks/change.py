@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeReport, change_between
 from evaluation.recognition.place_outcome import Number
-from evaluation.study.surveys import DriveSummary
+from evaluation.study.feature_extraction import DriveSummary
 from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
 
 
@@ -65,11 +65,11 @@ def measure_change(
 
     Args:
         reporter: reports progress.
-        first, second: files with the maps of the two drives: the results of
-            `evaluation.study.surveys.map_city`, or a `DriveSummary`.
+        first, second: files with the maps of the two drives: a `DriveMap`, or a
+            `DriveSummary`.
     """
     maps = (part.read() for part in (first, second))
     a, b = (
-        one.surveyed if isinstance(one, DriveSummary) else one for one in maps
+        one.drive_map if isinstance(one, DriveSummary) else one for one in maps
     )
     return change_between(a, b)

@@ -15,7 +15,10 @@ from evaluation.localisation import estimators, localise, tracking
 from evaluation.localisation.localise import Starts
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.recognition.place_outcome import Number, kept_share
-from evaluation.study.surveys import DriveSource, JoinedSource
+from evaluation.study.sources import (
+    DriveSource,
+    JoinedSource,
+)
 from evaluation.study.tasks.task import (
     Answered,
     Jobs,

@@ -18,9 +18,13 @@ from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import FROZEN_REDRAW
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import (
+    FeatureExtraction,
+    map_source,
+)
 from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
-from evaluation.study.surveys import DriveSource, FeatureExtraction, map_city
+from evaluation.study.sources import DriveSource
 
 # Expected time to describe a drive by all methods [s].
 _DESCRIPTION_COST = 30.0
@@ -251,7 +255,7 @@ class Jobs:
         if not (kept or len(self._uses.get(name, ())) > 1):
             needs += drive.needs
             return drive.source
-        files = self.files.survey(name)
+        files = self.files.features(name)
         step = FeatureExtraction(
             drive.source,
             frozenset({role}),
@@ -285,7 +289,7 @@ class Jobs:
         needs.append(job_name(part))
         cost = _MAP_COST if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
-        return self.add(part, map_city, arguments, drive.needs, cost)
+        return self.add(part, map_source, arguments, drive.needs, cost)
 
     def beside(self, pair: Pair, needs: list[str]) -> list[tuple[Part, ...]]:
         """Returns the files of a pair's further drives in the same world.

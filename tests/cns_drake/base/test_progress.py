@@ -197,7 +197,7 @@ def test_a_log_that_takes_no_text(clock):
 @pytest.mark.parametrize("width", [30, 60, 80, 200])
 def test_a_line_for_all_jobs_and_one_for_each(clock, screen, width):
     screen.width = width
-    names = ["survey metropolis_01_stage_04", "metropolis 01 > 04, ring++"]
+    names = ["features of metropolis_01_stage_04", "metropolis 01 > 04, ring++"]
     with screen.jobs(dict.fromkeys([*names, "short"], 1.0), 0, "jobs") as jobs:
         for name in (*names, "short"):
             jobs.start(name)

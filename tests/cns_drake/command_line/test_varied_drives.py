@@ -10,7 +10,7 @@ import yaml
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from cns_drake.studies import recording
-from evaluation.change.drive_change import survey
+from evaluation.change.drive_change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.protocol import FAIR_PROTOCOL
@@ -72,7 +72,7 @@ def test_simulated_and_recorded_drives_agree(tmp_path, monkeypatch):
     ):
         here = results.where(**{"database.missing": part, "gate": False})
         change = compare_maps(
-            survey(recorded / member), survey(recorded / "town_02")
+            read_map(recorded / member), read_map(recorded / "town_02")
         )
         (found,) = here.where(metric="tcr_sym").rows
         assert found.value == pytest.approx(change.change.symmetric, abs=1e-9)

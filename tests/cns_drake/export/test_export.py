@@ -21,7 +21,7 @@ from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.base.progress import Listener, heard_by
 from cns_drake.export.exporting import export_drive
 from evaluation import drives
-from evaluation.study.collection import find_recordings, group_cities
+from evaluation.study.collection import drives_by_map, find_recordings
 
 
 @pytest.fixture(scope="module")
@@ -413,7 +413,7 @@ def test_a_report_finds_exports(tmp_path, format_name, depth):
         )
         export_drive(recording, format_name, tmp_path / "in" / depth)
     (tmp_path / "in" / "notes").mkdir()
-    (city,) = group_cities(find_recordings(tmp_path / "in"))
+    (city,) = drives_by_map(find_recordings(tmp_path / "in"))
     assert city.name == "town"
     assert {stage: one.name for stage, one in city.stages.items()} == {
         "s1": "town_01",

@@ -7,7 +7,7 @@ import pytest
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.imports.dressing.dressed_city import dress_buildings, dress_city
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.options import ImportOptions
@@ -25,7 +25,7 @@ def shops(tmp_path):
     line = city.streets[0].line
     x = np.linspace(line[0, 0], line[-1, 0], 81)
     path = np.column_stack([x, np.full(81, line[0, 1])])
-    return city, WaypointDrive(path, path)
+    return city, WaypointRoute(path, path)
 
 
 def low_floors(structures):

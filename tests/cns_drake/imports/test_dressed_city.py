@@ -31,7 +31,7 @@ from cns_drake.imports.dressing.styles import (
     tagged_finish,
 )
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
@@ -67,7 +67,7 @@ def surfaces(one):
 
 
 def dressed(city, path=STREET, seed=0):
-    drives = [WaypointDrive(path, path)]
+    drives = [WaypointRoute(path, path)]
     ground = ground_of(city.structures)
     result = dress_buildings(city.structures, drives, (), ground, seed)
     names = {one.structure.name: one for one in result.buildings}
@@ -235,7 +235,7 @@ def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     city = type(row)(row.structures, row.origin, "", ImportFaults())
     staged, changes = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
     assert changes["part_of_height"]
-    drives = [WaypointDrive(STREET, STREET)]
+    drives = [WaypointRoute(STREET, STREET)]
     ground = ground_of(staged.kept)
     found = dress_buildings(staged.kept, drives, (), ground, 0)
     new = {o.structure.name: o for o in found.buildings.values()}
@@ -278,7 +278,7 @@ def test_a_house_behind_one_that_always_stands_has_no_windows(
     always = city.structures if is_lasting else city.structures[1:]
     result = dress_buildings(
         city.structures,
-        [WaypointDrive(path, path)],
+        [WaypointRoute(path, path)],
         (),
         ground_of(city.structures),
         0,

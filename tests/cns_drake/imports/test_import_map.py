@@ -18,7 +18,7 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.map_files import draw_overview
@@ -250,7 +250,7 @@ def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
         "house", "building", "Building", {"all": triangle}, {}
     )
     way = np.column_stack([np.linspace(-10.0, 50.0, 31), np.full(31, 30.0)])
-    drives = [WaypointDrive(way[k : k + 20], way[k : k + 20]) for k in (0, 11)]
+    drives = [WaypointRoute(way[k : k + 20], way[k : k + 20]) for k in (0, 11)]
     path = tmp_path / "from_above.png"
     draw_overview(path, [house], None, drives)
     pixels = np.round(255 * imread(path)[:, :, :3]).astype(int)

@@ -24,7 +24,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import ground_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.map_files import REPORT_NAME
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
@@ -378,7 +378,7 @@ def test_options_of_other_formats(source, tmp_path, option, value):
 @pytest.mark.slow
 def test_a_drive_of_ones_own_through_what_stands_near(source, town):
     xy = np.array([[20.0, -1.75], [60.0, -1.75], [100.0, -1.75]])
-    own = WaypointDrive(xy, xy)
+    own = WaypointRoute(xy, xy)
     options = ImportOptions(seed=1, within=40.0, grow=0.8)
     near = build_town(source, options, [own])
     (drive,) = near.drives

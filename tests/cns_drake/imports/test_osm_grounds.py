@@ -6,7 +6,7 @@ import pytest
 
 from cns_drake.imports.dressing.grounds import lane_marks
 from cns_drake.imports.dressing.street_dressing import may_park_on
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import Street
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 
@@ -208,13 +208,13 @@ def test_marks_lie_on_the_middle_and_end_before_junctions():
         Street(side, (2, 4), True, True, 2.0, 8.0, "side", {}),
     ]
     path = np.column_stack([np.linspace(0, 100, 30), np.full(30, -2.0)])
-    (marks,) = lane_marks(streets, [WaypointDrive(path, path)])
+    (marks,) = lane_marks(streets, [WaypointRoute(path, path)])
     x, y = marks.triangles[:, :, 0], marks.triangles[:, :, 1]
     assert np.abs(y).max() == pytest.approx(0.06)
     # Half of the street, 4 m before the junction, and half a dash.
     assert np.abs(x - 50.0).min() > 4.0 + 4.0 - 1.5 - 1e-9
     assert area(marks) == pytest.approx(len(x) / 2 * 3.0 * 0.12)
-    (free,) = lane_marks(streets[:1], [WaypointDrive(path, path)])
+    (free,) = lane_marks(streets[:1], [WaypointRoute(path, path)])
     assert len(free.triangles) > len(marks.triangles)
     far = path + np.array([0.0, 500.0])
-    assert not list(lane_marks(streets, [WaypointDrive(far, far)]))
+    assert not list(lane_marks(streets, [WaypointRoute(far, far)]))

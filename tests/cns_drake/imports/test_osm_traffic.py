@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
@@ -59,7 +59,7 @@ ROUTE = np.array([(-86, -71.7), (0, -71.7), (86, -71.7)])
 
 def lanes_of(path, tmp_path, side="right", added=()):
     city = import_openstreetmap(path, None)
-    drive = WaypointDrive(ROUTE, ROUTE)
+    drive = WaypointRoute(ROUTE, ROUTE)
     text = lanes_of_streets(
         city.streets,
         city.street_places,
@@ -297,7 +297,7 @@ def test_no_lane_without_a_round_trip(tmp_path):
 
 def test_no_lanes_without_streets_near_the_drives(tmp_path):
     city = import_openstreetmap(write_blocks(tmp_path / "a.osm"), None)
-    drive = WaypointDrive(ROUTE + 5000.0, ROUTE + 5000.0)
+    drive = WaypointRoute(ROUTE + 5000.0, ROUTE + 5000.0)
     for streets in ((), city.streets):
         found = lanes_of_streets(
             streets,

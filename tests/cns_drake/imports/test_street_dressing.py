@@ -22,7 +22,7 @@ from cns_drake.imports.dressing.grounds import (
     with_kerb,
 )
 from cns_drake.imports.dressing.street_dressing import dress_streets
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import bottom_of, ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap, object_of
 from cns_drake.imports.options import ImportOptions
@@ -52,7 +52,7 @@ def origin(city):
 def drive_of(city, y=2.25):
     x = np.linspace(-95, 95, 96)
     path = np.column_stack([x, np.full(96, y)]) + origin(city)
-    return WaypointDrive(path, path)
+    return WaypointRoute(path, path)
 
 
 def dressed(city, seed=0):

@@ -9,7 +9,7 @@ from shapely.geometry import LineString, box
 
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing.grounds import guessed_streets, paved_gaps
-from cns_drake.imports.drives.search import WaypointDrive
+from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 
@@ -17,7 +17,7 @@ from cns_drake.imports.openstreetmap.city import import_openstreetmap
 def straight_drive(y=0.0, start=-80.0, end=70.0):
     x = np.linspace(start, end, 81)
     path = np.column_stack([x, np.full(81, y)])
-    return WaypointDrive(path, path)
+    return WaypointRoute(path, path)
 
 
 def outline(one):
@@ -40,7 +40,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive().path + origin
-    found = list(paved_gaps(city.structures, [WaypointDrive(path, path)]))
+    found = list(paved_gaps(city.structures, [WaypointRoute(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     # The other walk is 4.5 m away from the carriageway.
@@ -58,7 +58,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
         assert one.structure.semantic_class == "sidewalk"
         np.testing.assert_allclose(one.triangles[..., 2], 0.12)
     far = path + np.array([0.0, 500.0])
-    assert not list(paved_gaps(city.structures, [WaypointDrive(far, far)]))
+    assert not list(paved_gaps(city.structures, [WaypointRoute(far, far)]))
 
 
 @pytest.mark.parametrize(("gap", "is_paved"), [(0.15, True), (0.06, False)])
@@ -72,7 +72,7 @@ def test_joints_of_walks_are_paved(tmp_path, gap, is_paved):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive(start=-50.0, end=50.0).path + origin
-    found = list(paved_gaps(city.structures, [WaypointDrive(path, path)]))
+    found = list(paved_gaps(city.structures, [WaypointRoute(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     joint = box(-55, 9.0, 55, 9.0 + gap)
@@ -108,7 +108,7 @@ def test_streets_are_laid_on_the_ground_below_drives(tmp_path, has_terrain):
     made = list(
         guessed_streets(
             found.structures,
-            [WaypointDrive(path, path)],
+            [WaypointRoute(path, path)],
             ground_of(found.structures),
         )
     )

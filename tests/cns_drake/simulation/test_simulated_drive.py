@@ -12,7 +12,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.simulation.simulation import simulate
 from evaluation.drives import open_drive
-from evaluation.study.surveys import survey_recording
+from evaluation.study.feature_extraction import extract_features
 
 
 def check_same(simulated, recorded, frames):
@@ -39,7 +39,7 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
     ]
     # All maps of these scans are equal as well.
     ours, theirs = (
-        survey_recording(s, set(), {}) for s in (source(), recorded)
+        extract_features(s, set(), {}) for s in (source(), recorded)
     )
     np.testing.assert_array_equal(ours.fine, theirs.fine)
     np.testing.assert_array_equal(

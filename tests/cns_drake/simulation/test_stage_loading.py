@@ -53,7 +53,7 @@ def test_a_neutral_section_records_the_same_bytes(scenario, tmp_path):
 
 
 @pytest.mark.slow
-def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
+def test_recordings_and_simulations_see_the_same_changes(scenario, tmp_path):
     """The same bytes twice, and the table of structures has the causes."""
     changed = scenario.with_transient(parked_cars=1.0, leaves=0.3)
     for name in ("first", "second"):
@@ -61,11 +61,11 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
     first, second = (recorded(tmp_path / n) for n in ("first", "second"))
     assert first.read_bytes() == second.read_bytes()
     recording = McapDrive(first, None)
-    survey = SimulatedDrive(changed)
+    read = SimulatedDrive(changed)
     plain = SimulatedDrive(scenario)
     for index in range(3):
         scan = recording.scan(index)
-        assert np.array_equal(scan, survey.scan(index))
+        assert np.array_equal(scan, read.scan(index))
         assert not np.array_equal(scan, plain.scan(index))
     with first.open("rb") as stream:
         table = next(

@@ -30,7 +30,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import recording, redrawing
 from cns_drake.studies.recording import is_recorded, record_all
-from evaluation.change.drive_change import survey
+from evaluation.change.drive_change import read_map
 from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow
@@ -217,9 +217,11 @@ def test_drives_of_experiments_share_other_cities(
 
     # Each city is another place.
     with pytest.raises(InputError, match=r"through town\w*8\w*, .* town\w*7"):
-        compare_maps(survey(query), survey(other))
+        compare_maps(read_map(query), read_map(other))
     changes = {
-        path.name: compare_maps(survey(path), survey(query)).change.symmetric
+        path.name: compare_maps(
+            read_map(path), read_map(query)
+        ).change.symmetric
         for path in databases
     }
     assert changes[names[0]] == 0.0  # The very same drive.

@@ -17,7 +17,7 @@ from evaluation.localisation.localise import (
     localise,
     summary,
 )
-from evaluation.study.surveys import RecordingSource
+from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
 
 STARTS = (Starts(0.5, 5.0), Starts(2.0, 10.0))

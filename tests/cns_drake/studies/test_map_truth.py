@@ -5,7 +5,7 @@ import shutil
 
 from helpers import eval_program
 from helpers.eval_program import run_program
-from helpers.map_pairs import GROUND, WALL, survey, wall_at
+from helpers.map_pairs import GROUND, WALL, labelled_drive, wall_at
 from helpers.small_map import box_visual, scenario_values
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ from cns_drake.studies.map_task import TRUTH, measure_maps
 from cns_drake.studies.map_truth import (
     NEAR,
     is_there,
-    open_survey,
-    simulate_survey,
+    open_labelled,
+    simulate_labelled,
     write_truth,
 )
 from evaluation.map_update.scores import Labels, score
@@ -36,12 +36,12 @@ SCREEN = box_visual("screen/body", (-6, 14, 5, 0, 0, 0), (40, 0.2, 12))
 
 def label(tmp_path, before, after, **options):
     """Returns the pair of two worlds, and the true labels of both maps."""
-    surveys = [
-        survey(tmp_path / name, visuals, **options)
+    labelled = [
+        labelled_drive(tmp_path / name, visuals, **options)
         for name, visuals in (("before", before), ("after", after))
     ]
     output = tmp_path / "truth"
-    write_truth(*surveys, output)
+    write_truth(*labelled, output)
     pair = read_pair(output)
     return pair, Labels(*read_truth(pair))
 
@@ -161,7 +161,7 @@ def test_labels_are_those_of_another_caster_but_at_edges(tmp_path):
         for name, found in boxes.items()
     }
     pair, truth = label(tmp_path, visuals["before"], visuals["after"])
-    other = survey(tmp_path / "again", visuals["after"])
+    other = labelled_drive(tmp_path / "again", visuals["after"])
     scene = open3d.t.geometry.RaycastingScene()
     for x, y, z, *size in [*boxes["after"], (0, 0, -0.5, 200, 200, 1)]:
         mesh = open3d.geometry.TriangleMesh.create_box(*size)
@@ -239,25 +239,25 @@ def test_an_aged_city_has_another_name(small_map, tmp_path):
         drives.append(SimulationSource(make_scenario(values, name)))
     scores = measure_maps(Reporter(), *drives, (TRUTH,), 1.0)
     assert scores[TRUTH].scores["miou"] == 1.0
-    surveys = [simulate_survey(drive.scenario) for drive in drives]
+    labelled = [simulate_labelled(drive.scenario) for drive in drives]
     with pytest.raises(InputError, match="through small_s1"):
-        write_truth(*surveys, tmp_path / "out")
+        write_truth(*labelled, tmp_path / "out")
 
 
 @pytest.mark.slow
 def test_two_worlds_and_changed_worlds_are_refused(
     short_recording, tmp_path, small_map
 ):
-    other = survey(tmp_path / "elsewhere", [GROUND])
+    other = labelled_drive(tmp_path / "elsewhere", [GROUND])
     with pytest.raises(InputError, match="elsewhere"):
-        write_truth(open_survey(short_recording), other, tmp_path / "out")
+        write_truth(open_labelled(short_recording), other, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     table = small_map / "structures.csv"
     text = table.read_text()
     try:
         table.write_text(text.replace("tower_000", "tower_900"))
         with pytest.raises(InputError, match="has changed since"):
-            open_survey(short_recording)
+            open_labelled(short_recording)
     finally:
         table.write_text(text)
 
@@ -270,7 +270,7 @@ def test_small_parts_are_there(tmp_path):
         )
         for k in range(9)
     ]
-    scene = survey(tmp_path / "w", [GROUND, *poles]).still()
+    scene = labelled_drive(tmp_path / "w", [GROUND, *poles]).still()
     rng = np.random.default_rng(8)
     k = rng.integers(0, 9, 4000)
     # In the axes of a pole.
@@ -295,7 +295,7 @@ def test_files_beside_a_recording_may_be_those_of_another(
     # The folder has moved, not the map.
     values["map"] = str((short_recording / values["map"]).resolve())
     file.write_text(yaml.safe_dump(values))
-    open_survey(folder)
+    open_labelled(folder)
     (lidar,) = values["lidars"]
     for change, field in (
         ({"seed": 77}, "seed"),
@@ -304,4 +304,4 @@ def test_files_beside_a_recording_may_be_those_of_another(
     ):
         file.write_text(yaml.safe_dump(values | change))
         with pytest.raises(InputError, match=f"{field}: .* of another drive"):
-            open_survey(folder)
+            open_labelled(folder)

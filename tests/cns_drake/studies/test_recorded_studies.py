@@ -11,7 +11,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment
 from cns_drake.studies.study import run_study
-from evaluation.change.drive_change import survey
+from evaluation.change.drive_change import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -78,7 +78,7 @@ def test_the_numbers_are_those_of_the_single_commands(folder, tmp_path):
             protocol=FAIR_PROTOCOL,
         ).by_mode["all"]
         assert found[stage]["auc"] == pytest.approx(alone.auc, abs=1e-9)
-        change = compare_maps(survey(folder / name), survey(query)).change
+        change = compare_maps(read_map(folder / name), read_map(query)).change
         assert values(results, **here, task="change")["tcr_sym"] == (
             pytest.approx(change.symmetric, abs=1e-9)
         )
@@ -205,7 +205,7 @@ def test_a_folder_given_twice(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_recording_is_surveyed_once_and_its_descriptions_are_removed(
+def test_a_recording_is_read_once_and_its_descriptions_are_removed(
     folder, tmp_path
 ):
     """They are made again for a further method, as in a study of its own."""
@@ -218,11 +218,11 @@ def test_a_recording_is_surveyed_once_and_its_descriptions_are_removed(
     whole = measure(tmp_path / "whole", folder, **{**fields, "methods": both})
     measure(tmp_path / "later", folder, **fields)
     parts = tmp_path / "later" / "parts"
-    surveys = sorted(path.name for path in (parts / "surveys").iterdir())
-    assert surveys == sorted(path.name for path in folder.iterdir())
+    features = sorted(path.name for path in (parts / "features").iterdir())
+    assert features == sorted(path.name for path in folder.iterdir())
     assert not (parts / "mapped").exists()
     described = list(parts.rglob("described_*.data"))
-    assert len(described) == len(surveys)
+    assert len(described) == len(features)
     for path in described:
         with pytest.raises(InputError, match="its value was removed"):
             Part(path).read()
@@ -235,7 +235,7 @@ def test_a_recording_is_surveyed_once_and_its_descriptions_are_removed(
 
 
 def test_drives_are_read_anew_for_another_protocol(folder, tmp_path):
-    """Surveys describe by the first protocol; results are those of each."""
+    """Jobs describe by the first protocol; results are those of each."""
     spacings = [10.0, 20.0]
     fields = {"protocol": {"base": "recorded", "query_spacing": spacings}}
     found = measure(tmp_path, folder, tasks=["place"], **fields)

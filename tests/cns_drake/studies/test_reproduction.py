@@ -21,7 +21,7 @@ from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import control_drives, recording_info
 from evaluation.methods import method
 from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study.collection import find_recordings, group_cities
+from evaluation.study.collection import drives_by_map, find_recordings
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +79,7 @@ def test_planned_files_are_the_written_ones(drives, tmp_path):
         )
         assert one.source == other.source
     for recordings in (expected, found.values()):
-        (city,) = group_cities(recordings)
+        (city,) = drives_by_map(recordings)
         (pair,) = city.change_pairs()
         assert [one.name for one in pair] == ["town_01", "town_04"]
         database, _ = city.unchanged_pair(*pair)
@@ -100,7 +100,7 @@ def test_everything_is_planned_before_anything_runs(
     assert recordings.keys() == names
     for name in names:
         assert jobs[name].needs == ()
-        assert jobs[f"survey {name}"].needs == (name,)
+        assert jobs[f"features of {name}"].needs == (name,)
     assert "picture town drives" in jobs
     assert "explain town_01 > town_04" in jobs
     for job in jobs.values():
@@ -118,8 +118,8 @@ def test_everything_is_planned_before_anything_runs(
     assert names & planned[1].keys() == {"town_04"}
     assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}
     # Nothing waits for a page.
-    assert planned[1]["survey town_04"].needs == ()
-    assert planned[1]["survey town_01"].needs == ()
+    assert planned[1]["features of town_04"].needs == ()
+    assert planned[1]["features of town_01"].needs == ()
     reproduction.reproduce_maps(*arguments, with_pages=False)
     assert names & planned[2].keys() == set()
     assert "town_04: already finished" in capsys.readouterr().err

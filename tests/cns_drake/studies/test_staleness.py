@@ -20,7 +20,7 @@ pytestmark = [
 
 DRIVES = {"town_01", "town_04", "town_01_stage_04"}
 PAGES = {"town_01", "town_04"}
-SURVEYS = {f"survey {name}" for name in DRIVES}
+FEATURES = {f"features of {name}" for name in DRIVES}
 DRAWN = {"draw town", "draw town 01 > 04"}
 COMPARED = {"place town_01 town_04", "place town_04 town_01"}
 CONTROL = {
@@ -31,7 +31,7 @@ MEASURED = {
     "change town_01 town_04", "change town_04 town_01",
     "change town_01_stage_04 town_04", "change town_04 town_01_stage_04",
 }  # fmt: skip
-STUDY = SURVEYS | DRAWN | COMPARED | CONTROL | EXPLAINED | MEASURED
+STUDY = FEATURES | DRAWN | COMPARED | CONTROL | EXPLAINED | MEASURED
 PICTURES = {"picture town drives"}
 
 
@@ -92,22 +92,22 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(with_recordings=False) == STUDY
     change(code / "evaluation/report/figures.py", "def ", "def  ")
     assert reproduce(with_recordings=False) == DRAWN
-    # Results of one method on all drives, and its part of their surveys.
+    # Results of one method on all drives, and its part of their features.
     options = {
         "with_recordings": False,
         "settings": ["solid.sensor_height=1.7"],
     }
-    assert reproduce(**options) == SURVEYS | COMPARED | CONTROL | EXPLAINED
+    assert reproduce(**options) == FEATURES | COMPARED | CONTROL | EXPLAINED
     assert reproduce(**options) == set()
     # Results of each setting stay; why places are wrong is of all methods.
     assert reproduce(with_recordings=False) == EXPLAINED
     # One drive, and all comparisons with it, which need descriptions of both.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
-    surveys = {"survey town_01", "survey town_04"}
+    features = {"features of town_01", "features of town_04"}
     maps = {"change town_01 town_04", "change town_04 town_01"}
     pairs = COMPARED | EXPLAINED | maps
-    assert reproduce(with_recordings=False) == surveys | DRAWN | pairs
+    assert reproduce(with_recordings=False) == features | DRAWN | pairs
 
 
 @pytest.mark.night
@@ -122,7 +122,7 @@ def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
     change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
     # The code that runs is not the copy: the new recordings hold the same, and
     # so what was measured on them stays.
-    assert reproduce(with_pages=False) == DRIVES | SURVEYS | PICTURES
+    assert reproduce(with_pages=False) == DRIVES | FEATURES | PICTURES
     assert reproduce() == PAGES
     # A page also shows the last stage.
     stage = tmp_path / "town" / "stage_04.sdf"

@@ -20,7 +20,7 @@ from cns_drake.studies import redrawing
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
-from evaluation.change.drive_change import Surveyed
+from evaluation.change.drive_change import DriveMap
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
@@ -141,7 +141,7 @@ def test_the_numbers_are_those_of_the_single_commands(
         voxels = VoxelAccumulator(CELL_SIZE)
         for frame in range(len(drive)):
             voxels.add(drive.scan(frame), drive.X_WS[frame])
-        mapped[name] = Surveyed(name, voxels.to_map(), drive.X_WS[:, :3, 3])
+        mapped[name] = DriveMap(name, voxels.to_map(), drive.X_WS[:, :3, 3])
     for stage in ("last", "own"):
         there = {"database__stage": stage, "gate": False}
         found = values(results, **there, task="change")

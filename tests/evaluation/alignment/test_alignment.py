@@ -26,7 +26,7 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import xyz
 from evaluation.alignment import align, in_one_world
-from evaluation.change.drive_change import survey_in_one_world
+from evaluation.change.drive_change import maps_in_one_world
 from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive
 from evaluation.drives.mulran import MulranDrive
@@ -262,25 +262,25 @@ def test_command_pr(capsys, recordings):
 
 
 def test_a_control_joins_the_same_world(recordings, drives):
-    surveys, reports = survey_in_one_world(list(recordings.values()), "auto")
+    maps, reports = maps_in_one_world(list(recordings.values()), "auto")
     assert [report.moved for report in reports] == ["second", "third"]
-    for one in surveys[1:]:
+    for one in maps[1:]:
         np.testing.assert_allclose(
             one.positions, drives.X_second[:, :3, 3], atol=0.05
         )
     np.testing.assert_allclose(
-        surveys[0].positions, drives.X_first[:, :3, 3], atol=1e-9
+        maps[0].positions, drives.X_first[:, :3, 3], atol=1e-9
     )
 
 
 def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
     np.save(tmp_path / "map.npy", make_town())
     paths = [recordings["first"], tmp_path / "map.npy"]
-    surveys, reports = survey_in_one_world(paths, "auto")
+    maps, reports = maps_in_one_world(paths, "auto")
     assert reports == []
-    assert surveys[1].name == "map.npy"
+    assert maps[1].name == "map.npy"
     with pytest.raises(InputError, match="--align always: a map file"):
-        survey_in_one_world(paths, "always")
+        maps_in_one_world(paths, "always")
 
 
 def test_mulran_and_helipr(capsys, tmp_path, drives, truth):

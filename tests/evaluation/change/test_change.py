@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
-from evaluation.change.drive_change import Surveyed, survey
+from evaluation.change.drive_change import DriveMap, read_map
 from evaluation.change.tcr import GRIDS
 from evaluation.maps.voxel_maps import CELL_SIZE, voxelise
 
@@ -46,7 +46,9 @@ def drive(folder, stage, route, reach=70.0, **options):
 def drives(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
     return {
-        (stage, route): survey(drive(folder / f"{stage}_{route}", stage, route))
+        (stage, route): read_map(
+            drive(folder / f"{stage}_{route}", stage, route)
+        )
         for stage in TOWN
         for route in ROUTE
     }
@@ -54,7 +56,7 @@ def drives(tmp_path_factory):
 
 def test_a_recording_maps_like_its_points(tmp_path, drives):
     np.save(tmp_path / "late.npy", TOWN["late"])
-    from_file = survey(tmp_path / "late.npy")
+    from_file = read_map(tmp_path / "late.npy")
     assert from_file.name == "late.npy"
     assert from_file.drive is None
     recorded = drives["late", "south"].voxels
@@ -121,7 +123,7 @@ def _built_town(built, seed=3):
 
 
 def _town_survey(points):
-    return Surveyed("town", voxelise(from_xyz(points), CELL_SIZE)[0])
+    return DriveMap("town", voxelise(from_xyz(points), CELL_SIZE)[0])
 
 
 @pytest.fixture(scope="module")
@@ -193,7 +195,7 @@ def test_json_adds_up(drives):
 def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
     for stage, points in TOWN.items():
         np.save(tmp_path / f"{stage}.npy", points)
-    early, late = (survey(tmp_path / f"{stage}.npy") for stage in TOWN)
+    early, late = (read_map(tmp_path / f"{stage}.npy") for stage in TOWN)
     values = compare_maps(early, late).to_json()
     assert values["tcr_sym"] > 0.03
     assert values["coverage_masked"] is None
@@ -203,7 +205,7 @@ def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
 
 def test_control_on_a_third_route(tmp_path, drives):
     other = drive(tmp_path / "other", "late", "south", reach=50.0)
-    shifted = survey(other)
+    shifted = read_map(other)
     a, b = drives["early", "south"], drives["late", "north"]
 
     def aside(y):
@@ -224,7 +226,7 @@ def test_disjoint_maps_are_undefined_with_a_reason(tmp_path):
     np.save(tmp_path / "a.npy", TOWN["late"])
     np.save(tmp_path / "b.npy", TOWN["late"] + np.array([5000.0, 0.0, 0.0]))
     values = compare_maps(
-        survey(tmp_path / "a.npy"), survey(tmp_path / "b.npy")
+        read_map(tmp_path / "a.npy"), read_map(tmp_path / "b.npy")
     ).to_json()
     assert values["tcr_sym"] is None
     assert values["tcr_source_to_target"] is None
@@ -235,10 +237,12 @@ def test_points_that_are_not_finite_are_counted(tmp_path):
     points = TOWN["late"].copy()
     points[[5, 900], 1] = np.nan, np.inf
     np.save(tmp_path / "a.npy", points)
-    assert survey(tmp_path / "a.npy").voxels.num_ignored == 2
+    assert read_map(tmp_path / "a.npy").voxels.num_ignored == 2
 
 
 def test_other_worlds_are_refused(tmp_path, drives):
-    other = survey(drive(tmp_path / "utm", "late", "south", world_frame="utm"))
+    other = read_map(
+        drive(tmp_path / "utm", "late", "south", world_frame="utm")
+    )
     with pytest.raises(InputError, match="frame 'utm'"):
         compare_maps(drives["early", "south"], other)

@@ -22,7 +22,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.file_digests import file_digests
 from evaluation.drives import open_drive
-from evaluation.study.surveys import RecordingSource
+from evaluation.study.sources import RecordingSource
 
 MATRIX = "matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1.6, 0, 0, 0, 1]\n"
 _opened: list[str] | None = None

@@ -4,7 +4,7 @@ import pytest
 
 from evaluation.drives import open_drive
 from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
-from evaluation.study.surveys import MappedDrive
+from evaluation.study.feature_extraction import MappedDrive
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from helpers.small_towns import ROUTES, drive
 import pytest
 
 from cns_drake.base.drives.drive import driven_way
-from evaluation.study.collection import find_recordings, group_cities
+from evaluation.study.collection import drives_by_map, find_recordings
 
 LEGS = ROUTES["a"]
 
@@ -14,7 +14,7 @@ def find_city(folder, **more):
     drive(folder / "town_01", "01", "a", city="town")
     drive(folder / "town_04", "04", "b", city="town")
     drive(folder / "town_walk", "04", "a", city="town", more=more)
-    (city,) = group_cities(find_recordings(folder))
+    (city,) = drives_by_map(find_recordings(folder))
     return city
 
 
@@ -39,7 +39,7 @@ def test_a_drive_beside_the_way_is_no_control(tmp_path, more):
 def test_the_last_stage_is_that_with_the_greatest_number(tmp_path, stages):
     for stage in stages:
         drive(tmp_path / f"town_{stage}", stage, "a", city="town")
-    (found,) = group_cities(find_recordings(tmp_path))
+    (found,) = drives_by_map(find_recordings(tmp_path))
     *earlier, last = stages
     pairs = [(a.stage, b.stage) for a, b in found.recognition_pairs()]
     back = [(last, one) for one in earlier] if len(earlier) == 1 else []

@@ -10,7 +10,7 @@ import pytest
 from cns_drake.base.files import file_name
 from evaluation.results.table_forms import Table
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.collection import City, RecordingInfo
+from evaluation.study.collection import MapDrives, RecordingInfo
 from evaluation.study.figures import change_stems
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
@@ -99,13 +99,13 @@ def test_no_two_figures_have_one_name():
             RecordingInfo(stage, Path(stage), city, stage, None)
             for stage in stages
         )
-        names.update(change_stems(City(city, {}, ()), pair))
+        names.update(change_stems(MapDrives(city, {}, ()), pair))
     assert len(names) == 2 * len(cases)
     usual = tuple(
         RecordingInfo(stage, Path(stage), "my_city", stage, None)
         for stage in ("01", "04")
     )
-    assert change_stems(City("my_city", {}, ()), usual) == (
+    assert change_stems(MapDrives("my_city", {}, ()), usual) == (
         "change_my_city_01_04",
         "sets_my_city_01_04",
     )

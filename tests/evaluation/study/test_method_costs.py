@@ -34,7 +34,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
     assert jobs[-1].step.is_done()
     files = StudyFiles(output)
     described = {
-        name: files.survey("town_01").described(name).read()[1]
+        name: files.features("town_01").described(name).read()[1]
         for name in shipped_methods()
     }
     path = study.assemble(with_tables=True)

@@ -14,9 +14,10 @@ from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import measurements
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.measurements import measure_places
 from evaluation.study.parts import FeatureFiles, MakePart, Part
-from evaluation.study.surveys import FeatureExtraction, RecordingSource
+from evaluation.study.sources import RecordingSource
 
 METHODS = (
     MethodChoice("solid"),

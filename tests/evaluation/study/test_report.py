@@ -25,7 +25,7 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.study import chosen_methods
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.collection import find_recordings, group_cities
+from evaluation.study.collection import drives_by_map, find_recordings
 from evaluation.study.stages_report import StagesReport, write_report
 
 pytestmark = pytest.mark.slow
@@ -84,7 +84,7 @@ def recordings(tmp_path_factory):
 
 
 def find_cities(folder):
-    return group_cities(find_recordings(folder))
+    return drives_by_map(find_recordings(folder))
 
 
 def test_recordings_find_their_roles(recordings):

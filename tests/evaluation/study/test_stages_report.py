@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.paper import reference_for
-from evaluation.study.collection import RecordingInfo, group_cities
+from evaluation.study.collection import RecordingInfo, drives_by_map
 from evaluation.study.stages_report import StagesReport
 
 
@@ -28,26 +28,26 @@ FAMILY = [
 
 def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
     jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
-    surveys = {n: j for n, j in jobs.items() if n.startswith("survey ")}
-    assert {name: job.needs for name, job in surveys.items()} == {
-        "survey metropolis_01": ("metropolis_01",),
-        "survey metropolis_02": ("metropolis_02",),
-        "survey metropolis_04": ("metropolis_04",),
-        "survey metropolis_01_stage_04": (),
+    features = {n: j for n, j in jobs.items() if n.startswith("features of ")}
+    assert {name: job.needs for name, job in features.items()} == {
+        "features of metropolis_01": ("metropolis_01",),
+        "features of metropolis_02": ("metropolis_02",),
+        "features of metropolis_04": ("metropolis_04",),
+        "features of metropolis_01_stage_04": (),
     }
-    roles = {name: sorted(job.step.roles) for name, job in surveys.items()}
+    roles = {name: sorted(job.step.roles) for name, job in features.items()}
     assert roles == {
-        "survey metropolis_01": ["places"],
-        "survey metropolis_02": ["places"],
-        "survey metropolis_04": ["queries"],
-        "survey metropolis_01_stage_04": ["places"],
+        "features of metropolis_01": ["places"],
+        "features of metropolis_02": ["places"],
+        "features of metropolis_04": ["queries"],
+        "features of metropolis_01_stage_04": ["places"],
     }
     assert not any(tmp_path.iterdir())
 
 
-def test_pairs_wait_for_their_surveys(tmp_path):
+def test_pairs_wait_for_their_features(tmp_path):
     jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
-    both = ("survey metropolis_01", "survey metropolis_04")
+    both = ("features of metropolis_01", "features of metropolis_04")
     for task in ("place", "change"):
         assert (
             job_of(jobs, task, "metropolis_01", "metropolis_04").needs == both
@@ -60,23 +60,23 @@ def test_pairs_wait_for_their_surveys(tmp_path):
     )
     assert jobs["draw metropolis 02 > 04"].needs == (
         job_of(jobs, "change", "metropolis_02", "metropolis_04").name,
-        "survey metropolis_02",
-        "survey metropolis_04",
+        "features of metropolis_02",
+        "features of metropolis_04",
     )
     assert jobs["draw metropolis"].needs == (
-        "survey metropolis_01",
-        "survey metropolis_02",
-        "survey metropolis_04",
+        "features of metropolis_01",
+        "features of metropolis_02",
+        "features of metropolis_04",
     )
     control = job_of(jobs, "place", "metropolis_01_stage_04", "metropolis_04")
     assert control.needs == (
-        "survey metropolis_01_stage_04",
-        "survey metropolis_04",
+        "features of metropolis_01_stage_04",
+        "features of metropolis_04",
     )
     own = job_of(jobs, "place", "metropolis_01", "metropolis_04")
     explained = jobs["explain metropolis_01 > metropolis_04"]
     assert explained.needs == (own.name,)
-    # Four surveys, one city, two changes; two pairs and a control, each with
+    # Four features, one city, two changes; two pairs and a control, each with
     # its change; two pairs are explained.
     assert len(jobs) == 4 + 1 + 2 + 2 * 3 + 2
 
@@ -93,16 +93,16 @@ def test_a_control_takes_the_place_of_one_drive():
     last = info("riverside_02", "02", "b", "riverside")
     again = info("riverside_01_stage_02", "02", "a", "riverside")
     before = info("riverside_02_stage_01", "01", "b", "riverside")
-    (city,) = group_cities([first, last, again])
+    (city,) = drives_by_map([first, last, again])
     assert city.unchanged_pair(first, last) == (again, last)
     assert city.unchanged_pair(last, first) == (last, again)
-    (city,) = group_cities([first, last, before])
+    (city,) = drives_by_map([first, last, before])
     assert city.unchanged_pair(first, last) == (first, before)
     # With both, the queries keep their scans.
-    (city,) = group_cities([first, last, before, again])
+    (city,) = drives_by_map([first, last, before, again])
     assert city.unchanged_pair(first, last) == (again, last)
     assert city.unchanged_pair(last, first) == (before, first)
-    (city,) = group_cities([first, last])
+    (city,) = drives_by_map([first, last])
     assert city.unchanged_pair(first, last) is None
 
 
@@ -118,7 +118,7 @@ def test_a_control_serves_both_ways(tmp_path):
             drives, tmp_path, reference=reference_for({"riverside"})
         ).jobs()
     }
-    roles = sorted(jobs["survey riverside_01_stage_02"].step.roles)
+    roles = sorted(jobs["features of riverside_01_stage_02"].step.roles)
     assert roles == ["places", "queries"]
     for names in (
         ("riverside_01_stage_02", "riverside_02"),

@@ -10,9 +10,9 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
+from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.parts import Part
 from evaluation.study.stages_report import StagesReport
-from evaluation.study.surveys import FeatureExtraction
 
 pytestmark = pytest.mark.slow
 
@@ -97,10 +97,13 @@ def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
         return done
 
     whole = run("whole", methods)
-    assert set(whole) >= {"survey metropolis_01", "survey metropolis_04"}
+    assert set(whole) >= {
+        "features of metropolis_01",
+        "features of metropolis_04",
+    }
     assert run("whole", methods) == []
-    surveys = tmp_path / "whole" / "parts" / "surveys"
-    for path in surveys.rglob("*.data"):
+    features = tmp_path / "whole" / "parts" / "features"
+    for path in features.rglob("*.data"):
         if not path.name.startswith("described"):
             Part(path).read()
         else:
@@ -109,10 +112,10 @@ def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
                 Part(path).read()
     run("later", methods[:1])
     # New results of one method need its descriptions alone.
-    shape = surveys.relative_to(tmp_path / "whole")
+    shape = features.relative_to(tmp_path / "whole")
     old = tmp_path / "later" / shape / "metropolis_01" / "fine.data"
     before = old.stat().st_mtime_ns
-    assert "survey metropolis_01" in run("later", methods)
+    assert "features of metropolis_01" in run("later", methods)
     assert old.stat().st_mtime_ns == before
     for name in ("queries.csv", "place_recognition.csv", "why.csv"):
         expected = (tmp_path / "whole" / name).read_bytes()

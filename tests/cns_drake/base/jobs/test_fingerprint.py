@@ -16,7 +16,7 @@ from cns_drake.base.jobs.fingerprint import (
     script_digest,
 )
 
-SURVEY = "evaluation.study.surveys"
+EXTRACTION = "evaluation.study.feature_extraction"
 SIMULATION = "cns_drake.simulation.simulation"
 SOURCES = {
     "evaluation/__init__.py": "import sys\n",
@@ -217,13 +217,13 @@ def test_of_our_own_code_the_right_modules_count(packages):
         )
     for path, counts, module in (
         ("cns_drake/sensors/lidar/presets.py", True, SIMULATION),
-        ("cns_drake/sensors/lidar/presets.py", False, SURVEY),
-        ("evaluation/methods/btc.py", True, SURVEY),
+        ("cns_drake/sensors/lidar/presets.py", False, EXTRACTION),
+        ("evaluation/methods/btc.py", True, EXTRACTION),
         ("evaluation/methods/btc.py", False, SIMULATION),
-        ("evaluation/report/page_template/page.css", False, SURVEY),
+        ("evaluation/report/page_template/page.css", False, EXTRACTION),
         ("evaluation/report/page_template/page.css", True, "evaluation.*"),
         ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),
-        ("cns_drake/base/progress_display.py", False, SURVEY),
+        ("cns_drake/base/progress_display.py", False, EXTRACTION),
     ):
         assert differs(packages / path, module) == counts, (path, module)
 
@@ -232,7 +232,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
 @pytest.mark.parametrize(
     "module",
     [
-        SURVEY,
+        EXTRACTION,
         pytest.param("evaluation.study.figures", marks=pytest.mark.night),
         pytest.param(
             "cns_drake.simulation.simulated_drive", marks=pytest.mark.night

@@ -1,4 +1,4 @@
-"""Surveys of drives that are made while they are read."""
+"""Features of drives, which are extracted while they are read."""
 
 from dataclasses import dataclass, field
 import os
@@ -17,13 +17,13 @@ from evaluation.drives.sampling import within_range
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.feature_extraction import (
+    FeatureExtraction,
+    extract_features,
+)
 from evaluation.study.measurements import measure_method
 from evaluation.study.parts import FeatureFiles, MakePart, Part
-from evaluation.study.surveys import (
-    FeatureExtraction,
-    RecordingSource,
-    survey_recording,
-)
+from evaluation.study.sources import RecordingSource
 
 pytestmark = pytest.mark.slow
 
@@ -80,8 +80,8 @@ class Source:
         return {"seed": self.seed}
 
 
-def survey(source, methods, files, roles=BOTH, **options):
-    """Runs a survey unless all its parts exist."""
+def extract(source, methods, files, roles=BOTH, **options):
+    """Extracts features unless all its parts exist."""
     step = FeatureExtraction(
         source, roles, tuple(methods), PAPER_PROTOCOL, files, **options
     )
@@ -126,15 +126,15 @@ def source(recorded):
 
 @pytest.fixture
 def files(tmp_path):
-    return FeatureFiles(tmp_path / "survey")
+    return FeatureFiles(tmp_path / "features")
 
 
-def test_stored_surveys_equal_computed_ones(recorded, source, files):
+def test_stored_features_equal_computed_ones(recorded, source, files):
     choices = choose_methods()
-    survey(source, choices, files)
+    extract(source, choices, files)
     methods = [choice.make() for choice in choices]
     asked = {one.name: (one, BOTH, PAPER_PROTOCOL) for one in methods}
-    found = survey_recording(recorded, BOTH, asked)
+    found = extract_features(recorded, BOTH, asked)
     assert_equal(files.drive.read(), found.drive)
     assert_equal(files.fine.read(), found.fine)
     direct = describe_drive(recorded, methods, BOTH, PAPER_PROTOCOL)
@@ -147,8 +147,8 @@ def test_stored_surveys_equal_computed_ones(recorded, source, files):
 
 
 def test_scans_of_places_and_queries_are_kept(recorded, source, files):
-    survey(source, (), files, with_scans=True)
-    survey(source, (), files, with_scans=True)
+    extract(source, (), files, with_scans=True)
+    extract(source, (), files, with_scans=True)
     assert len(source.opened) == 1
     kept = files.scans.read()
     assert kept.instances == recorded.instances
@@ -167,26 +167,26 @@ def test_scans_of_places_and_queries_are_kept(recorded, source, files):
 @pytest.mark.parametrize("roles", [frozenset(), BOTH])
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
     asked = {"a": (choose_methods()[0].make(), roles, PAPER_PROTOCOL)}
-    found = survey_recording(recorded, roles, asked)
-    assert_equal(found.drive.coarse, drive_change.survey(folder).voxels)
+    found = extract_features(recorded, roles, asked)
+    assert_equal(found.drive.coarse, drive_change.read_map(folder).voxels)
 
 
 def test_only_missing_or_stale_parts_are_computed(source, files):
     *others, btc = sorted(choose_methods(), key=lambda one: one.name == "btc")
-    survey(source, others, files)
+    extract(source, others, files)
     stamps = {path: path.stat().st_mtime_ns for path in files.folder.iterdir()}
-    survey(source, others, files)
+    extract(source, others, files)
     assert len(source.opened) == 1
-    survey(source, (*others, btc), files)
+    extract(source, (*others, btc), files)
     assert len(source.opened) == 2
     for method in others:
         path = files.described(method.name).path
         assert path.stat().st_mtime_ns == stamps[path]
-    survey(source, (*others, btc), files, frozenset())
+    extract(source, (*others, btc), files, frozenset())
     assert len(source.opened) == 3
     assert len(files.drive.read().frames) == 0
     other = Source(source.recorded, 7, source.opened)
-    survey(other, (), files, frozenset())
+    extract(other, (), files, frozenset())
     assert len(source.opened) == 4
 
 
@@ -230,12 +230,12 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
             self.world_frame = "utm"
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
-    surveys = (FeatureFiles(tmp_path / "a"), FeatureFiles(tmp_path / "b"))
-    survey(Source(recorded), (solid,), surveys[0])
+    extracted = (FeatureFiles(tmp_path / "a"), FeatureFiles(tmp_path / "b"))
+    extract(Source(recorded), (solid,), extracted[0])
     other = Source(Elsewhere(recorded))
-    survey(other, (solid,), surveys[1])
+    extract(other, (solid,), extracted[1])
     part = Part(tmp_path / "results" / "solid.data")
-    described = tuple(one.described(solid.name) for one in surveys)
+    described = tuple(one.described(solid.name) for one in extracted)
     arguments = (*described, (), 0, solid, None, PAPER_PROTOCOL, (7.5,))
     step = MakePart(part, measure_method, arguments)
     with pytest.raises(InputError, match="poses in frame 'utm'"):

@@ -1,29 +1,22 @@
-"""Features of drives: maps, places and queries, extracted in one pass.
-
-A job that works on a drive may run in another process, or on another machine,
-before or after the drive is recorded. The job therefore gets the source of the
-drive, a function that opens the drive, instead of the drive.
-"""
+"""Feature extraction: maps, places and queries of a drive, in one pass."""
 
 from collections.abc import Callable, Mapping, Set
 import contextlib
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.points import xyz
 from cns_drake.base.progress import doing, track
-from evaluation.change.drive_change import Surveyed
-from evaluation.drives import Drive, PlacedDrive, open_drive
+from evaluation.change.drive_change import DriveMap
+from evaluation.drives import Drive, DriveNames
 from evaluation.drives.drive_views import RecentScans
-from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import cropped, sample_frames, within_range
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import (
@@ -37,6 +30,7 @@ from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import FeatureFiles, Part
+from evaluation.study.sources import DriveSource
 
 # Divisions of a cell's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 2
@@ -83,87 +77,6 @@ class MappedDrive(RecentScans):
         self._num_mapped += 1
 
 
-class DriveSource(Protocol):
-    """A picklable function that opens a drive.
-
-    A job in another process gets this function instead of the drive.
-    """
-
-    def __call__(self) -> Drive:
-        """Opens the drive.
-
-        Jobs read its scans in increasing order, each once. A drive can
-        therefore be simulated while it is read.
-
-        Raises:
-            InputError: if the drive cannot be opened.
-        """
-
-    def identity(self) -> object:
-        """Returns the identity of the drive, ready for JSON.
-
-        If the identity of a drive has not changed, its results are not computed
-        again.
-
-        Raises:
-            InputError: if there is no drive.
-        """
-
-
-@dataclass(frozen=True)
-class RecordingSource:
-    """The source of a recorded drive, in any format that `open_drive` reads.
-
-    An object is called without arguments, and returns the opened `Drive`.
-
-    Attributes:
-        path: file or folder of the recording.
-        lidar: name of the LiDAR, for recordings with several.
-        columns: number of values per point in `.bin` files; by default guessed
-            from the values.
-    """
-
-    path: Path
-    lidar: str | None = None
-    columns: int | None = None
-
-    def __call__(self) -> Drive:
-        return open_drive(self.path, self.lidar, self.columns)
-
-    def identity(self) -> list[list]:
-        """Returns what identifies the recording: its options and its files.
-
-        Its reader names the files. Each counts by its name and its content.
-        """
-        drive = self()
-        names = [file.name for file in drive.files]
-        return [
-            [drive.name, drive.world_frame, self.lidar, self.columns],
-            *map(list, zip(names, file_digests(drive.files), strict=True)),
-        ]
-
-
-@dataclass(frozen=True)
-class JoinedSource:
-    """The source of a database of several drives, as one drive.
-
-    Attributes:
-        sources: the sources of the drives, from older to newer.
-        keep: which frames are kept in a map, see
-            `evaluation.recognition.keeping.kept_places`.
-    """
-
-    sources: tuple[DriveSource, ...]
-    keep: str | int
-
-    def __call__(self) -> JoinedDrive:
-        return JoinedDrive(self.sources, self.keep)
-
-    def identity(self) -> list[object]:
-        """Returns the identities of the drives, and what is kept."""
-        return [*(one.identity() for one in self.sources), self.keep]
-
-
 @dataclass(frozen=True)
 class DriveSummary:
     """A drive with its map, and with its scans reduced to small pictures.
@@ -180,7 +93,7 @@ class DriveSummary:
             `evaluation.maps.thumbnails`.
     """
 
-    placed: PlacedDrive
+    placed: DriveNames
     stamps_ns: np.ndarray
     X_WS: np.ndarray
     coarse: VoxelMap
@@ -197,9 +110,9 @@ class DriveSummary:
         return self.X_WS[:, :3, 3]
 
     @property
-    def surveyed(self) -> Surveyed:
+    def drive_map(self) -> DriveMap:
         """The map, with the names of the drive, its world and its map."""
-        return Surveyed(self.name, self.coarse, self.positions, self.placed)
+        return DriveMap(self.name, self.coarse, self.positions, self.placed)
 
 
 @dataclass(frozen=True)
@@ -261,8 +174,8 @@ class ExtractedFeatures:
         fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """
 
-    placed: PlacedDrive
-    described: dict[str, description.DescribedDrive]
+    placed: DriveNames
+    described: dict[str, description.DriveDescriptors]
     scans: KeptScans | list[np.ndarray] | None
     drive: DriveSummary | None = None
     fine: np.ndarray | None = None
@@ -281,7 +194,7 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
     return f"{method},{protocol.name}"
 
 
-def survey_recording(
+def extract_features(
     recording: Drive,
     roles: Set[description.Role],
     asked: Mapping[str, description.Request],
@@ -331,8 +244,8 @@ def survey_recording(
     coarse, fine = mapped.finish()
     if len(coarse) == 0:
         raise InputError(f"{mapped.name}: no scan holds a point")
-    placed = PlacedDrive.of(recording)
-    surveyed = DriveSummary(
+    placed = DriveNames.of(recording)
+    summary = DriveSummary(
         placed=placed,
         stamps_ns=mapped.stamps_ns,
         X_WS=mapped.X_WS,
@@ -340,12 +253,12 @@ def survey_recording(
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return ExtractedFeatures(placed, described, kept, surveyed, fine)
+    return ExtractedFeatures(placed, described, kept, summary, fine)
 
 
-def map_city(
+def map_source(
     reporter: Reporter, source: DriveSource, spacing: float | None
-) -> Surveyed:
+) -> DriveMap:
     """Returns the voxel map of a drive, to compute the change ratio (TCR).
 
     Args:
@@ -360,7 +273,7 @@ def map_city(
     if spacing is not None:
         frames = sample_frames(positions, spacing).tolist()
     voxels = map_drive(drive, CELL_SIZE, frames)
-    return Surveyed(drive.name, voxels, positions)
+    return DriveMap(drive.name, voxels, positions)
 
 
 def describe_recording(
@@ -372,7 +285,7 @@ def describe_recording(
     """Describes the places or queries of a recording, and keeps their scans.
 
     No map is made. Only the scans of places and queries are read, each once.
-    The arguments are those of `survey_recording`.
+    The arguments are those of `extract_features`.
     """
     drive = RecentScans(recording, _most_scans(asked))
     seen: list[np.ndarray] = []
@@ -381,7 +294,7 @@ def describe_recording(
         seen.append(cloud.astype(np.float32))
 
     described = _described(drive, roles, asked, protocol, keep)
-    return ExtractedFeatures(PlacedDrive.of(recording), described, seen)
+    return ExtractedFeatures(DriveNames.of(recording), described, seen)
 
 
 def _most_scans(asked: Mapping[str, description.Request]) -> int:
@@ -395,7 +308,7 @@ def _described(
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
-) -> dict[str, description.DescribedDrive]:
+) -> dict[str, description.DriveDescriptors]:
     found = description.describe_drive(
         drive, (), roles, protocol, visit, asked.values()
     )
@@ -438,14 +351,14 @@ class FeatureExtraction(Step):
         return self.files.folder
 
     def is_done(self) -> bool:
-        # A drive that is surveyed for the first time is not read for this.
+        # A drive that is new is not read for this.
         asked = map(self.files.described, self._asked)
         return all(one.path.is_file() for one in asked) and not self._missing()
 
     def missing(self) -> list[Part]:
-        """Returns the files of an earlier survey that are missing or stale.
+        """Returns the files of an earlier run that are missing or stale.
 
-        That is none if there is no recording yet, or no earlier survey.
+        That is none if there is no recording yet, or no earlier run.
         """
         with contextlib.suppress(InputError):
             if self.files.folder.is_dir():
@@ -466,7 +379,7 @@ class FeatureExtraction(Step):
             self.protocol,
         )
         if self.with_map:
-            found = survey_recording(*arguments, with_scans=self.with_scans)
+            found = extract_features(*arguments, with_scans=self.with_scans)
         else:
             found = describe_recording(*arguments)
         values: dict[Part, object] = {

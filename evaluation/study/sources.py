@@ -1,0 +1,95 @@
+"""Sources of drives: what opens a drive in the process of a job.
+
+A job that works on a drive may run in another process, or on another machine,
+before or after the drive is recorded. The job therefore gets the source of the
+drive, a function that opens the drive, instead of the drive.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from cns_drake.base.jobs.file_digests import file_digests
+from evaluation.drives import Drive, open_drive
+from evaluation.drives.joined_drive import JoinedDrive
+
+
+class DriveSource(Protocol):
+    """A picklable function that opens a drive.
+
+    A job in another process gets this function instead of the drive.
+    """
+
+    def __call__(self) -> Drive:
+        """Opens the drive.
+
+        Jobs read its scans in increasing order, each once. A drive can
+        therefore be simulated while it is read.
+
+        Raises:
+            InputError: if the drive cannot be opened.
+        """
+
+    def identity(self) -> object:
+        """Returns the identity of the drive, ready for JSON.
+
+        If the identity of a drive has not changed, its results are not computed
+        again.
+
+        Raises:
+            InputError: if there is no drive.
+        """
+
+
+@dataclass(frozen=True)
+class RecordingSource:
+    """The source of a recorded drive, in any format that `open_drive` reads.
+
+    An object is called without arguments, and returns the opened `Drive`.
+
+    Attributes:
+        path: file or folder of the recording.
+        lidar: name of the LiDAR, for recordings with several.
+        columns: number of values per point in `.bin` files; by default guessed
+            from the values.
+    """
+
+    path: Path
+    lidar: str | None = None
+    columns: int | None = None
+
+    def __call__(self) -> Drive:
+        return open_drive(self.path, self.lidar, self.columns)
+
+    def identity(self) -> list[list]:
+        """Returns what identifies the recording: its options and its files.
+
+        Its reader names the files. Each counts by its name and its content.
+        """
+        drive = self()
+        names = [file.name for file in drive.files]
+        return [
+            [drive.name, drive.world_frame, self.lidar, self.columns],
+            *map(list, zip(names, file_digests(drive.files), strict=True)),
+        ]
+
+
+@dataclass(frozen=True)
+class JoinedSource:
+    """The source of a database of several drives, as one drive.
+
+    Attributes:
+        sources: the sources of the drives, from older to newer.
+        keep: which frames are kept in a map, see
+            `evaluation.recognition.keeping.kept_places`.
+    """
+
+    sources: tuple[DriveSource, ...]
+    keep: str | int
+
+    def __call__(self) -> JoinedDrive:
+        return JoinedDrive(self.sources, self.keep)
+
+    def identity(self) -> list[object]:
+        """Returns the identities of the drives, and what is kept."""
+        return [*(one.identity() for one in self.sources), self.keep]
