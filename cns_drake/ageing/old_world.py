@@ -1,12 +1,13 @@
 """The city of today: the last stage of a map, prepared for ageing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 import re
 from xml.etree import ElementTree
 
 import numpy as np
+from pydrake.geometry import Box, Cylinder, Mesh, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -30,7 +31,8 @@ from cns_drake.transient import world_structures
 
 # The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
-_NO_POSE = "0 0 0 0 0 0"
+# The colour of parts without one.
+_GREY = (0.6, 0.6, 0.6)
 # The only files that a stage may name, since only these are copied to the aged
 # map.
 _OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
@@ -62,7 +64,7 @@ class OldWorld:
         self.folder = folder
         self.path = stages[-1]
         self._read_table()
-        self.visuals, self._elements = _read_visuals(self.path)
+        self.visuals = _read_visuals(self.path)
         self._world = load_world(self.path)
         self._seen = world_structures.read_structures(self._world)
         self.built = {
@@ -114,14 +116,12 @@ class OldWorld:
         parts = []
         meshes = {}
         materials = self._world.structures[name].materials
-        for visual in self._elements[name]:
-            pose = np.array(visual.findtext("pose", _NO_POSE).split(), float)
-            X_SP = X_SW @ RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
-            rgb = visual.findtext("material/diffuse", "0.6 0.6 0.6 1").split()
-            shape = _shape(visual)
+        for one in self._seen[name].parts:
+            X_SG = X_SW @ one.X_WG
+            shape = self._shape(one)
             if shape is None:
                 raise InputError(
-                    f"{self.path}: {visual.get('name')}: a shape that ageing "
+                    f"{self.path}: {name}/{one.name}: a shape that ageing "
                     "cannot change"
                 )
             if isinstance(shape, structures.MeshShape):
@@ -133,15 +133,15 @@ class OldWorld:
                     raise InputError(
                         f"{file}: not an OBJ file that ageing can change"
                     ) from None
-            part = visual.attrib["name"].partition("/")[2]
             parts.append(
                 structures.Part(
-                    part,
+                    one.name,
                     shape,
-                    triple(X_SP.translation().round(4)),
-                    triple(X_SP.rotation().ToRollPitchYaw().vector().round(5)),
-                    triple(map(float, rgb[:3])),
-                    materials.get(part, materials.get("")),
+                    triple(X_SG.translation().round(4)),
+                    triple(X_SG.rotation().ToRollPitchYaw().vector().round(5)),
+                    # Drake has colours in single precision.
+                    triple(np.round(one.geometry.rgb or _GREY, 6)),
+                    materials.get(one.name, materials.get("")),
                 )
             )
         model = structures.Model(
@@ -154,9 +154,26 @@ class OldWorld:
     def shapes(self) -> dict[str, list[structures.Shape]]:
         """Name of a structure -> its shapes of the kinds that can change."""
         return {
-            name: [s for one in some if (s := _shape(one)) is not None]
-            for name, some in self._elements.items()
+            name: [s for p in one.parts if (s := self._shape(p)) is not None]
+            for name, one in self.things.items()
         }
+
+    def _shape(
+        self, part: world_structures.LoadedPart
+    ) -> structures.Shape | None:
+        """Returns the shape of a part; None for other kinds of shapes."""
+        inspector = self._world.scene_graph.model_inspector()
+        shape = inspector.GetShape(part.geometry.geometry_id)
+        if isinstance(shape, Mesh) and shape.source().is_path():
+            name = Path(shape.source().path()).stem
+            return structures.MeshShape(name, triple(shape.scale3()))
+        if isinstance(shape, Box):
+            return structures.BoxShape(triple(shape.size()))
+        if isinstance(shape, Cylinder):
+            return structures.CylinderShape(shape.radius(), shape.length())
+        if isinstance(shape, Sphere):
+            return structures.SphereShape(shape.radius())
+        return None
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
@@ -229,9 +246,8 @@ def _is_open(one: world_structures.LoadedStructure) -> bool:
     return one.semantic_class in kinds and not _PUBLIC.search(one.name.lower())
 
 
-def _read_visuals(
-    path: Path,
-) -> tuple[dict[str, list[str]], dict[str, list[ElementTree.Element]]]:
+def _read_visuals(path: Path) -> dict[str, list[str]]:
+    """Returns name of a structure -> SDF texts of its visuals."""
     root = read_elements(path)
     visuals = root.findall("world/model/link/visual")
     if len(root.findall("world/model")) != 1 or not all(
@@ -248,32 +264,8 @@ def _read_visuals(
                 "of the map"
             )
     lines: dict[str, list[str]] = {}
-    elements: dict[str, list[ElementTree.Element]] = {}
     for one in visuals:
         name = one.attrib["name"].partition("/")[0]
-        elements.setdefault(name, []).append(one)
         line = ElementTree.tostring(one, encoding="unicode").strip()
         lines.setdefault(name, []).append(line)
-    return lines, elements
-
-
-def _shape(visual: ElementTree.Element) -> structures.Shape | None:
-    """Returns the shape of a visual; None for other kinds of shapes."""
-
-    def numbers(tag: str, default: str = "") -> Sequence[float]:
-        text = visual.findtext(f"geometry/{tag}", default)
-        return [float(value) for value in text.split()]
-
-    mesh = visual.findtext("geometry/mesh/uri")
-    if mesh is not None and mesh.startswith(f"{MESH_FOLDER}/"):
-        scale = triple(numbers("mesh/scale", "1 1 1"))
-        return structures.MeshShape(Path(mesh).stem, scale)
-    if visual.find("geometry/box") is not None:
-        return structures.BoxShape(triple(numbers("box/size")))
-    if visual.find("geometry/cylinder") is not None:
-        return structures.CylinderShape(
-            *numbers("cylinder/radius"), *numbers("cylinder/length")
-        )
-    if visual.find("geometry/sphere") is not None:
-        return structures.SphereShape(*numbers("sphere/radius"))
-    return None
+    return lines
