@@ -22,6 +22,7 @@ from cns_drake.base.yaml_files import parse_yaml
 class Material(BaseModel, frozen=True, extra="forbid"):
     """A material; `materials.yaml` explains the fields."""
 
+    name: str
     look: str
     kind: Literal["lambert", "retro", "beads", "glass", "leaves"] = "lambert"
     reflectivity: tuple[float, float]
@@ -36,18 +37,14 @@ class Material(BaseModel, frozen=True, extra="forbid"):
     gets_wet: bool = False
 
 
-class _Table(BaseModel, frozen=True, extra="forbid"):
-    of_classes: dict[str, str]
-    materials: dict[str, Material]
-
-
-_TABLE = _Table.model_validate(
-    parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
-)
+_TABLE = parse_yaml(Path(__file__).with_name("materials.yaml").read_bytes())
 # Name -> material.
-MATERIALS = _TABLE.materials
+MATERIALS = {
+    name: Material(name=name, **fields)
+    for name, fields in _TABLE["materials"].items()
+}
 # Semantic class -> name of the material of parts that have no other one.
-OF_CLASSES = _TABLE.of_classes
+OF_CLASSES: dict[str, str] = _TABLE["of_classes"]
 
 
 def as_cell(semantic_class: str, parts: Mapping[str, str]) -> str:

@@ -78,13 +78,12 @@ def _as_model(
     for number, part in enumerate(building.parts):
         mesh = f"{_file_of(part, editing)}/{number}"
         meshes[mesh] = _mesh_of(part, p_WS)
-        kind = part.material.kind
         parts.append(
             Part(
                 str(number),
                 MeshShape(mesh),
                 rgb=part.geometry.rgb,
-                material=kind if kind == "glass" else None,
+                material=part.material.name,
             )
         )
     low = (building.p_WPs - p_WS)[:, :2].min(axis=0)

@@ -17,7 +17,6 @@ from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import FOLDER, Mesh, structures
 from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.materials import OF_CLASSES
 from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
@@ -251,9 +250,6 @@ class SceneEditing:
         loaded = dict(zip(before.parts, thing.parts, strict=True))
         old = {part.name: one for part, one in loaded.items()}
         kept = loaded.keys() & set(after.parts)
-        materials = structures.Structure(
-            thing.name, thing.semantic_class, after, (0.0, 0.0, 0.0)
-        ).materials
         taken = {one.name for one in thing.parts}
         replaced = {part.name for part in after.parts}
         for part in after.parts:
@@ -271,10 +267,7 @@ class SceneEditing:
             self._register(
                 f"{thing.name}/{name}", X_WG, shape, *_properties(look)
             )
-            material = materials[part.name]
-            # The structure may have another usual material than its class.
-            if material != OF_CLASSES[thing.semantic_class]:
-                self._note_material(thing.name, name, material)
+            self._note_material(thing.name, name, part.material)
         for name, one in old.items():
             if name not in replaced:
                 self._remove_part(one)

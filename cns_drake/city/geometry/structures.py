@@ -56,13 +56,13 @@ class Finish(NamedTuple):
     """The finish of a surface: its colour, and what it is made of.
 
     Attributes:
-        rgb: colour.
+        rgb: colour; None for that of the structure's semantic class.
         material: name of the material, a key of
             `cns_drake.scene.materials.MATERIALS`; None for the usual one of the
             structure's semantic class.
     """
 
-    rgb: tuple[float, float, float]
+    rgb: tuple[float, float, float] | None
     material: str | None = None
 
     @classmethod

@@ -242,7 +242,7 @@ def _is_shared(part: Part) -> bool:
     return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
 
 
-def _walls(placed: Sequence[tuple[Part, Mesh]]) -> Finish | None:
+def _walls(placed: Sequence[tuple[Part, Mesh]]) -> Finish:
     """Returns the finish of the building's largest part that is not glass."""
 
     def extent(one: tuple[Part, Mesh]) -> float:
@@ -250,4 +250,4 @@ def _walls(placed: Sequence[tuple[Part, Mesh]]) -> Finish | None:
 
     walls = [one for one in placed if one[0].material != "glass"]
     largest, _ = max(walls, key=extent)
-    return largest.rgb and Finish(largest.rgb, largest.material)
+    return Finish(largest.rgb, largest.material)

@@ -212,6 +212,7 @@ def _cornice(use: str, is_flat: bool, is_old: bool, chance: float) -> float:
 
 
 def _tinted(finish: Finish, factor: float) -> Finish:
+    assert finish.rgb is not None
     rgb = np.clip(np.multiply(finish.rgb, factor), 0.0, 1.0).round(3)
     return finish._replace(rgb=triple(rgb))
 
