@@ -28,6 +28,7 @@ from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
 from cns_drake.transient import world_structures
+from cns_drake.transient.ground_surface import GroundSurface
 
 # The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
@@ -184,11 +185,11 @@ class OldWorld:
         return np.concatenate([np.zeros((0, 3, 3)), *found])
 
     @cached_property
-    def ground(self) -> world_structures.GroundSurface:
+    def ground(self) -> GroundSurface:
         """The ground below and around buildings."""
         feet = [t.footprint for t in self.of_class("building", "pole")]
         near = shapely.union_all(feet).convex_hull.buffer(_AROUND)
-        return world_structures.GroundSurface(self._seen, near)
+        return GroundSurface(self._seen, near)
 
     @cached_property
     def streets(self) -> BaseGeometry:

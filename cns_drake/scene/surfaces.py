@@ -144,3 +144,27 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
         radius = surface.radius * radius
         z = surface.radius * z + half
     return TriangleSurface(*revolved(radius, z, sides))
+
+
+def is_closed(surface: Surface) -> bool:
+    """Returns whether a surface encloses a volume.
+
+    A surface of triangles is closed if each edge belongs to an even number of
+    triangles. Edges are compared by the positions of their ends.
+    """
+    if isinstance(surface, HalfSpaceSurface):
+        return False
+    if not isinstance(surface, TriangleSurface):
+        return True
+    _, place = np.unique(
+        np.round(surface.p_GVset, 6), axis=0, return_inverse=True
+    )
+    corners = np.reshape(place, -1)[surface.triangles]
+    edges = np.sort(
+        np.concatenate(
+            [corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]
+        ),
+        axis=1,
+    )
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    return bool(len(edges) > 0 and np.all(count % 2 == 0))

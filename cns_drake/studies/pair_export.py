@@ -29,7 +29,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
-from cns_drake.transient.world_structures import GROUND_CLASSES
+from cns_drake.transient.ground_surface import GROUND_CLASSES
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.maps.voxel_maps import thin
 from evaluation.recognition.overlap_truth import (

@@ -24,15 +24,21 @@ from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient import putting_up
-from cns_drake.transient.height_limit import limit_heights
-from cns_drake.transient.scene_editing import Look, SceneEditing, Surroundings
-from cns_drake.transient.world_structures import (
+from cns_drake.transient.ground_surface import (
     GROUND_CLASSES,
     GroundSurface,
+)
+from cns_drake.transient.height_limit import limit_heights
+from cns_drake.transient.obstacles import Obstacles
+from cns_drake.transient.scene_editing import (
+    Look,
+    SceneEditing,
+    Surroundings,
+    draws,
+)
+from cns_drake.transient.world_structures import (
     LoadedPart,
     LoadedStructure,
-    Obstacles,
-    draws,
     read_structures,
     triangle_corners,
 )

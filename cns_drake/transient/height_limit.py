@@ -10,11 +10,10 @@ from shapely.geometry import box
 from cns_drake.city.geometry import FOLDER, Mesh, MeshShape, Model, Part
 from cns_drake.city.growth.lowering import STOREY, lowered, top_of
 from cns_drake.scene.surfaces import tessellate
-from cns_drake.transient.scene_editing import SceneEditing, Surroundings
+from cns_drake.transient.scene_editing import SceneEditing, Surroundings, draws
 from cns_drake.transient.world_structures import (
     LoadedPart,
     LoadedStructure,
-    draws,
 )
 
 _CAUSE = "height_limit"

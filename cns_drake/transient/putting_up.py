@@ -22,13 +22,10 @@ from cns_drake.city.geometry import (
     post,
 )
 from cns_drake.city.placement.objects import OBJECTS, pick
-from cns_drake.transient.scene_editing import Surroundings
-from cns_drake.transient.world_structures import (
-    GROUND_CLASSES,
-    LoadedStructure,
-    Obstacles,
-    draws,
-)
+from cns_drake.transient.ground_surface import GROUND_CLASSES
+from cns_drake.transient.obstacles import Obstacles
+from cns_drake.transient.scene_editing import Surroundings, draws
+from cns_drake.transient.world_structures import LoadedStructure
 
 # Greatest distance between a front and the drive [m].
 _FARTHEST = 30.0

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+import hashlib
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -23,12 +24,11 @@ from cns_drake.scene.structure_table import (
 )
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
+from cns_drake.transient.ground_surface import GroundSurface
+from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.world_structures import (
-    GroundSurface,
     LoadedPart,
     LoadedStructure,
-    Obstacles,
-    draws,
 )
 
 # Snow farther from the drive than this would hardly be visible to a LiDAR [m].
@@ -514,6 +514,21 @@ class Surroundings:
             rng = draws(self.seed, cause, thing.name)
             if rng.uniform() < share:
                 yield thing, rng
+
+
+def draws(seed: int, cause: str, name: str) -> np.random.Generator:
+    """Returns the random generator for one kind of change of one structure.
+
+    The random numbers do not depend on other structures or other kinds of
+    change.
+
+    Args:
+        seed: seed of the changes.
+        cause: field of the section `transient` that asks for the change.
+        name: name of the structure.
+    """
+    digest = hashlib.sha256(f"{seed}/{cause}/{name}".encode()).digest()
+    return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
 
 def _memory_mesh(

@@ -8,7 +8,7 @@ import numpy as np
 from cns_drake.scene.materials import Material
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.scene.surfaces import HalfSpaceSurface, Surface, TriangleSurface
+from cns_drake.scene.surfaces import Surface, is_closed
 
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS, SPRAYS = range(6)
@@ -154,27 +154,3 @@ def _wet(reflectivity: float) -> float:
     return (
         reflectivity * (1.0 - _FILM_INNER) / (1.0 - _FILM_INNER * reflectivity)
     )
-
-
-def is_closed(surface: Surface) -> bool:
-    """Returns whether a surface encloses a volume.
-
-    A surface of triangles is closed if each edge belongs to an even number of
-    triangles. Edges are compared by the positions of their ends.
-    """
-    if isinstance(surface, HalfSpaceSurface):
-        return False
-    if not isinstance(surface, TriangleSurface):
-        return True
-    _, place = np.unique(
-        np.round(surface.p_GVset, 6), axis=0, return_inverse=True
-    )
-    corners = np.reshape(place, -1)[surface.triangles]
-    edges = np.sort(
-        np.concatenate(
-            [corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]
-        ),
-        axis=1,
-    )
-    _, count = np.unique(edges, axis=0, return_counts=True)
-    return bool(len(edges) > 0 and np.all(count % 2 == 0))

@@ -54,7 +54,7 @@ class PoseTask(Task):
             )
             for drive, role in pair.roles
         )
-        others = jobs.elsewhere(pair, needs)
+        others = jobs.distractor_places(pair, needs)
         beside = jobs.beside(pair, needs)
         # The task `place` reads the same files.
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
@@ -158,7 +158,7 @@ class CostTask(Task):
         arguments = (
             database[1:],
             query[1:],
-            jobs.elsewhere(pair, needs),
+            jobs.distractor_places(pair, needs),
             pair.distractors,
             jobs.methods,
             tuple(parts[1:] for parts in jobs.beside(pair, needs)),

@@ -312,7 +312,7 @@ class Jobs:
             found.append(parts)
         return found
 
-    def elsewhere(
+    def distractor_places(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
         """Returns descriptions of drives through other cities, for a pair.

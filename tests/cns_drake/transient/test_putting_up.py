@@ -20,10 +20,8 @@ from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.world_structures import (
-    GroundSurface,
-    read_structures,
-)
+from cns_drake.transient.ground_surface import GroundSurface
+from cns_drake.transient.world_structures import read_structures
 
 DRIVE = shapely.LineString([(X_WT @ [x, -0.5, 0])[:2] for x in (-60, 80)])
 

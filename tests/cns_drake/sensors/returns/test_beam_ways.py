@@ -11,10 +11,14 @@ from scipy.special import erf
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.scene.surfaces import EllipsoidSurface, TriangleSurface
+from cns_drake.scene.surfaces import (
+    EllipsoidSurface,
+    TriangleSurface,
+    is_closed,
+)
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.sensors.returns.materials import find_materials, is_closed
+from cns_drake.sensors.returns.materials import find_materials
 from cns_drake.sensors.returns.propagation import pane_shares
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 
