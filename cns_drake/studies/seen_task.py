@@ -20,7 +20,7 @@ from cns_drake.simulation.simulated_drive import (
 from cns_drake.studies.map_upkeep import UpkeptSource
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.place_outcome import Number
-from evaluation.study.surveys import DriveSource
+from evaluation.study.sources import DriveSource
 from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
 
 # Expected time to simulate a drive twice [s].

@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.description import DescribedScans, DriveDescriptors
 from evaluation.recognition.search import Search
 
 # Number of clouds, or of queries, whose time is measured; the time of the first
@@ -64,7 +64,7 @@ class Cost:
 
 
 def measure_search(
-    method: Method, places: DescribedScans, queries: DescribedDrive
+    method: Method, places: DescribedScans, queries: DriveDescriptors
 ) -> QueryCost:
     """Returns the time and memory that a search in a database needs.
 
@@ -113,7 +113,7 @@ def measure_cost(
 
 
 def query_ms(
-    method: Method, places: DescribedScans, queries: DescribedDrive
+    method: Method, places: DescribedScans, queries: DriveDescriptors
 ) -> float:
     """Returns the median CPU time of several queries, on one core [ms].
 
@@ -132,7 +132,7 @@ def query_ms(
 
 
 def _searched(
-    method: Method, places: DescribedScans, queries: DescribedDrive
+    method: Method, places: DescribedScans, queries: DriveDescriptors
 ) -> tuple[Search, np.ndarray]:
     """Returns a search after some queries, and the CPU time of each [ms]."""
     search = Search(method, places)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cns_drake.base.progress import track
 from evaluation.methods.method import Method, check_number
-from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.description import DescribedScans, DriveDescriptors
 from evaluation.recognition.pose_errors import checked_pose
 from evaluation.recognition.scoring import checked_scores, score_places
 from evaluation.recognition.stored_places import StoredDescriptors
@@ -44,7 +44,7 @@ class Search:
 
     def scores(
         self,
-        query: DescribedDrive,
+        query: DriveDescriptors,
         rows: Sequence[int],
         is_known: np.ndarray,
     ) -> np.ndarray:
@@ -79,7 +79,7 @@ class Search:
         return scores
 
     def poses(
-        self, query: DescribedDrive, wanted: Sequence[np.ndarray]
+        self, query: DriveDescriptors, wanted: Sequence[np.ndarray]
     ) -> list[dict[int, np.ndarray | None]]:
         """Returns the poses of queries at places.
 
@@ -114,7 +114,7 @@ class Search:
 
     def _shares(
         self,
-        query: DescribedDrive,
+        query: DriveDescriptors,
         rows: Sequence[int],
         is_known: np.ndarray,
     ) -> np.ndarray | None:
@@ -149,7 +149,7 @@ class Search:
 
     def _score(
         self,
-        query: DescribedDrive,
+        query: DriveDescriptors,
         row: int,
         database: Any,
         is_known: np.ndarray,
@@ -196,7 +196,7 @@ class Search:
             yield number, group, self._built[1]
 
     def _tracked(
-        self, query: DescribedDrive, rows: Sequence[int]
+        self, query: DriveDescriptors, rows: Sequence[int]
     ) -> Iterator[int]:
         return iter(
             track(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.description import DescribedScans, DriveDescriptors
 
 # Greatest size of the descriptors that are in memory at a time, unless those of
 # a single drive are larger [bytes].
@@ -25,7 +25,7 @@ class StoredDrives:
 
     def __init__(
         self,
-        readers: Sequence[Callable[[], DescribedDrive]],
+        readers: Sequence[Callable[[], DriveDescriptors]],
         sizes: Sequence[float],
         most_bytes: float,
     ):
@@ -37,7 +37,7 @@ class StoredDrives:
             most_bytes: greatest size of a group of several drives.
         """
         self._readers = readers
-        self._held: dict[int, DescribedDrive] = {}
+        self._held: dict[int, DriveDescriptors] = {}
         self._names: dict[int, str] = {}
         groups: list[int] = []
         group, held = 0, 0.0
@@ -48,7 +48,7 @@ class StoredDrives:
             groups.append(group)
         self.group_of = np.array(groups, np.int64)
 
-    def drive(self, number: int) -> DescribedDrive:
+    def drive(self, number: int) -> DriveDescriptors:
         """Returns a drive; drives of other groups leave the memory."""
         group = self.group_of[number]
         if any(self.group_of[one] != group for one in self._held):

@@ -453,6 +453,6 @@ def crowded(
     )
 
 
-def _described_in(part: Part) -> DescribedDrive:
+def _described_in(part: Part) -> DriveDescriptors:
     """Returns the drive with a method's descriptions in a file."""
     return part.read()[1]

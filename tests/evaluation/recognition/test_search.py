@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from evaluation.methods import make_method
-from evaluation.recognition.description import DescribedDrive, DescribedScans
+from evaluation.recognition.description import DescribedScans, DriveDescriptors
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.recognition.retrieval import compare_with_gates
 from evaluation.recognition.search import Search
@@ -54,13 +54,13 @@ def drives_of(method):
         seeds = [min(drive, last) * NUM_PLACES + k for k in range(NUM_PLACES)]
         described = [method.describe_place(cloud(seed)) for seed in seeds]
         places = scans(described, drive * NUM_PLACES)
-        found.append(DescribedDrive(f"drive {drive}", places, places))
+        found.append(DriveDescriptors(f"drive {drive}", places, places))
     return found
 
 
 def queries_of(method):
     seeds = [0, 3, 8, 13, 17]
-    return DescribedDrive(
+    return DriveDescriptors(
         "queries",
         scans([], 0),
         scans([method.describe(moved(cloud(s), s)) for s in seeds], 0),
@@ -112,7 +112,7 @@ def test_groups_give_the_same_as_the_whole(name, settings):
     for most_bytes in (40, 10):
         places = stored(drives, most_bytes, [])
         assert len(places.descriptors) == NUM_DRIVES * NUM_PLACES
-        database = DescribedDrive("places", places, places)
+        database = DriveDescriptors("places", places, places)
         found.append(
             compare_with_gates(
                 method, database, queries, protocol, [None, 25.0]
