@@ -310,8 +310,8 @@ def ranking(path: Path) -> None:
         panels = part.subplots(1, len(radii), sharex=True, sharey=True)
         for axes, radius in zip(panels, radii, strict=True):
             for k, (kind, look) in enumerate(kinds.items()):
-                rows = found[metric, gate, kind, radius]
-                for one in summaries.ranking(rows)[0]:
+                rows = found.get((metric, gate, kind, radius), [])
+                for one in summaries.ranking(rows)[0] if rows else ():
                     y = order.index(one.method) + 0.25 * (k - 1)
                     colour = METHOD_STYLES[one.method][0]
                     ends = [one.interval.low, one.interval.high]

@@ -111,6 +111,7 @@ def test_things_stand_on_the_ground_and_cars_in_bays(lay_out_text):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_a_district_does_not_disturb_another(lay_out_text):
     before = lay_out_text(PLAN)
     after = lay_out_text(

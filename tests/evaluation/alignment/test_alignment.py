@@ -142,6 +142,7 @@ def test_a_drive_that_drifts(drives, truth):
     assert change(result.first, result.second) == pytest.approx(truth, abs=0.01)
 
 
+@pytest.mark.night
 def test_the_drive_that_drifts_gives_way(drives):
     """Forth and back, so that a drive's disagreement with itself shows."""
     X = np.concatenate([route(lane=-1.75), route(lane=1.75, reverse=True)])
@@ -174,6 +175,7 @@ def test_heights_start_at_the_ground(drives):
         np.testing.assert_allclose(drive.X_WS[:, 2, 3], LIDAR_HEIGHT, atol=0.05)
 
 
+@pytest.mark.night
 def test_another_town(drives):
     X = route()
     other = TownDrive("other", make_scans(make_town(seed=8), X), X, "elsewhere")
