@@ -652,6 +652,8 @@ def _leaves(
 
 def _is_single(name: str, value: Sequence[Any]) -> bool:
     """Returns whether a list is one value of a field."""
+    if name == SESSIONS and _is_of(value, str):
+        return True  # Recordings.
     kinds = _LISTS.get(name)
     return kinds is not None and all(isinstance(v, kinds) for v in value)
 

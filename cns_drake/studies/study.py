@@ -56,6 +56,7 @@ from cns_drake.studies.redrawing import make_maps, redraw_frozen
 from cns_drake.studies.seen_task import SeenTask
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.methods import optional_methods
+from evaluation.recognition.keeping import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts import check
 from evaluation.results.page import write_page
@@ -74,6 +75,7 @@ from evaluation.study.chosen_methods import (
 )
 from evaluation.study.collection import (
     MapDrives,
+    RecordingInfo,
     drives_by_map,
     find_recordings,
 )
@@ -82,6 +84,7 @@ from evaluation.study.parts import MakePart, StudyFiles
 from evaluation.study.recorded import (
     ExtractionJobs,
     RecordedCondition,
+    chosen_sessions,
     recorded_comparisons,
 )
 from evaluation.study.tasks.change import ChangeTask
@@ -109,6 +112,8 @@ TASKS: Mapping[str, type[Task]] = {
 }
 # Expected time to update a map by one drive [s].
 _UPKEEP_COST = 40.0
+# Fields of a database of several recordings.
+_OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")
 # Tables that earlier versions wrote.
 _FORMER = (
     "ladder.csv",
@@ -649,6 +654,11 @@ class Study:
                     one.changes.get("both", {}).get("stage", OWN),
                     one.is_baseline,
                     self._protocol_of(one),
+                    self._recorded_sessions(city, one),
+                    checked_keep(
+                        one.changes.get("database", {}).get("keep", KEEP_ALL),
+                        f"{self.source}: database.keep",
+                    ),
                 )
                 for one in self._conditions
             ],
@@ -657,11 +667,32 @@ class Study:
             both_ways=self.experiment.drives == "both-ways",
         )
 
+    def _recorded_sessions(
+        self, city: MapDrives, condition: Condition
+    ) -> tuple[RecordingInfo, ...]:
+        """Returns the recordings of a database of several."""
+        names = condition.changes.get("database", {}).get(SESSIONS)
+        if names is None:
+            return ()
+        where = f"{self.source}: database.{SESSIONS}"
+        if not (
+            isinstance(names, list) and all(map(_is_text, names)) and names
+        ):
+            raise InputError(f"{where}: not a list of names of recordings")
+        return chosen_sessions(city, names, where)
+
     def _check_recordable(self, city: MapDrives) -> None:
         """Checks that conditions vary only the stage, as recordings require."""
         for condition in self._conditions:
             sides = {n: condition.changes.get(n, {}) for n in SIDES}
             given = [f"{side}.{name}" for side in sides for name in sides[side]]
+            if SESSIONS in sides["database"]:
+                given = [one for one in given if one not in _OF_RECORDINGS]
+                if sides["both"]:
+                    raise InputError(
+                        f"{self.source}: {STAGE}: databases of several"
+                        " recordings have no control"
+                    )
             given += [CAUSE] if condition.causes else []
             for name in given:
                 if name != STAGE:
@@ -696,6 +727,10 @@ def _has_several(condition: Condition) -> bool:
         ):
             return True
     return False
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def _base_name(database: Scenario) -> str:

@@ -92,6 +92,7 @@ def joined_scans(
         most: number of scans to keep, from the start of the list; None for all.
     """
     poses = []
+    is_one = len(every) == 1 and every[0].drive_of is None
     drives: list[np.ndarray] = []
     for one, world in zip(every, worlds, strict=True):
         own = one.drive_of
@@ -108,7 +109,7 @@ def joined_scans(
         X_WS=np.concatenate(poses)[:most],
         descriptors=[d for one in every for d in one.descriptors][:most],
         clouds=[cloud for one in every for cloud in one.clouds][:most],
-        drive_of=np.concatenate(drives)[:most] if len(every) > 1 else None,
+        drive_of=None if is_one else np.concatenate(drives)[:most],
     )
 
 

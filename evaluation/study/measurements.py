@@ -91,12 +91,7 @@ def shown_overlaps(
     """
     choice.make()  # It registers the type of its descriptions.
     (_, database), (_, query) = (part.read() for part in described)
-    kept, asked = (part.read() for part in scans)
-    if not isinstance(kept, list):
-        kept = [
-            gather(kept, frame, 1, protocol.max_range).astype(np.float32)
-            for frame in database.places.frames.tolist()
-        ]
+    asked = scans[1].read()
     if not isinstance(asked, list):
         asked = [
             protocol.query_scan(asked, frame).astype(np.float32)
@@ -122,15 +117,22 @@ def shown_overlaps(
         for radius in radii
     }
     found = {radius: np.full(len(asked), math.nan) for radius in radii}
+    drive_of = database.places.drive_of
+    if drive_of is None:
+        drive_of = np.zeros(len(searched.rows), np.int64)
     # The scans of one drive are in memory at a time.
     first = 0
-    for source in (None, *(scans for scans, _ in beside)):
-        scans_here = kept if source is None else source.read()
-        of = (searched.rows >= first) & (
-            searched.rows < first + len(scans_here)
-        )
-        chosen = [scans_here[k] for k in searched.rows[of] - first]
-        first += len(scans_here)
+    for number, (part, _) in enumerate([(scans[0], None), *beside]):
+        of = drive_of == number
+        kept = part.read()
+        if isinstance(kept, list):
+            chosen = [kept[row] for row in searched.rows[of] - first]
+            first += len(kept)
+        else:
+            chosen = [
+                gather(kept, frame, 1, protocol.max_range).astype(np.float32)
+                for frame in database.places.frames[of].tolist()
+            ]
         for radius in radii:
             shown = best_overlaps(
                 chosen,

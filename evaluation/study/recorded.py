@@ -3,16 +3,21 @@
 A recording is read once, for all that a study needs of it.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from cns_drake.base.drives.drive import check_same_world
+from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
+from cns_drake.base.listing import natural_key
+from cns_drake.base.value_lists import repeated
 from evaluation.recognition.description import Role
+from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
-from evaluation.study.collection import MapDrives
+from evaluation.study.collection import MapDrives, RecordingInfo
 from evaluation.study.feature_extraction import (
     FeatureExtraction,
     Further,
@@ -25,6 +30,9 @@ from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result
 # queries.
 _MAP_COST = 19.0
 _ROLE_COST = 10.0
+# Clocks of recordings that begin at 0 say nothing about their order: the first
+# stamps of others are years after 1970 [ns].
+_DATED_NS = 10**17
 
 
 class RecordedCondition(NamedTuple):
@@ -36,12 +44,17 @@ class RecordedCondition(NamedTuple):
             which both drives lead through the stage of the query.
         is_baseline: whether other conditions are compared with this one.
         protocol: protocol of place recognition.
+        sessions: the recordings of the database, if there are several.
+        keep: which places of these recordings are kept, see
+            `evaluation.recognition.keeping.kept_places`.
     """
 
     factors: Mapping[str, Any]
     stage: str
     is_baseline: bool
     protocol: RetrievalProtocol
+    sessions: tuple[RecordingInfo, ...] = ()
+    keep: str | int = KEEP_ALL
 
 
 def recorded_comparisons(
@@ -67,7 +80,11 @@ def recorded_comparisons(
     pairs = city.recognition_pairs() if both_ways else city.change_pairs()
     if with_itself:
         pairs += [(one, one) for one in city.stages.values()]
-    for pair in pairs:
+    composed = [one for one in conditions if one.sessions]
+    if composed:
+        conditions = [one for one in conditions if not one.sessions]
+        yield from _of_sessions(city, composed, seed)
+    for pair in pairs if conditions else ():
         control = city.unchanged_pair(*pair)
         for condition in conditions:
             drives = pair if condition.stage == OWN else control
@@ -97,6 +114,87 @@ def recorded_comparisons(
             )
 
 
+def chosen_sessions(
+    city: MapDrives, names: Sequence[str], where: str
+) -> tuple[RecordingInfo, ...]:
+    """Returns the recordings of a database of several, from older to newer.
+
+    Args:
+        city: all recordings of the map; the query is that of the last stage.
+        names: names of the recordings.
+        where: file and field of the names, for errors.
+
+    Raises:
+        InputError: a recording is unknown, there twice, in another frame of
+            reference, or not older than the query.
+    """
+    known = {one.name: one for one in (*city.stages.values(), *city.others)}
+    for name in repeated(names):
+        raise InputError(f"{where}: {name}: the same drive twice")
+    query = _query_of(city)
+    placed = query.source()
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"{where}: {city.name} has no recording {name!r} (there are:"
+                f" {', '.join(sorted(known))}){did_you_mean(name, known)}"
+            )
+        if name == query.name:
+            raise InputError(f"{where}: {name}: this drive is the query")
+        drive = known[name].source()
+        with errors_at(where):
+            check_same_world(drive, placed)
+        is_dated = drive.stamps_ns[0] > _DATED_NS < placed.stamps_ns[0]
+        if is_dated and drive.stamps_ns[0] > placed.stamps_ns[0]:
+            raise InputError(
+                f"{where}: {name}: this drive is later than the query"
+                f" {query.name}"
+            )
+    return tuple(
+        sorted(
+            (known[name] for name in names),
+            key=lambda one: natural_key(one.stage),
+        )
+    )
+
+
+def _query_of(city: MapDrives) -> RecordingInfo:
+    """Returns the recording of the last stage."""
+    return city.stages[max(city.stages, key=natural_key)]
+
+
+def _of_sessions(
+    city: MapDrives, conditions: Iterable[RecordedCondition], seed: int
+) -> Iterator[Pair]:
+    """Yields the pairs of databases of several recordings and the query."""
+    query = _query_of(city)
+    for one in conditions:
+        drives = [session.named for session in one.sessions]
+        digest = fingerprint(
+            {
+                **one.protocol.to_json(),
+                "radius": None,
+                "drives": [drive.name for drive in drives],
+                "keep": one.keep,
+            }
+        )[:8]
+        yield Pair(
+            map_name=city.name,
+            names=(city.name, query.name),
+            factors=one.factors,
+            seed=seed,
+            is_baseline=one.is_baseline,
+            stated=one.protocol,
+            key=f"{drives[0].name} {query.name} {digest}",
+            database=drives[0],
+            query=query.named,
+            way=drives[0],
+            protocol=one.protocol,
+            beside=tuple(drives[1:]),
+            keep=one.keep,
+        )
+
+
 @dataclass
 class ExtractionJobs(Jobs):
     """Jobs of a study that read each drive once.
@@ -120,7 +218,9 @@ class ExtractionJobs(Jobs):
         super().expect(pair)
         if self._protocol is None:
             self._protocol = pair.protocol
-        for drive, role in pair.roles:
+        further: list[tuple[NamedDrive, Role]]
+        further = [(drive, "places") for drive in pair.beside]
+        for drive, role in (*pair.roles, *further):
             if self._is_extracted(pair.protocol):
                 self._roles.setdefault(drive.name, set()).add(role)
 

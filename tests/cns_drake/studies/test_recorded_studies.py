@@ -1,9 +1,11 @@
 """Experiments on folders of recordings, whose stage alone can vary."""
 
 from helpers import studies
+from helpers.drive_files import make_scan, write_recording
 from helpers.eval_program import write_towns
 from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_towns import drive
+import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
@@ -202,6 +204,94 @@ def test_folders_without_two_stages(folder, tmp_path):
 def test_a_folder_given_twice(folder, tmp_path):
     with pytest.raises(InputError, match=r"another map, .* metropolis, too"):
         measure(tmp_path / "out", folder, f"{folder}/.")
+
+
+SESSIONS = [["metropolis_01"], ["metropolis_01", "metropolis_04_control"]]
+
+
+@pytest.mark.slow
+def test_several_recordings_are_a_database(folder, tmp_path):
+    """One session is the drive by itself; both have the places of both."""
+    results = measure(
+        tmp_path / "both",
+        folder,
+        tasks=["place", "localise"],
+        database={"sessions": SESSIONS, "keep": ["all", 1]},
+    )
+    alone = measure(tmp_path / "alone", folder, tasks=["place"])
+    one, two = (f"[{','.join(names)}]" for names in SESSIONS)
+
+    def of(sessions, keep, task="place"):
+        where = {"database.sessions": sessions, "database.keep": keep}
+        return values(results, **where, task=task, gate=False, method="solid")
+
+    single = values(alone, task="place", gate=False)
+    expected = {name: single[name] for name in ("auc", "r1", "visible_change")}
+    assert expected.items() <= of(one, "all").items()
+    assert of(two, "all")["places"] == 2.0 * single["places"]
+    # Both follow one route, so each cell has a place of each.
+    assert of(two, 1)["places"] == single["places"]
+    assert of(two, "all", "cost")["memory"] == pytest.approx(
+        2.0 * of(one, "all", "cost")["memory"], rel=0.01
+    )
+    assert results.where(task="localise", method="icp").rows
+
+
+@pytest.mark.parametrize(
+    ("sessions", "fault"),
+    [
+        (["metropolis_01", "metropolis_01"], "metropolis_01: the same drive"),
+        (["metropolis_4"], "metropolis has no recording 'metropolis_4'"),
+        (["metropolis_04"], "metropolis_04: this drive is the query"),
+        ([[]], "a list without a value"),
+        ([{"years": 3}], "not a list of names of recordings"),
+    ],
+)
+def test_faults_of_recorded_sessions(folder, tmp_path, sessions, fault):
+    with pytest.raises(
+        (InputError, ValueError), match=rf"database\.sessions: {fault}"
+    ) as error:
+        measure(tmp_path, folder, database={"sessions": sessions})
+    if isinstance(error.value, InputError):
+        assert "\n" not in str(error.value)
+
+
+def write_town(folder, number, **options):
+    """Writes a drive of two scans through stage `number` of a town."""
+    scans = [make_scan(np.ones((9, 3))), make_scan(np.ones((9, 3)))]
+    write_recording(
+        folder / f"town_{number}", scans, [np.eye(4)] * 2, **options
+    )
+
+
+def test_sessions_of_another_frame(tmp_path):
+    write_town(tmp_path / "in", 1)
+    write_town(tmp_path / "in", 2, world_frame="utm")
+    write_town(tmp_path / "in", 3)
+    with pytest.raises(InputError, match=r"sessions: .*utm") as error:
+        measure(
+            tmp_path / "out",
+            tmp_path / "in",
+            database={"sessions": ["town_1", "town_2"]},
+        )
+    assert "\n" not in str(error.value)
+
+
+def test_sessions_later_than_the_query(tmp_path):
+    """By the clock, if it is one: drives with times from 0 on are undated."""
+    year_ns = 365 * 86_400 * 10**9
+    for number, years in ((1, 50), (2, 52), (3, 51)):
+        stamps = [years * year_ns, years * year_ns + 10**8]
+        write_town(tmp_path / "in", number, stamps_ns=stamps)
+    with pytest.raises(
+        InputError,
+        match="sessions: town_2: this drive is later than the query town_3",
+    ):
+        measure(
+            tmp_path / "out",
+            tmp_path / "in",
+            database={"sessions": ["town_1", "town_2"]},
+        )
 
 
 @pytest.mark.slow

@@ -103,5 +103,7 @@ def test_places_of_two_halves_are_those_of_the_whole():
     np.testing.assert_array_equal(found.clouds, whole.clouds)
     assert found.drive_of.tolist() == [0] * 4 + [1] * 7
     # A third drive is another one.
+    again = joined_scans([found], [0])
+    np.testing.assert_array_equal(again.drive_of, found.drive_of)
     more = joined_scans([found, whole], [0, 0])
     assert more.drive_of.tolist() == [0] * 4 + [1] * 7 + [2] * number
