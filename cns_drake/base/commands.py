@@ -122,7 +122,7 @@ class Command(TyperCommand):
         super().__init__(*args, help=text, params=params, **settings)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Reads the command line, after refusing options of other days."""
+        """Reads the command line; refuses options of earlier versions first."""
         former = getattr(self.callback, "former_options", {})
         for word in args[: args.index("--")] if "--" in args else args:
             option = word.partition("=")[0]
@@ -151,9 +151,9 @@ def former_options(
     """Returns a decorator that names the new spelling of a command's options.
 
     Args:
-        replaced: option of an earlier version -> what replaces it, such as
-            `--lidar`. Giving the former option is an error that names the new
-            one.
+        replaced: option of an earlier version -> the option that replaces it,
+            such as `--lidar`. If a user gives the earlier option, an error
+            names the new one.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -164,10 +164,10 @@ def former_options(
 
 
 def given_options(context: typer.Context) -> list[str]:
-    """Returns the names of parameters that stand on the command line.
+    """Returns the names of parameters that the user gave on the command line.
 
-    Parameters that have their defaults, or values from the environment, are not
-    among them.
+    The result excludes parameters whose values are defaults or come from the
+    environment.
     """
     sources = {
         str(one.name): context.get_parameter_source(str(one.name))

@@ -1,4 +1,4 @@
-"""Models of input files whose numbers are numbers."""
+"""Models of input files that do not accept true and false as numbers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pydantic import BaseModel, ValidationInfo, field_validator
 
 
 class InputModel(BaseModel):
-    """A model of an input file in which true and false are no numbers.
+    """A model of an input file in which true and false are not numbers.
 
-    pydantic would take them for 1 and 0.
+    By itself, pydantic reads them as 1 and 0.
     """
 
     @field_validator("*", mode="before")

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: when they may interrupt, how they end a process."""
+"""Ctrl-C and SIGTERM: when they can interrupt, and how they end a process."""
 
 from collections.abc import Callable, Iterator
 import contextlib
@@ -113,9 +113,8 @@ def ignore_interrupts() -> None:
 def end_interrupted() -> NoReturn:
     """Ends an interrupted process at once, without Python's shutdown.
 
-    The shutdown can fail after a library was interrupted in a computation. Of
-    the files that are open, only standard output and standard error are
-    flushed.
+    The shutdown can fail if a library was interrupted during a computation.
+    Only standard output and standard error are flushed, no other open files.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

@@ -23,8 +23,8 @@ def natural_key(text: str) -> tuple:
 def listed(folder: Path, pattern: str = "*") -> list[Path]:
     """Returns the files and folders in a folder, in natural order.
 
-    Those with a hidden name are left out: editors and macOS leave files such as
-    `._000001.bin` beside those of a user.
+    Hidden files are left out: editors and macOS write files such as
+    `._000001.bin` next to the user's files.
 
     Args:
         folder: the folder; if there is none, the result is empty.

@@ -1,4 +1,4 @@
-"""Estimates of the time that is left, made only from a steady pace."""
+"""Estimates of the time that is left, made only if the pace is steady."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Pace:
     def steady(self, total: float) -> float | None:
         """Returns the time that one unit of work takes [s].
 
-        The result is None as long as an estimate for `total` units of work
-        could not be trusted: until a tenth is done, or if the first half of
-        what is done took another time than the second half.
+        The result is None while an estimate for `total` units of work would be
+        unreliable: before a tenth is done, or if the first half of the work
+        done so far did not take about as long as the second half.
         """
         work, seconds = self._seen[-1]
         if work < _LEAST_SHARE * total or seconds < _LEAST_TIME:
@@ -116,7 +116,7 @@ class TimeLeft:
         return ended / max(sum(work.cost for work in works), 1e-9)
 
     def seconds(self, now: float) -> float | None:
-        """Returns the time left [s]; None while it cannot be told."""
+        """Returns the time left [s]; None while it cannot be estimated."""
         left = [work for work in self._works.values() if not work.is_ended]
         if not left:
             return 0.0

@@ -1,8 +1,9 @@
-"""What long work says about itself: what it does, and how far it is.
+"""Progress reports of long tasks: what they do, and how far they are.
 
-Work says so wherever it is called from, as a library writes to a log. Who
-starts the work decides who hears it: the command line shows it on stderr, the
-process of a job sends it to its parent, and by default nobody hears it.
+A task reports its progress as a library writes to a log, whoever called it. The
+caller chooses the listener that receives the reports: the command line shows
+them on stderr, and the process of a job sends them to its parent process. By
+default, they are ignored.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ _Item = TypeVar("_Item")
 
 
 class Listener:
-    """Hears what work does. This one ignores all that it hears."""
+    """Receives progress reports of a task. This base class ignores them."""
 
     def doing(
         self, activity: str, done: int = 0, total: int = 0, unit: str = ""
     ) -> None:
-        """Hears what is done from now on, and how far it is.
+        """Receives what the task does from now on, and how far it is.
 
         Args:
             activity: what is done, such as `reading the stage`.
@@ -33,7 +34,7 @@ class Listener:
     def jobs(
         self, costs: Mapping[str, float], num_done: int, unit: str
     ) -> contextlib.AbstractContextManager[JobsListener]:
-        """Returns a context manager whose value hears of jobs.
+        """Returns a context manager whose value receives reports of jobs.
 
         Args:
             costs: name of each job that is left -> expected time on one core
@@ -45,10 +46,10 @@ class Listener:
 
 
 class JobsListener:
-    """Hears what jobs do that run side by side. This one ignores it."""
+    """Receives reports of parallel jobs. This base class ignores them."""
 
     def start(self, name: str) -> None:
-        """Hears that a job starts, or is started again."""
+        """Receives the report that a job starts, or is started again."""
 
     def doing(
         self,
@@ -58,10 +59,10 @@ class JobsListener:
         total: int = 0,
         unit: str = "",
     ) -> None:
-        """Hears what a job does; see `Listener.doing`."""
+        """Receives what a job does; see `Listener.doing`."""
 
     def end(self, name: str, fault: bool = False) -> None:
-        """Hears that a job has ended; if `fault` is true, with an error."""
+        """Receives the report that a job ended, with an error if `fault`."""
 
 
 _NOBODY = Listener()
@@ -73,15 +74,15 @@ _loops: ContextVar[tuple[tuple[str, int, int, str], ...]] = ContextVar(
 
 
 def listener() -> Listener:
-    """Returns who hears what work does here."""
+    """Returns the listener that receives progress reports here."""
     return _listener.get()
 
 
 @contextlib.contextmanager
 def heard_by(one: Listener) -> Iterator[None]:
-    """Makes a listener hear what the work of the `with` block does.
+    """Makes a listener receive the progress reports of the `with` block.
 
-    Other threads than the present one are not heard.
+    It does not receive the reports of other threads.
     """
     token = _listener.set(one)
     try:
@@ -91,16 +92,16 @@ def heard_by(one: Listener) -> Iterator[None]:
 
 
 def doing(activity: str, done: int = 0, total: int = 0, unit: str = "") -> None:
-    """Says what is done from now on; see `Listener.doing`."""
+    """Reports what is done from now on; see `Listener.doing`."""
     _listener.get().doing(activity, done, total, unit)
 
 
 def track(
     items: Iterable[_Item], activity: str, total: int, unit: str
 ) -> Iterator[_Item]:
-    """Yields the items of a long loop, and says how far it is.
+    """Yields the items of a long loop, and reports how far the loop is.
 
-    After a loop inside another one, the work is that of the outer loop again.
+    After an inner loop, the progress of the outer loop is reported again.
 
     Args:
         items: the items.

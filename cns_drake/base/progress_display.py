@@ -1,4 +1,4 @@
-"""What a program does, on stderr: bars on a terminal, lines in a log."""
+"""Shows progress on stderr: bars on a terminal, lines in a log."""
 
 from __future__ import annotations
 
@@ -110,10 +110,10 @@ def _clock(seconds: float) -> str:
 class Display(Listener):
     """Shows on a stream what the program does, while the `with` block runs.
 
-    On a terminal, the last lines show it, one for the program or all of its
-    jobs and one for each running job. Elsewhere whole lines are printed: when
-    the activity changes, and after growing intervals. Nothing is shown of work
-    that ends at once.
+    On a terminal, the last lines show the progress: one line for the program,
+    or for all of its jobs, and one for each running job. In a file or pipe,
+    whole lines are printed when the activity changes, and after growing
+    intervals. Work that ends at once is not shown.
     """
 
     def __init__(
@@ -182,7 +182,7 @@ class Display(Listener):
                 self._jobs = before
 
     def refresh(self) -> None:
-        """Shows what is done, if that is due."""
+        """Updates the display, if an update is due."""
         with self._lock:
             now = self._now()
             if self._ended.is_set() or now < self._start + PATIENCE:
@@ -195,20 +195,20 @@ class Display(Listener):
                 self._print("; ".join(self._lines(now)), now)
 
     def print(self, text: str) -> None:
-        """Prints a line in a log; a terminal shows what it is about."""
+        """Prints a line, unless the stream is a terminal."""
         with self._lock:
             if not self._is_terminal:
                 self._print(text, self._now())
 
     @contextlib.contextmanager
     def erased(self) -> Iterator[None]:
-        """Lets something else write on the terminal."""
+        """Removes the display while other text is written on the terminal."""
         with self._lock:
             self._erase()
             yield
 
     def note_end(self, text: str) -> None:
-        """Notes what else was written on the terminal at last."""
+        """Records the end of the last other text on the terminal."""
         self._ends_line = text.endswith("\n")
 
     def _keep_telling(self) -> None:
@@ -285,7 +285,7 @@ def _bar(share: float) -> str:
 
 @contextlib.contextmanager
 def shown() -> Iterator[None]:
-    """Shows on stderr what the block does, unless it is shown already."""
+    """Shows the progress of the block on stderr, unless it is shown already."""
     if isinstance(listener(), Display):
         yield
         return

@@ -1,4 +1,4 @@
-"""How both programs start."""
+"""Starts the two command-line programs."""
 
 from collections.abc import Callable
 import sys

@@ -298,10 +298,10 @@ def note(message: str) -> None:
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """Says, if the block is interrupted, that the work can be resumed.
+    """Prints a note if the block is interrupted: the work can be resumed.
 
-    The note says that what is finished is kept, and that the same command
-    continues from there.
+    The note says that finished work is kept, and that the same command
+    continues the work.
 
     Raises:
         KeyboardInterrupt: if the block is interrupted.
@@ -340,7 +340,7 @@ def show(
     *,
     json: bool,
 ) -> None:
-    """Prints a result as JSON; or as rows, or text, for people."""
+    """Prints a result as JSON, or in a form for people: rows or text."""
     if json:
         print_json(dict(values))
     elif isinstance(rows, str):

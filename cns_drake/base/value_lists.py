@@ -1,4 +1,4 @@
-"""Lists of values in input files: spread evenly, and without repetitions."""
+"""Lists of values in input files: evenly spaced values, and repetitions."""
 
 from collections.abc import Hashable, Iterable, Mapping
 import json
@@ -12,16 +12,16 @@ _MOST_SPREAD = 10_000
 
 
 def is_spread(value: object) -> bool:
-    """Returns whether a value is {from, to, count}, short for a list."""
+    """Returns whether a value is {from, to, count}, a short form of a list."""
     return isinstance(value, Mapping) and set(value) == _SPREAD
 
 
 def spread(value: Any, *, whole: bool = False) -> Any:
     """Turns {from, to, count} into a list of evenly spaced numbers.
 
-    Other values are returned as they are. The numbers are rounded to four
-    decimal places. They are of type int if all of them are whole, and so are
-    both ends as written.
+    Other values are returned unchanged. The numbers are rounded to four decimal
+    places. They have the type int if all of them are whole and both ends are
+    written as whole numbers.
 
     Args:
         value: any value of a field.
@@ -59,7 +59,7 @@ def spread(value: Any, *, whole: bool = False) -> Any:
 
 
 def repeated(values: Iterable[_T]) -> list[_T]:
-    """Returns a value for each later value that equals it, in order."""
+    """Returns each value that equals an earlier one, in order."""
     seen: dict[Hashable, _T] = {}
     found = []
     for value in values:

@@ -1,4 +1,4 @@
-"""The version of the release, which recordings and reports carry."""
+"""The version of the release, which recordings and reports contain."""
 
 from collections.abc import Iterable
 import contextlib

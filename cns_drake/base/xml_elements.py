@@ -31,7 +31,7 @@ class Element(ElementTree.Element):
     line = 0
 
     def all(self, *path: str) -> Iterator[Element]:
-        """Yields all elements that a path of tags leads to from this element.
+        """Yields all elements that a path of tags, from this element, reaches.
 
         For example, `all("road", "link")` yields each `link` in each `road` in
         this element.
@@ -39,7 +39,7 @@ class Element(ElementTree.Element):
         return cast(Iterator[Element], self.iterfind("/".join(path)))
 
     def first(self, *path: str) -> Element | None:
-        """Returns the first element that a path of tags leads to, or None."""
+        """Returns the first element that a path of tags reaches, or None."""
         return next(self.all(*path), None)
 
     def value(self, name: str, default: str | None = None) -> str:

@@ -73,7 +73,7 @@ class YamlLoader(_PlainScalars, yaml.CSafeLoader):
 
 
 class MarkedYamlLoader(_PlainScalars, yaml.SafeLoader):
-    """A slower loader, whose nodes know their places in the text."""
+    """A slower loader, whose nodes contain their positions in the text."""
 
 
 def read_yaml(path: Path) -> Any:
@@ -93,11 +93,11 @@ def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
 
     A document whose aliases expand to too many values is refused, since a few
     lines of aliases could fill the memory. A repeated key is an error; YAML
-    libraries would silently use the last value. Without quotes, yes, no, on and
-    off, and whole numbers that begin with a zero or contain underscores, are
-    errors, too, since libraries read them in different ways. So are numbers in
-    another form behind !!int and !!float, other types such as !!set, and a <<
-    that merges several mappings.
+    libraries would silently use the last value. Some values are errors because
+    libraries read them in different ways: yes, no, on and off without quotes;
+    whole numbers without quotes that begin with a zero or contain underscores;
+    numbers in another form after !!int and !!float; other types such as !!set;
+    and a << that merges several mappings.
 
     Args:
         text: the document.

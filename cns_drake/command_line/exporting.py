@@ -383,12 +383,13 @@ def _write_maps(
     *,
     json: bool,
 ) -> None:
-    """Writes maps of two drives, and the truth of what changed if it is known.
+    """Writes maps of two drives, with labels of what changed if they are known.
 
     Args:
         a: older drive.
         b: newer drive.
-        layout: whether the maps get labels.
+        layout: the format: `map-truth` (maps with labels) or `map-sessions`
+            (maps without labels).
         output: folder to write.
         values: options by name.
         json: whether to print the counts of labels as JSON.

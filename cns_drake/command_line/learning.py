@@ -53,8 +53,8 @@ def train(
             --minutes.
         steps: Number of training steps; by default the number follows from
             --minutes.
-        seed: Seed of everything that is sampled. Another seed gives other
-            cities and other weights.
+        seed: Seed of all random choices. Another seed gives other cities and
+            other weights.
         without: Kind of variation to leave out of the training: changes of the
             city between drives (change); weather, and LiDAR returns with the
             losses and errors of a data sheet (returns); or wandering in the

@@ -196,14 +196,13 @@ def import_city(
             (first), only the last stage (last), or no stage (never).
         lod: Level of detail (LoD) in which to read the buildings of CityJSON,
             such as 1.2; by default the highest that each building has.
-        seed: Seed of everything that is random: which buildings are missing or
-            lower in the first stage (--grow), what is added to buildings and
-            streets, and, for an OpenDRIVE file without buildings, all its
-            buildings.
+        seed: Seed of all random choices: which buildings are missing or lower
+            in the first stage (--grow), what is added to buildings and streets,
+            and, for an OpenDRIVE file, which has no buildings, the whole city.
         along: CSV file with the path of a drive of your own, x and y in the map
             [m]. This drive replaces the two proposed drives.
         within: Leave out structures that are farther than this from the drives
-            [m], to save memory. By default none is left out.
+            [m], to save memory. By default, no structure is left out.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or right if the file does not say.
         grow: Add a first stage in which a random sample of the buildings, of
@@ -335,8 +334,8 @@ def city(
 ) -> None:
     """Build the stages of a city from its roads and plan.
 
-    You write the roads, and a plan of what stands along the roads; the command
-    generates an SDF world for each stage.
+    You write the roads, and a plan of the districts along the roads. The
+    command generates an SDF world for each stage.
 
     Args:
         folder: Folder with roads.yaml, city.yaml and stages.yaml. The stages
@@ -391,8 +390,10 @@ def maps_and_years(
     appends all further years to the arguments, after the names of the maps.
 
     Args:
-        words: the arguments: names of maps, then the further years.
-        first: the values of the option, one each time that it is given.
+        words: the arguments of the command: names of maps, then the further
+            years.
+        first: the values that the parser has already read for --years, one per
+            occurrence of the option.
 
     Returns:
         The names of the maps, and all years.

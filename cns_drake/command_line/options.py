@@ -21,7 +21,8 @@ Frames = Annotated[
         min=1,
         metavar="N",
         help="Number of frames (LiDAR scans) to record, from the start of the "
-        "drive; by default the whole drive. Usually a second has 20 frames.",
+        "drive; by default the whole drive. Usually there are 20 frames per "
+        "second.",
     ),
 ]
 LIDAR_OPTION = typer.Option(

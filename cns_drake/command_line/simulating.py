@@ -161,8 +161,8 @@ def simulate(
 ) -> None:
     """Simulate a drive and record it.
 
-    Writes a rosbag2 folder, as ROS 2 tools read it: an MCAP file with the
-    scans, the poses and all other sensor data, and its metadata.
+    Writes a rosbag2 folder, which ROS 2 tools can read. It contains an MCAP
+    file with the scans, the poses and all other sensor data, and its metadata.
 
     Args:
         scenario: Name of a shipped drive, as cns-drake list shows it, or a

@@ -91,11 +91,11 @@ class DriveRecord:
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: for each moving object other than the vehicle: id of its leading
-            geometry frame -> ids of all its geometry frames, each with its
-            constant pose in the leading one.
-        names: id of an object's leading geometry frame -> name of the object in
-            the page.
+        limbs: the parts of each moving object other than the vehicle: id of the
+            object's root frame -> {id of each of its geometry frames: constant
+            pose in the root frame}. The root frame is the frame whose poses are
+            recorded.
+        names: id of an object's root frame -> name of the object in the page.
         images: name of a camera -> the images to show: index of the frame, and
             JPEG.
     """

@@ -100,9 +100,9 @@ def tcr(
         control: Third drive, on A's route in B's stage or on B's route in A's
             stage. The command then also prints how large TCR_sym is if only the
             routes differ and nothing has changed.
-        paths: Compare how the two drives were driven, instead of what changed.
-            Every 5 m along A, the command measures how B differs from A:
-            lateral offset, lane, heading and height. The command also prints
+        paths: Compare the paths and speeds of the two drives, instead of what
+            changed. Every 5 m along A, the command measures how B differs from
+            A: lateral offset, lane, heading and height. The command also prints
             which share of the time each car stands, and its speeds. For
             comparison, the command shows the same numbers for two pairs of real
             drives: two drives of Boreas, 28 days apart, and KAIST 01 and 02 of
@@ -383,9 +383,9 @@ def report(
     """Evaluate all recordings in a folder and write a report.
 
     The command compares the drives of each map in place recognition and
-    structural change. The folder then contains results.csv and queries.csv, as
-    after cns-drake study stages, figures and report.html. To resume after an
-    interruption, run the same command again.
+    structural change. The folder then contains report.html, figures, and the
+    tables results.csv and queries.csv, in the same format as those of cns-drake
+    study. To resume after an interruption, run the same command again.
 
     Args:
         recordings: Folder that contains the recordings.

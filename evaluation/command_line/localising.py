@@ -100,8 +100,8 @@ def localise(
             differs from that of the drive.
         output: Folder to write results.csv and queries.csv to, in the same form
             as those of a study; created if it does not exist. The folder also
-            gets localisation.csv, with all that is known of each query, and a
-            picture if you give --track.
+            gets localisation.csv, with all values of each query, and a picture
+            if you give --track.
     """
     import math
 

@@ -23,9 +23,9 @@ def real(
     that the page "Real drives" of the documentation lists: KITTI 00 and its
     revisits, nuScenes 1072, Newer College, NCLT, HeLiPR, bird's-eye images of
     KITTI with poses, and results of other programs over sessions. If a data set
-    is missing, the command says so and goes on with the others. The command
-    writes results.csv and queries.csv, which cns-eval compare reads. To resume
-    after an interruption, run the same command again.
+    is missing, the command prints a note and continues with the others. The
+    command writes results.csv and queries.csv, which cns-eval compare reads. To
+    resume after an interruption, run the same command again.
 
     Args:
         folder: Folder with the excerpts of public data sets.

@@ -1,9 +1,8 @@
-"""The paper as the reference of a report: its values, findings and aims.
+"""Reference values of a report: the paper's numbers and claims, and aims.
 
-The findings are claims of the paper. The aims are targets by which the shipped
-cities were made: TCR_sym and SOLiD's AUC were fitted to the paper. Other
-methods' results were not fitted, but had been seen before later versions of the
-cities were frozen.
+The aims are the targets to which this project fitted its cities: TCR_sym and
+SOLiD's AUC were fitted to the paper. The results of other methods were not
+fitted, but had been seen before later versions of the cities were frozen.
 """
 
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Measures a method's cost: time to describe and query, memory per place."""
+"""Measures a method's cost: time per descriptor and query, memory per place."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -94,8 +94,8 @@ def measure_cost(
 
     Args:
         method: method to measure.
-        clouds: clouds to describe, two or more; the time of the first does not
-            count.
+        clouds: clouds to describe, two or more; the time for the first one does
+            not count.
         scans_per_place: number of scans that are merged into each cloud.
         search: cost of searching a database.
     """
@@ -118,9 +118,9 @@ def query_ms(
     """Returns the median CPU time of several queries, on one core [ms].
 
     A query is compared with all places, including the method's second stage if
-    it has one. Geometric verification and the pose of the top-ranked place do
-    not count: not each method has them, and they take the same time however
-    many places there are. The first query does not count.
+    it has one. The time does not include geometric verification and the pose of
+    the top-ranked place, because not every method has them, and their time does
+    not depend on the number of places. The first query does not count.
 
     Args:
         method: method to measure.

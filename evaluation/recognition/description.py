@@ -119,7 +119,7 @@ class DriveDescriptors:
 
     Attributes:
         name: name of the drive.
-        places: places of the drive, for queries to find.
+        places: places of the drive, among which queries are searched.
         queries: queries of the drive.
     """
 
@@ -146,13 +146,13 @@ def describe_drive(
         drive: the drive.
         methods: methods that describe the scans.
         roles: whether the drive has places, queries or both.
-        protocol: protocol by which frames of places and queries are chosen, and
-            their clouds made.
+        protocol: protocol that determines the frames of places and queries, and
+            how their clouds are made.
         visit: function that is called with the frame number and the scan (N, 3)
             of each place and query that `protocol` chooses. The scan is cropped
             to the protocol's range, in the sensor's frame. If the drive has
-            only queries, the scan is changed as the protocol says: turned,
-            tilted or without a sector.
+            only queries, the scan is changed as the protocol says: with a
+            random yaw, a tilt or an occluded sector.
         further: requests for further descriptors: each is a method, the roles
             to describe, and a protocol.
 

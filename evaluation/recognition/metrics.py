@@ -194,8 +194,8 @@ UNKNOWN = Interval()
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of the route in which each query lies.
 
-    A block is a stretch of the route; the bootstrap draws whole blocks, because
-    neighbouring queries tend to be right or wrong together.
+    A block is a stretch of the route. The bootstrap samples whole blocks,
+    because neighbouring queries tend to be right or wrong together.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].
@@ -217,15 +217,15 @@ def resampled_weights(
     """Returns the number of times each query is in each bootstrap sample.
 
     Neighbouring queries along a drive tend to be right or wrong together.
-    Therefore whole blocks of queries are drawn with replacement (Kuensch,
+    Therefore whole blocks of queries are sampled with replacement (Kuensch,
     Annals of Statistics 17, 1989; here blocks do not overlap).
 
     Args:
         num_queries: Q, one or more.
-        seed: seed of the draws; equal seeds draw the same queries.
-        blocks: (Q,) the block of each query. Each sample draws as many blocks
-            as exist. By default, and on routes shorter than two blocks, each
-            query is a block of its own.
+        seed: seed of the random sampling; equal seeds give the same samples.
+        blocks: (Q,) the block of each query. Each sample contains as many
+            blocks as exist. By default, and on routes shorter than two blocks,
+            each query is a block of its own.
 
     Returns:
         (B, Q) float64 counts. Without blocks, each row sums to Q.
@@ -255,13 +255,14 @@ def weights_by_drive(
     """Yields how often queries are in bootstrap samples, for sets of queries.
 
     Sets of queries of one drive are not independent: where the streets suit a
-    method, it tends to be right under all conditions. Therefore the sets of one
-    drive draw the same blocks. Different drives draw independently.
+    method, it tends to be right under all conditions. Therefore samples of the
+    sets of one drive contain the same blocks. Different drives are sampled
+    independently.
 
     Args:
         blocks: for each set, the block (Q,) of the route of each query.
-        drives: for each set, a number that identifies the drive, and seeds its
-            draws.
+        drives: for each set, a number that identifies the drive, and is the
+            seed of its samples.
 
     Yields:
         For each set, the number of different blocks in all sets of its drive,
@@ -308,8 +309,8 @@ def own_samples(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns AUC, R@1 and strict AUC of B bootstrap samples, each (B,).
 
-    Strict AUC is defined at `PrCurve.strict_auc`. The samples draw whole blocks
-    of the queries' route, see `resampled_weights`. They are cached, so that
+    Strict AUC is defined at `PrCurve.strict_auc`. The samples consist of whole
+    blocks of the queries' route, see `resampled_weights`. They are cached, so
     several comparisons use the same samples.
 
     Args:
@@ -325,7 +326,7 @@ def paired_samples(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns metrics of bootstrap samples, paired with those of `other`.
 
-    Sample k draws the same blocks of queries as sample k of
+    Sample k contains the same blocks of queries as sample k of
     `own_samples(other)`. The metrics of both methods or conditions can thus be
     subtracted, sample by sample.
 
@@ -360,7 +361,7 @@ def bootstrap_intervals(
 ) -> tuple[Interval, Interval]:
     """Returns 95 % intervals of AUC and of R@1, by bootstrap.
 
-    Each bootstrap sample draws whole blocks of the queries' route.
+    Each bootstrap sample consists of whole blocks of the queries' route.
 
     Args:
         outcomes: outcomes of the queries.
@@ -421,21 +422,21 @@ def compared_by_auc(
     """Returns the difference of the mean AUC between any two methods.
 
     The mean is over one or more sets of queries. All queries count, with or
-    without a match. The p-value is that of a t test. The variance of the sum of
-    all sets of one drive is that over bootstrap samples, which draw the same
-    blocks of the route for both methods and for all these sets, times n / (n -
-    1) for n blocks. Drives are independent, so that their variances add up, and
-    so do their n - 1 degrees of freedom.
+    without a match. The p-value comes from a t test. For the sets of one drive,
+    the variance of their sum is the variance over bootstrap samples, times n /
+    (n - 1) for n blocks. These samples contain the same blocks of the route for
+    both methods and for all sets of the drive. Drives are independent, so their
+    variances add up, and so do their n - 1 degrees of freedom.
 
     Args:
         answers: method -> its outcomes on each set of queries. The queries must
             be the same for all methods, and so must their blocks of the route,
             see `QueryOutcomes.blocks`.
         drives: for each set of queries, a number that identifies the drive. By
-            default, each set is of a drive of its own.
+            default, each set belongs to a different drive.
 
     Returns:
-        (first method, second method) -> AUC of the first minus that of the
+        (first method, second method) -> AUC of the first minus AUC of the
         second; and the p-value, corrected by Holm's method for the number of
         differences.
     """

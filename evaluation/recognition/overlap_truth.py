@@ -63,7 +63,7 @@ def overlap_matrix(
     Args:
         database: the drive of the places.
         query: the drive of the queries, in the same world frame.
-        protocol: protocol by which frames of queries and places are chosen.
+        protocol: protocol that determines the frames of queries and places.
         see: function that returns the surfaces seen at a frame of the database.
             By default these are the surfaces of the frame's scan, and at most
             8192 points of a query are compared.

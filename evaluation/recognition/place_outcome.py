@@ -1,4 +1,4 @@
-"""The answers of a method on two drives, query by query, as numbers."""
+"""The answers of a method to the queries of a drive, and their metrics."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ _HALF = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PlaceOutcome:
-    """The answers of a method to the queries of a drive, and their truth.
+    """The answers of a method to the queries of a drive, and which are right.
 
     All numbers, tables and pages of place recognition are made from it. It
     holds the top-ranked places of each query instead of the scores of all
     places.
 
     Attributes:
-        method: name of the method; if it has settings, with them.
+        method: name of the method, with its settings if it has any.
         database: name of the drive of the places.
         query: name of the drive of the queries.
-        protocol: protocol with the method's own choices. Its radius, and
-            whether it has geometric verification, are those of the outcome.
+        protocol: protocol with the method's own choices. Its radius and its
+            geometric verification apply to the outcome.
         protocol_name: name of the protocol in tables, see
             `RetrievalProtocol.name_with`.
         outcomes: outcomes of Q queries.
@@ -115,7 +115,7 @@ class PlaceOutcome:
             method: the method.
             protocol: protocol of the retrieval: the radius of a match, and
                 whether geometric verification has changed the scores.
-            retrieval: scores and truth of Q queries and D places.
+            retrieval: scores and ground truth of Q queries and D places.
             query: name of the drive of the queries, and time stamps (Q,) [ns]
                 and positions (Q, 3) [m] of the queries.
             drives: name of each place's drive (D names). The first name is
@@ -124,8 +124,8 @@ class PlaceOutcome:
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
                 match. None if it is unknown.
             num_here: number of places in the query's own city, which come
-                first; by default all of the database drive. Distances to all
-                other places are unknown.
+                first; by default all places of the database drive. Distances to
+                all other places are unknown.
         """
         scores = retrieval.scores
         order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)
@@ -361,7 +361,7 @@ def faults(
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
     """Returns the mean visible change minus that of a baseline.
 
-    The visible change also contains parts of a scan that are hidden only
+    The visible change also contains parts of a scan that are occluded only
     because the viewpoints differ (parallax). Subtracting the baseline removes
     this share.
 
@@ -426,18 +426,18 @@ def place_numbers(
 ) -> Iterator[Number]:
     """Yields a method's place recognition results in a condition, one by one.
 
-    Intervals are by bootstrap over blocks of the route. Each bootstrap sample
-    draws the same blocks in the condition and in the baseline, in which nothing
-    differs between the drives.
+    Intervals come from a bootstrap over blocks of the route. Each bootstrap
+    sample contains the same blocks in the condition and in the baseline, in
+    which nothing differs between the drives.
 
     Args:
         now: outcome of the method in the condition.
         before: outcome of the method in the baseline; None to leave out the
             results that compare the condition with the baseline. `kept`,
             `kept_r1` and `kept_strict` are AUC, R@1 and strict AUC in the
-            condition, divided by those in the baseline. `lost` is the number of
-            queries that are right in the baseline only, and `found` the number
-            of those that are right in the condition only. For
+            condition, divided by the same metric in the baseline. `lost` is the
+            number of queries that are right only in the baseline, and `found`
+            the number of queries that are right only in the condition. For
             `visible_change_added`, see the function.
     """
     outcomes = now.outcomes

@@ -35,8 +35,8 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 class RetrievalProtocol:
     """The protocol of place recognition: how two drives are compared.
 
-    The defaults are those of the paper, with queries as recorded, except for
-    the choice of the merged scan that stands for a place.
+    The defaults are those of the paper, with queries as recorded. The only
+    difference is which of the merged scans determines the pose of a place.
 
     Attributes:
         radius: greatest distance between a query and its match, in three
@@ -47,13 +47,13 @@ class RetrievalProtocol:
             farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; by default, each method uses its own number.
-        place: which of the merged scans stands for a place: `middle`; or
-            `first`, as in the paper. The pose of this scan is that of the
-            place. A method's own parameter `place` overrides this value. With
-            one scan per place, the value becomes None.
+        place: which of the merged scans determines the pose of the place:
+            `middle`; or `first`, as in the paper. A method's own parameter
+            `place` overrides this value. With one scan per place, the value
+            becomes None.
         exclude_recent: for a drive that is compared with itself: a query is
             compared only with places that the drive passed at least this time
-            before [s]. None if two drives are compared.
+            earlier [s]. None if two drives are compared.
         overlap: share of a query's scan, up to 1, that the scan of a place must
             show to be a match, at any distance (see
             `evaluation.recognition.overlap_truth`). None if places within
@@ -122,7 +122,7 @@ class RetrievalProtocol:
         return method.scans_per_place
 
     def scans_before(self, method: Method) -> int:
-        """Returns how many of the merged scans come before the place's scan.
+        """Returns how many merged scans come before the scan of the place.
 
         The place's scan is the one that gives the place its pose.
         """
@@ -132,7 +132,7 @@ class RetrievalProtocol:
     def query_sensor(self, frame: int) -> QuerySensor | None:
         """Returns the sensor of a query; None if queries are as recorded.
 
-        The sensor can be turned, tilted and partly hidden.
+        The sensor can have a random yaw, a tilt and an occluded sector.
         """
         if not self._changes_queries:
             return None
@@ -159,8 +159,8 @@ class RetrievalProtocol:
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
 
-        These poses differ from the recorded ones if the protocol turns or tilts
-        queries.
+        These poses differ from the recorded ones if the protocol gives queries
+        a random yaw or a tilt.
 
         Args:
             X_WS: (Q, 4, 4) poses of the recorded sensor in the world.
@@ -177,10 +177,9 @@ class RetrievalProtocol:
     def name(self) -> str:
         """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
 
-        Only a shipped protocol as it is has its name; if any field that changes
-        a number differs, such as the radius or a spacing, the name is `own`.
-        Geometric verification does not count, because tables have a column for
-        it.
+        If any field that changes a number differs from the shipped protocol,
+        such as the radius or a spacing, the name is `own`. Geometric
+        verification does not count, because tables have a column for it.
         """
         return self._named(lambda one: one)
 
@@ -245,8 +244,8 @@ class RetrievalProtocol:
     def of(self, method: Method) -> RetrievalProtocol:
         """Returns the protocol with a method's own choices filled in.
 
-        A method can choose the number of scans per place, and which scan stands
-        for a place.
+        A method can choose the number of scans per place, and which scan
+        determines the pose of a place.
         """
         return replace(
             self,
@@ -257,8 +256,9 @@ class RetrievalProtocol:
     def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
         """Returns the protocol with some options of another protocol.
 
-        These are the options that turn, tilt or partly hide queries, their
-        `seed`, and the choice of the scan that stands for a place (`place`).
+        These are the options for random yaw, tilt and occluded sector of
+        queries, their `seed`, and the choice of the scan that determines the
+        pose of a place (`place`).
         """
         return replace(self, place=other.place, **other._asked)
 
@@ -348,7 +348,7 @@ _ASKED = (*_QUERY_CHANGES, "seed")
 
 
 def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
-    """Checks that all protocols are the same, but for each method's choices.
+    """Checks that all protocols are equal, apart from each method's choices.
 
     Raises:
         InputError: the protocols differ.

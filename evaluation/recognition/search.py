@@ -1,4 +1,4 @@
-"""Searches a database, which may be larger than the memory."""
+"""Searches a database, which can be larger than the memory."""
 
 from collections.abc import Iterator, Sequence
 from time import process_time_ns
@@ -50,8 +50,8 @@ class Search:
     ) -> np.ndarray:
         """Returns the scores of some queries, (R, D) float64.
 
-        They are before geometric verification; NaN for a place that is no
-        candidate.
+        The scores are those before geometric verification; NaN for a place that
+        is no candidate.
 
         Args:
             query: drive with described queries.

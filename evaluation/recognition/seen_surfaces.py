@@ -43,9 +43,9 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Shares of given points that a scan shows and hides; NaN without points.
+    """Shares of points that a scan shows and occludes; NaN without points.
 
-    A point can be neither shown nor hidden, for example in front of all
+    A point can be neither shown nor occluded, for example in front of all
     surfaces.
 
     Attributes:

@@ -1,9 +1,10 @@
 """Computes numbers from a table of results or of queries.
 
-Intervals of shares, of excesses and of AUC differences are by bootstrap over
-blocks of the route; the same blocks are drawn for both results that are
-compared. Intervals of means are t intervals over maps or conditions, and those
-of rank correlations are by bootstrap over conditions.
+Intervals of shares, of interaction effects of two causes (`excesses`), and of
+AUC differences come from a bootstrap over blocks of the route, which samples
+the same blocks for both results that are compared. Intervals of means are t
+intervals over maps or conditions. Intervals of rank correlations come from a
+bootstrap over conditions.
 """
 
 from __future__ import annotations

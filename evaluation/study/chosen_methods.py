@@ -32,7 +32,7 @@ _FORM = "METHOD.NAME=VALUE"
 
 @dataclass(frozen=True)
 class MethodChoice:
-    """A method with its settings, from which any process can make it.
+    """A method by name and settings, from which any process can make it.
 
     Attributes:
         name: name of the method.
@@ -62,7 +62,7 @@ class MethodChoice:
     def at_height(self, height: float) -> MethodChoice:
         """Returns the method for a LiDAR at a height above the ground [m].
 
-        A height that the user has set for the method stays.
+        If the user has set a height for the method, that height is kept.
         """
         is_set = "sensor_height" in dict(self.settings)
         if is_set or height == MethodConfig().sensor_height:
@@ -141,7 +141,7 @@ def with_standard(names: Iterable[str]) -> list[str]:
     """Returns names of methods, with all standard ones in place of `standard`.
 
     Raises:
-        InputError: a method is there twice.
+        InputError: a method is named twice.
     """
     found: list[str] = []
     for name in names:

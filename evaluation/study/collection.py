@@ -140,7 +140,7 @@ class MapDrives:
         """Returns the control of a pair: the same two routes, in one stage.
 
         One drive of the pair is replaced by a drive on the same route, but in
-        the stage of the other drive. If possible, this is the database, so that
+        the stage of the other drive. If possible, the database is replaced, so
         the queries keep their scans.
 
         Args:

@@ -40,8 +40,8 @@ _LONG = 3600.0
 class Engine:
     """Measures pairs of drives by tasks and methods.
 
-    Add all pairs of each map with `add`, then call `run`. If `jobs` are run
-    beside others, call `write_tables` once they are done.
+    Add all pairs of each map with `add`, then call `run`. If you run `jobs`
+    together with other jobs, call `write_tables` when they are done.
 
     Attributes:
         experiment: name of the experiment, which stands in the tables.
@@ -53,7 +53,7 @@ class Engine:
             study takes.
         jobs: name -> job.
         measured: all comparisons.
-        given: results from elsewhere, which the tables begin with.
+        given: results from another source, with which the tables begin.
     """
 
     experiment: str

@@ -79,7 +79,7 @@ def find_evidence(
 ) -> PairEvidence:
     """Returns evidence on why the top-ranked places of queries are wrong.
 
-    The scan of each query is compared with those of its matches and of its
+    The scan of each query is compared with the scans of its matches and of its
     wrong top-ranked places.
 
     Args:

@@ -313,10 +313,10 @@ class Part:
         self._write(header, data)
 
     def spend(self) -> None:
-        """Removes the value, and keeps what it was made of.
+        """Removes the value, and keeps the record of its inputs.
 
-        Results that were made from the value stay up to date. To have the value
-        made again, see `restore`.
+        Results that were made from the value stay valid. To have the value made
+        again, call `restore`.
 
         Raises:
             InputError: if there is no such file, or it is damaged.

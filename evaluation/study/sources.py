@@ -64,7 +64,8 @@ class RecordingSource:
     def identity(self) -> list[list]:
         """Returns what identifies the recording: its options and its files.
 
-        Its reader names the files. Each counts by its name and its content.
+        The reader of the recording names the files. Each file is identified by
+        its name and its content.
         """
         drive = self()
         names = [file.name for file in drive.files]

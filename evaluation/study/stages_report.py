@@ -111,7 +111,7 @@ class StagesReport:
     def published(self) -> Engine:
         """The engine of second runs, by the protocol of published numbers.
 
-        Its pairs are not in the tables, whose rows are those of `stages`.
+        The tables do not contain its pairs, but only those of `stages`.
         """
         return Engine(
             self.reference.title,
@@ -180,8 +180,8 @@ class StagesReport:
     ) -> Path:
         """Writes the report, once all jobs are done.
 
-        What it was made from stays, except descriptions of places, which take
-        most of the space. They are made again if new results need them.
+        The inputs of the report are kept, except descriptions of places, which
+        take most of the space. They are made again if new results need them.
 
         The report consists of these files:
 

@@ -60,8 +60,8 @@ def measure_change(
 ) -> ChangeReport:
     """Returns how much changed between two drives.
 
-    The spread over shifted grids is unknown, because it takes sixteen times as
-    long as all else.
+    The result does not contain the spread over shifted grids, which would take
+    sixteen times as long as all other computations.
 
     Args:
         reporter: reports progress.

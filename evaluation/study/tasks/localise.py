@@ -197,7 +197,7 @@ def measure_localisation(
         methods: names of registration methods, or Python files with your own.
         texts: contents of those files, and "" for names. Results are computed
             again if a text changes.
-        starts: how the random initial poses of the scans are drawn, one entry
+        starts: how the random initial poses of the scans are sampled, one entry
             for each size of their errors.
         spacing: distance between two queries [m].
         values: settings of the methods that differ from their defaults.
@@ -260,7 +260,7 @@ def localise_among_others(
 ) -> list[np.ndarray]:
     """Localises each scan of a drive in a map of the other scans around it.
 
-    A scan without another one within `NEAR` is left out.
+    A scan without another scan within `NEAR` is left out.
 
     Args:
         reporter: reports progress.

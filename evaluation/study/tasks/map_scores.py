@@ -82,7 +82,7 @@ class MapTask(Task):
 
 
 class LabelledMapTask(MapTask):
-    """The task on two maps with true labels, which are in a folder already."""
+    """The task `map` on two maps with exact labels in an existing folder."""
 
     def __init__(
         self, maps: Path, methods: Sequence[str], given: Sequence[Path] = ()
@@ -93,7 +93,7 @@ class LabelledMapTask(MapTask):
             maps: folder with the maps of two drives and their exact labels.
             methods: names of change detectors.
             given: files with labels of the older and of the newer map, which
-                are scored instead.
+                are scored instead of the labels of change detectors.
         """
         super().__init__({}, str(maps))
         self._arguments = maps, tuple(methods), tuple(given)

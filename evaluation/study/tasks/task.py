@@ -46,8 +46,8 @@ class NamedDrive:
     Attributes:
         name: its unique name.
         source: function that opens it.
-        needs: names of the jobs that record it; empty if it is there, or is
-            simulated while it is read.
+        needs: names of the jobs that record it; empty if it is recorded
+            already, or is simulated while it is read.
     """
 
     name: str
@@ -81,7 +81,8 @@ class Held:
 class Pair:
     """Two drives that are measured under a condition of an experiment.
 
-    The first fields are those of the tables, the others say what is measured.
+    The first fields are columns of the tables; the others determine what is
+    measured.
 
     Attributes:
         map_name: name of the map.
@@ -90,10 +91,10 @@ class Pair:
         factors: name -> value of each factor of the condition.
         seed: seed of everything that is random.
         is_baseline: whether other conditions are compared with this one.
-        stated: protocol that the tables name: that of the experiment, before
-            the condition changes its queries.
-        key: name of the results. Two pairs have the same key only if the same
-            is measured, but for the radius of a match.
+        stated: protocol that the tables name: the protocol of the experiment,
+            before the condition changes its queries.
+        key: name of the results. Two pairs have the same key only if they
+            measure the same thing; only the radius of a match can differ.
         database, query: the drives.
         way: drive along the query's route through the database's city, if there
             is one; otherwise the database drive. The change of the city
@@ -108,10 +109,10 @@ class Pair:
         ages: for an aged city, the years that it has aged by at each drive of
             the database and at the query; empty if the city does not age.
         leaves_out_itself: whether a drive is compared with itself, and each
-            scan with all scans but itself.
-        may_repeat: whether the pair can repeat drives of another pair,
-            because its condition changes the queries (turned, tilted or partly
-            hidden) or adds distractors. A task whose results depend only on the
+            scan with all other scans.
+        may_repeat: whether the pair can repeat drives of another pair, because
+            its condition changes the queries (random yaw, tilt or occluded
+            sector) or adds distractors. A task whose results depend only on the
             drives then skips the pair if it has measured these drives before.
         settings: name -> value of settings outside of the protocol that change
             a number, such as the height of a LiDAR that differs from the
@@ -155,7 +156,7 @@ class Pair:
 
     @property
     def closes_loops(self) -> bool:
-        """Whether a drive is compared with what it passed itself before."""
+        """Whether a drive is compared with places that it passed before."""
         is_itself = self.database == self.query
         return is_itself and self.protocol.exclude_recent is not None
 
@@ -168,13 +169,14 @@ class Pair:
     def is_composed(self) -> bool:
         """Whether the database differs from the places of a single drive.
 
-        It does if it has places of several drives, or only some of one.
+        This is so if it has places of several drives, or only some places of
+        one drive.
         """
         return bool(self.beside) or self.keep != KEEP_ALL
 
     @property
     def drives(self) -> tuple[object, ...]:
-        """Names of the drives of database and query, and what is kept."""
+        """Names of the drives of database and query, and the field `keep`."""
         database = [one.name for one in (self.database, *self.beside)]
         return (*database, self.keep, self.query.name)
 
@@ -197,8 +199,8 @@ class Jobs:
         radii: key of a pair -> the greatest distances between a query and its
             match that are used for this pair [m].
         processes: number of processes that a task may use by itself.
-        shows_overlaps: whether results contain how much of each query's scan
-            its best match shows, which takes time.
+        shows_overlaps: whether results contain the share of each query's scan
+            that its best match shows. To compute it takes time.
         leaves_out_slow: whether methods that would take more than an hour for a
             pair are left out.
     """
@@ -239,9 +241,9 @@ class Jobs:
         """Returns where a job gets the descriptions of a drive's scans from.
 
         If several pairs need the descriptions, this function adds a job that
-        writes them, and returns the files: first that with the scans, then one
-        for each method. If only one pair needs them, the function returns the
-        source of the drive, and the job of this pair makes the descriptions
+        writes them, and returns the files: first the file with the scans, then
+        one for each method. If only one pair needs them, the function returns
+        the source of the drive, and the job of this pair makes the descriptions
         itself.
 
         Args:
@@ -418,7 +420,7 @@ class Task(abc.ABC):
             self.check(name, value, where)
 
     def check(self, name: str, value: Any, where: str) -> None:  # noqa: B027
-        """Checks a setting of the task; by default every value is right.
+        """Checks a setting of the task; by default every value is accepted.
 
         Args:
             name: name of the setting.
@@ -433,8 +435,8 @@ class Task(abc.ABC):
     def changed_settings(self) -> dict[str, Any]:
         """Name -> value of the settings that change a number.
 
-        Settings that have their defaults are left out. The methods do not
-        count, because each number is that of one method.
+        Settings that have their defaults are left out. The setting `methods`
+        does not count, because each number belongs to one method.
         """
         return {
             f"{self.name}.{name}": value
@@ -452,7 +454,7 @@ class Task(abc.ABC):
         """
 
     def found(self, pair: Pair) -> Any:
-        """Returns the task's result for a pair of drives, which has it."""
+        """Returns the task's result for a pair of drives that has one."""
         (part,) = pair.parts[self.name]
         return part.read()
 
