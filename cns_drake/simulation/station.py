@@ -15,7 +15,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
-from cns_drake.pictures.drive_page import MeshcatRecorder
+from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor

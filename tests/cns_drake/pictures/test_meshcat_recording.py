@@ -18,7 +18,8 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.pictures.drive_page import MeshcatRecorder, ShownStages
+from cns_drake.pictures.drive_page import ShownStages
+from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.patterns import POINT_DTYPE
@@ -376,7 +377,7 @@ def test_route_goes_from_red_to_blue(early):
 
 
 def test_long_drives_show_no_more_scans(folder, monkeypatch):
-    monkeypatch.setattr("cns_drake.pictures.drive_page._MAX_SCANS", 4)
+    monkeypatch.setattr("cns_drake.pictures.meshcat_recorder._MAX_SCANS", 4)
     recorder = drive(folder, "stage_01", None, scan_spacing=5.0)
     frames = [frame for frame, _ in recorder.drive.scans]
     # 5 m between frames at first, doubled when the fifth came: 20 frames

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from cns_drake.pictures.drive_page import MeshcatRecorder
+from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.carriers import sensor_pose

@@ -1,0 +1,224 @@
+"""Records a drive while it is simulated, for its web page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import FrameId, QueryObject
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.sensors import ImageRgba8U
+
+from cns_drake.base.files import write_text
+from cns_drake.base.jpeg_images import to_jpeg
+from cns_drake.pictures.drive_page import (
+    DriveRecord,
+    ShownStages,
+    make_drive_page,
+    moving_frames,
+)
+from cns_drake.scene.world import World
+
+# These limits keep the page of any drive below 25 MB.
+_MAX_SCANS = 160
+_MAX_POINTS_PER_SCAN = 3000
+# Greatest number of images per camera.
+_MAX_IMAGES = 200
+# Longer side of an image [pixels].
+_IMAGE_SIDE = 400
+# One point is kept per cube of this size [m]. Otherwise nearly all points would
+# lie on the rings of ground around the vehicle.
+_THINNING_SIZE = 0.5
+
+
+class MeshcatRecorder(LeafSystem):
+    """A system that records a drive and saves it as a web page.
+
+    See `make_drive_page` for the page.
+
+    .. pydrake_system::
+
+        name: MeshcatRecorder
+        input_ports:
+        - geometry_query
+        - odometry
+        - specific_force
+        - angular_velocity
+        - <lidar>_scan (one for each LiDAR)
+        - <camera>_image (one for each camera)
+
+    Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is an
+    `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I [rad/s]
+    are expressed in I; `<lidar>_scan` is a structured array of points expressed
+    in S; `<camera>_image` is an ImageRgba8U.
+
+    The poses of all moving frames are recorded at every frame. Scans are
+    recorded whenever the vehicle has driven another `scan_spacing` metres. On a
+    long drive, this spacing is doubled as often as needed.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        X_BSs: Mapping[str, RigidTransform],
+        period: float,
+        num_frames: int | None = None,
+        shown: ShownStages | None = None,
+        scan_spacing: float = 15.0,
+        cameras: Mapping[str, int] = MappingProxyType({}),
+    ):
+        """Declares the ports and the schedule.
+
+        Args:
+            world: the world that is drawn.
+            X_BSs: name of a LiDAR -> pose of its frame S on the body B.
+            period: time between two frames [s].
+            num_frames: number of frames that are recorded; all if None.
+            shown: stages whose differences the page shows; None for none.
+            scan_spacing: distance driven between two shown scans [m].
+            cameras: name of a camera -> number of frames from one image to the
+                next.
+        """
+        super().__init__()
+        self._world = world
+        self._shown = shown or ShownStages()
+        self._X_BSs = dict(X_BSs)
+        self._scan_spacing = scan_spacing
+        self._way_to_scan = 0.0
+        self._num_frames = num_frames
+        self.drive = DriveRecord(
+            period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
+        )
+
+        self._geometry_query = self.DeclareAbstractInputPort(
+            "geometry_query", Value(QueryObject())
+        )
+        self._odometry = self.DeclareAbstractInputPort(
+            "odometry", Value(object())
+        )
+        self._specific_force = self.DeclareVectorInputPort("specific_force", 3)
+        self._angular_velocity = self.DeclareVectorInputPort(
+            "angular_velocity", 3
+        )
+        self._scans = {
+            name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
+            for name in self._X_BSs
+        }
+        self._cameras = dict(cameras)
+        self._images = {}
+        for name in cameras:
+            self.drive.images[name] = []
+            self._images[name] = self.DeclareAbstractInputPort(
+                f"{name}_image", Value(ImageRgba8U())
+            )
+        self.DeclarePeriodicPublishEvent(
+            period_sec=period, offset_sec=0.0, publish=self._publish
+        )
+
+    def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
+        """Adds a moving object to the page.
+
+        The object moves as a rigid body: only the motion of the first frame is
+        recorded, and all other frames follow it.
+
+        Args:
+            name: name of the object, unique in the page.
+            frames: geometry frames of the object.
+        """
+        leading = frames[0]
+        self.drive.X_WFs[leading] = []
+        self.drive.names[leading] = name
+        self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
+
+    def save(self, path: Path, *, title: str = "cns-drake") -> None:
+        """Writes the web page of the drive as recorded so far.
+
+        Raises:
+            InputError: if the file cannot be written.
+        """
+        page = make_drive_page(self.drive, self._world, self._shown, title)
+        write_text(path, page)
+
+    def _publish(self, context: Context) -> EventStatus:
+        if len(self.drive.X_WBs) == self._num_frames:
+            return EventStatus.DidNothing()
+        query_object = self._geometry_query.Eval(context)
+        for frame_id, X_WFs in self.drive.X_WFs.items():
+            X_WF = query_object.GetPoseInWorld(frame_id)
+            # Copies, since the values of the ports may be overwritten in the
+            # next step.
+            X_WFs.append(RigidTransform(X_WF))
+        if not self.drive.X_WBs:
+            for leading, X_FLs in self.drive.limbs.items():
+                X_FW = self.drive.X_WFs[leading][0].inverse()
+                for limb in X_FLs:
+                    X_FLs[limb] = X_FW @ query_object.GetPoseInWorld(limb)
+        odometry = self._odometry.Eval(context)
+        X_WB = RigidTransform(odometry.X_WB)
+        self.drive.speeds.append(float(odometry.V_WB_B.translational()[0]))
+        self.drive.specific_forces_I.append(
+            self._specific_force.Eval(context).copy()
+        )
+        self.drive.angular_velocities_I.append(
+            self._angular_velocity.Eval(context).copy()
+        )
+        X_WBs = self.drive.X_WBs
+        if X_WBs:
+            step = X_WB.translation() - X_WBs[-1].translation()
+            self._way_to_scan -= float(np.linalg.norm(step))
+        X_WBs.append(X_WB)
+        if self._way_to_scan <= 0.0:
+            self._take_scan(context, X_WB)
+        self._take_images(context, len(X_WBs) - 1)
+        return EventStatus.Succeeded()
+
+    def _take_images(self, context: Context, frame: int) -> None:
+        for name, images in self.drive.images.items():
+            if frame % self._cameras[name]:
+                continue
+            # The import is slow, and few drives have cameras.
+            from PIL import Image
+
+            pixels = self._images[name].Eval(context).data[:, :, :3]
+            picture = Image.fromarray(np.ascontiguousarray(pixels))
+            images.append((frame, to_jpeg(picture, longest=_IMAGE_SIDE)))
+            if len(images) > _MAX_IMAGES:
+                del images[1::2]
+                self._cameras[name] *= 2
+
+    def _take_scan(self, context: Context, X_WB: RigidTransform) -> None:
+        p_WRset = np.concatenate(
+            [
+                _positions(X_WB @ self._X_BSs[name], scan.Eval(context))
+                for name, scan in self._scans.items()
+            ]
+        )
+        frame = len(self.drive.X_WBs) - 1
+        self.drive.num_points.append(len(p_WRset))
+        self.drive.scans.append((frame, _thinned(p_WRset)))
+        if len(self.drive.scans) > _MAX_SCANS:
+            del self.drive.scans[1::2]
+            self._scan_spacing *= 2.0
+        self._way_to_scan = self._scan_spacing
+
+
+def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
+    """Returns the positions (N, 3) of a scan's points in W [m]."""
+    p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
+    return p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
+
+
+def _thinned(p_WRset: np.ndarray) -> np.ndarray:
+    """Returns an evenly spread part of points (N, 3)."""
+    cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
+    _, first = np.unique(cubes, axis=0, return_index=True)
+    count = min(len(first), _MAX_POINTS_PER_SCAN)
+    # Points are dropped evenly from the sorted cubes, and thus evenly on all
+    # sides.
+    kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
+    return p_WRset[np.sort(kept)]
