@@ -46,6 +46,7 @@ from evaluation.map_update.upkeep import MAINTAINERS, NOT_MAINTAINED
 from evaluation.recognition.keeping import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import LAST, OWN
+from evaluation.study.tasks.task import USUAL_LENGTH
 
 # Fields of a side (`both`, `database`, `query`) that no scenario has.
 LOSS_FIELDS = tuple(Losses.model_fields)
@@ -166,6 +167,7 @@ class Compared:
             `evaluation.map_update.upkeep`.
         ages: the years by which the city has aged at each of `drives`; empty if
             it does not age.
+        lengths: about how long each of `drives` is [m].
     """
 
     database: Scenario
@@ -177,6 +179,7 @@ class Compared:
     keep: str | int = KEEP_ALL
     maintain: str = NOT_MAINTAINED
     ages: tuple[int, ...] = ()
+    lengths: tuple[float, ...] = ()
 
     @property
     def drives(self) -> tuple[Scenario, ...]:
@@ -312,7 +315,7 @@ class PairMaker:
             self._check_side("database", sides["database"])
         self._check_side("query", sides["query"])
         dated = self._database(sessions, sides, condition, seed)
-        database = [drive for _, drive in dated]
+        database = [drive for _, _, drive in dated]
         years = _oldest(sides["database"], sessions)
         age = years, sides["database"].get("rates", 1.0)
         drive = self._changed("query", sides["query"], age, seed)
@@ -347,7 +350,8 @@ class PairMaker:
             tuple(database[1:]),
             keep,
             self._maintained(sides["database"], len(database)),
-            (*(when for when, _ in dated), years) if years else (),
+            (*(when for when, _, _ in dated), years) if years else (),
+            (*(length for _, length, _ in dated), _length(sides["query"])),
         )
 
     def _maintained(self, database: Changes, number: int) -> str:
@@ -429,10 +433,10 @@ class PairMaker:
         sides: Mapping[str, Changes],
         condition: Condition,
         seed: int,
-    ) -> list[tuple[int, Scenario]]:
+    ) -> list[tuple[int, float, Scenario]]:
         """Returns the drives of a database, from older to newer.
 
-        Each has the years by which its city has aged.
+        Each has the years by which its city has aged, and its `_length`.
 
         `years` says how much older a drive is than another one, through whose
         city these years have passed. So the city of the oldest drive is aged by
@@ -482,7 +486,10 @@ class PairMaker:
                     f"{self.source}: {place}: the same drive as {before}"
                 )
         found.sort(key=lambda one: one[0])
-        return [(time[0], drive) for time, _, drive in found]
+        return [
+            (time[0], _length(sessions[place]), drive)
+            for time, place, drive in found
+        ]
 
     def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
         """Returns those fields of a case that are possible on the map.
@@ -798,6 +805,14 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
 def _oldest(database: Changes, sessions: Mapping[str, Changes]) -> int:
     """Returns by how many years the city of the query is aged."""
     return max(one.get("years", 0) for one in (database, *sessions.values()))
+
+
+def _length(changes: Changes) -> float:
+    """Returns about how long a drive is with these changes [m]."""
+    route = changes.get("route")
+    if isinstance(route, Mapping):
+        return float(route["length"])
+    return USUAL_LENGTH
 
 
 def _factors_of(place: str, factors: Changes) -> dict[str, Any]:

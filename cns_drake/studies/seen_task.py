@@ -21,10 +21,16 @@ from cns_drake.studies.map_upkeep import UpkeptSource
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.place_outcome import Number
 from evaluation.study.sources import DriveSource
-from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
+from evaluation.study.tasks.task import (
+    OPENING_COST,
+    SCAN_COST,
+    Jobs,
+    Pair,
+    Result,
+    Task,
+    positive,
+)
 
-# Expected time to simulate a drive twice [s].
-_COST = 40.0
 # Events in which a structure appears under its own name; in all others, the
 # successor appears.
 _APPEARS = ("built", "put_up")
@@ -146,7 +152,10 @@ class SeenTask(Task):
                 }
             )[:8]
             part = jobs.files.part("seen", drive.name, digest)
-            parts.append(jobs.add(part, sight_structures, arguments, (), _COST))
+            # The drive is simulated in two cities.
+            scans = drive.length / arguments[2]
+            cost = 2.0 * (OPENING_COST + SCAN_COST * scans)
+            parts.append(jobs.add(part, sight_structures, arguments, (), cost))
         part = jobs.files.part("changes", pair.key)
         parts.append(jobs.add(part, changes_until, (sources[-1],), (), 1.0))
         return tuple(parts)

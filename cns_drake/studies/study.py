@@ -12,6 +12,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.listing import listed, natural_key
+from cns_drake.base.progress import doing
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -246,6 +247,7 @@ class Study:
         if fewer:
             self.on_note(f"measured at their last level: {', '.join(fewer)}")
         drives = list(self._drives(maps))
+        doing("looking at all conditions")
         # Errors in the file are found before all slow work.
         for some in drives:
             for _ in self._simulated(some, made=False):
@@ -581,7 +583,12 @@ class Study:
 
     def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
         """Returns a pair of drives, which tables show with given fields."""
-        *drives, asked = map(self._named, compared.drives)
+        *drives, asked = (
+            replace(self._named(drive), length=length)
+            for drive, length in zip(
+                compared.drives, compared.lengths, strict=True
+            )
+        )
         database, *beside = self._maintained(drives, compared.maintain)
         way = database
         if self.experiment.drives == "same-route":
@@ -595,7 +602,7 @@ class Study:
             elif drive != query:
                 content = fingerprint(drive.model_dump(mode="json"))[:8]
                 drive = drive.replaced(name=f"{query.name}_way_{content}")
-            way = self._named(drive)
+            way = replace(self._named(drive), length=asked.length)
         asked_how = {
             "compared": compared.fingerprint(),
             **compared.protocol.to_json(),
@@ -631,7 +638,7 @@ class Study:
             job_name(part),
             MakePart(part, update_maps, (sources, maintain)),
             tuple(need for one in drives for need in one.needs),
-            _UPKEEP_COST * len(drives),
+            sum(_UPKEEP_COST * one.share for one in drives),
         )
         self._upkeep[job.name] = job
         return [
@@ -639,6 +646,7 @@ class Study:
                 f"{one.name}_{maintain}_{content}",
                 UpkeptSource(sources, number, maintain, part),
                 (job.name,),
+                one.length,
             )
             for number, one in enumerate(drives)
         ]

@@ -20,6 +20,7 @@ from evaluation.study.sources import (
     JoinedSource,
 )
 from evaluation.study.tasks.task import (
+    OPENING_COST,
     Answered,
     Jobs,
     Pair,
@@ -32,8 +33,11 @@ from evaluation.study.tasks.task import (
 SHIPPED = tuple(
     name for name in estimators.METHODS if name != estimators.KISS_MATCHER
 )
+# Expected time to localise the scans of a drive among the others [s].
 _COST = 60.0
-# Expected time to add a further drive to the map [s].
+# Expected time to localise the queries of a usual drive [s].
+_QUERIES_COST = 10.0
+# Expected time to add a usual drive to the map [s].
 _MAP_COST = 50.0
 # Scans within this distance make the map of a scan that is localised among
 # the others of its drive [m].
@@ -123,7 +127,8 @@ class LocaliseTask(Task):
             self.settings["odometry_drift"],
             jobs.processes,
         )
-        cost = _COST + _MAP_COST * len(pair.beside)
+        cost = OPENING_COST + _QUERIES_COST * pair.query.share
+        cost += sum(_MAP_COST * one.share for one in drives)
         needs = [need for one in (*drives, pair.query) for need in one.needs]
         found = jobs.add(part, measure_localisation, arguments, needs, cost)
         return (found,)

@@ -8,7 +8,11 @@ from typing import Any
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
-from evaluation.recognition.costs import QueryCost, measure_search
+from evaluation.recognition.costs import (
+    NUM_TRIALS,
+    QueryCost,
+    measure_search,
+)
 from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.place_outcome import (
     Number,
@@ -24,12 +28,23 @@ from evaluation.study.measurements import (
     shown_overlaps,
 )
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.tasks.task import Answered, Jobs, Pair, Result, Task
+from evaluation.study.tasks.task import (
+    Answered,
+    Jobs,
+    Pair,
+    Result,
+    Task,
+    num_described,
+)
 
-# Expected time to describe a pair and to compare it by all methods [s].
-_PLACES_COST = 60.0
-# Expected time to measure the costs of the methods [s].
-_COSTS_COST = 30.0
+# Expected time to start a job [s].
+_STARTING_COST = 2.0
+# Expected time of a method to answer a query, with geometric verification, and
+# to compare it with one more place [s].
+_QUERY_COST = 0.045
+_PLACE_COST = 3e-5
+# Expected time to find what the matches of a query show [s].
+_OVERLAP_COST = 0.2
 
 Outcomes = Sequence[PlaceOutcome]
 
@@ -56,6 +71,7 @@ class PoseTask(Task):
         )
         others = jobs.distractor_places(pair, needs)
         beside = jobs.beside(pair, needs)
+        num_queries = num_described(pair.query, "queries", pair.protocol)
         # The task `place` reads the same files.
         if not (isinstance(database, tuple) and isinstance(query, tuple)):
             part = jobs.files.part("place", pair.key)
@@ -70,9 +86,14 @@ class PoseTask(Task):
                 pair.overlaps,
                 jobs.leaves_out_slow,
             )
-            return (
-                jobs.add(part, measure_places, arguments, needs, _PLACES_COST),
-            )
+            cost = _search_cost(pair, jobs, num_queries)
+            cost += _OVERLAP_COST * num_queries
+            for (drive, role), found in zip(
+                pair.roles, (database, query), strict=True
+            ):
+                if not isinstance(found, tuple):
+                    cost += jobs.description_cost(drive, role, pair.protocol)
+            return (jobs.add(part, measure_places, arguments, needs, cost),)
         # Each method has a file, so that another method leaves it as it is.
         shown = MakePart(
             jobs.files.part("overlaps", pair.key),
@@ -111,7 +132,9 @@ class PoseTask(Task):
         ]
         name = f"place {pair.key}"
         whole = Steps((*overlaps, *steps)[0].part.path, (*overlaps, *steps))
-        jobs.jobs[name] = Job(name, whole, tuple(needs), _PLACES_COST)
+        cost = _search_cost(pair, jobs, num_queries)
+        cost += _OVERLAP_COST * num_queries
+        jobs.jobs[name] = Job(name, whole, tuple(needs), cost)
         return tuple(one.part for one in steps)
 
     def found(self, pair: Pair) -> Outcomes:
@@ -166,7 +189,8 @@ class CostTask(Task):
             pair.protocol.place_spacing,
         )
         part = jobs.files.part("cost", pair.key)
-        return (jobs.add(part, measure_costs, arguments, needs, _COSTS_COST),)
+        cost = _search_cost(pair, jobs, NUM_TRIALS)
+        return (jobs.add(part, measure_costs, arguments, needs, cost),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, cost in found.items():
@@ -176,6 +200,16 @@ class CostTask(Task):
                 ("memory", float(cost.memory)),
             ):
                 yield Number(method, False, name, value, n=cost.places)
+
+
+def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
+    """Returns the expected time of queries by all methods [s]."""
+    num_places = pair.distractors + sum(
+        num_described(drive, "places", pair.protocol)
+        for drive in (pair.database, *pair.beside)
+    )
+    each = len(jobs.methods) * (_QUERY_COST + _PLACE_COST * num_places)
+    return _STARTING_COST + num_queries * each
 
 
 def measure_costs(

@@ -26,8 +26,14 @@ from evaluation.study.measurements import DescribedSource
 from evaluation.study.parts import MakePart, Part, StudyFiles
 from evaluation.study.sources import DriveSource
 
-# Expected time to describe a drive by all methods [s].
-_DESCRIPTION_COST = 30.0
+# Length of a drive through a shipped city, about [m].
+USUAL_LENGTH = 1400.0
+# Expected time to start a job and to open a drive [s].
+OPENING_COST = 8.0
+# Expected time to read a scan [s].
+SCAN_COST = 0.011
+# Expected time of a method to describe a cloud [s].
+_CLOUD_COST = 0.02
 # Expected time to map a drive with each of its scans [s].
 _MAP_COST = 60.0
 # Expected time of other work [s].
@@ -48,11 +54,18 @@ class NamedDrive:
         source: function that opens it.
         needs: names of the jobs that record it; empty if it is recorded
             already, or is simulated while it is read.
+        length: about how long the drive is [m], to estimate costs.
     """
 
     name: str
     source: DriveSource
     needs: tuple[str, ...] = ()
+    length: float = USUAL_LENGTH
+
+    @property
+    def share(self) -> float:
+        """Its length as a share of `USUAL_LENGTH`."""
+        return self.length / USUAL_LENGTH
 
 
 class Result(Protocol):
@@ -268,12 +281,22 @@ class Jobs:
             with_map=False,
         )
         job = f"describe {name}"
-        self.jobs[job] = Job(job, step, drive.needs, _DESCRIPTION_COST)
+        cost = self.description_cost(drive, role, protocol)
+        self.jobs[job] = Job(job, step, drive.needs, cost)
         needs.append(job)
         return (
             files.scans,
             *(files.described(one.key) for one in self.methods),
         )
+
+    def description_cost(
+        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+    ) -> float:
+        """Returns the expected time to describe a drive by all methods [s]."""
+        made = [one.make() for one in self.methods]
+        scans = max(map(protocol.scans, made), default=1)
+        each = SCAN_COST * scans + _CLOUD_COST * len(made)
+        return OPENING_COST + each * num_described(drive, role, protocol)
 
     def mapped(
         self, drive: NamedDrive, spacing: float | None, needs: list[str]
@@ -289,7 +312,7 @@ class Jobs:
         name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
         part = self.files.part("mapped", name)
         needs.append(job_name(part))
-        cost = _MAP_COST if spacing is None else _OTHER_COST
+        cost = _MAP_COST * drive.share if spacing is None else _OTHER_COST
         arguments = (drive.source, spacing)
         return self.add(part, map_source, arguments, drive.needs, cost)
 
@@ -365,6 +388,16 @@ class Jobs:
         step = MakePart(part, function, arguments)
         self.jobs[name] = Job(name, step, tuple(needs), cost)
         return part
+
+
+def num_described(
+    drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+) -> float:
+    """Returns about how many places or queries a drive has."""
+    spacing = protocol.place_spacing
+    if role == "queries":
+        spacing = protocol.query_spacing
+    return drive.length / spacing
 
 
 def job_name(part: Part) -> str:

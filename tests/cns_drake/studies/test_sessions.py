@@ -17,6 +17,7 @@ from cns_drake.studies.experiment import (
 from cns_drake.studies.study import Study, run_study
 from evaluation.results.table import Results
 from evaluation.study import engine
+from evaluation.study.tasks.task import OPENING_COST, USUAL_LENGTH
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +161,45 @@ def test_conditions_share_the_drives_that_are_the_same(town):
     near, both, lane = found
     assert both.drives[:2] == (near.database, lane.database)
     assert len({one.fingerprint() for one in found}) == 3
+
+
+def test_drives_have_the_lengths_of_their_routes(town):
+    drawn = {"route": {"length": 350.0, "seed": 1}}
+    (found,) = compared(
+        town,
+        database={"sessions": [{}, {"viewpoint": "lane", **drawn}]},
+        query={"route": {"length": 70.0, "seed": 2}},
+    )
+    assert found.lengths == (USUAL_LENGTH, 350.0, 70.0)
+    assert found.ages == ()
+
+
+def test_costs_grow_with_what_is_measured(town, tmp_path):
+    """A route of half the length has half the scans, and as many jobs."""
+    costs = []
+    for length in (100.0, 200.0):
+        wanted = experiment(
+            maps=[str(town)],
+            both={"route": {"length": length, "seed": 1}},
+            database={"sessions": [{}, {"viewpoint": "lane"}]},
+            tasks=["place", "localise"],
+            **SIMULATED,
+        )
+        study = Study(wanted, tmp_path, "mine.yaml", Cluster())
+        jobs = study._plan(study._drives(())).jobs
+        found: dict[str, float] = {}
+        for name, job in jobs.items():
+            kind = name.partition(" ")[0]
+            found[kind] = found.get(kind, 0.0) + job.cost
+        costs.append(found)
+    short, long = costs
+    assert short.keys() == long.keys()
+    # Three drives are opened, and two make a map.
+    opened = {"describe": 3 * OPENING_COST, "localise": OPENING_COST}
+    for kind, start in opened.items():
+        assert long[kind] - start == pytest.approx(2.0 * (short[kind] - start))
+    assert long["place"] > 2.0 * short["place"] - 2.0
+    assert short["cost"] < long["cost"] < 2.0 * short["cost"]
 
 
 FLEET = {"cars": 2, "years": 3, "length": 100.0}
