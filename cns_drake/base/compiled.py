@@ -13,7 +13,7 @@ import numba
 
 from cns_drake.base.files import cache_folder
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.progress import doing
+from cns_drake.base.progress import interlude
 
 _Function = TypeVar("_Function", bound=Callable)
 
@@ -102,8 +102,9 @@ def _for_all(
     """
 
     def compile_once(types: tuple) -> object:
-        doing(f"compiling {file.stem.rpartition('.')[2]}")
         with contextlib.ExitStack() as stack:
+            name = file.stem.rpartition(".")[2]
+            stack.enter_context(interlude(f"compiling {name}"))
             # This lock excludes other processes but not other threads: numba
             # compiles one thread at a time already, and a second lock could
             # deadlock. A forked process does not inherit it. Without locks in

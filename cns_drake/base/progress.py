@@ -67,6 +67,10 @@ class JobsListener:
 
 _NOBODY = Listener()
 _listener: ContextVar[Listener] = ContextVar("listener", default=_NOBODY)
+# The latest report: activity, done, total and unit.
+_latest: ContextVar[tuple[str, int, int, str] | None] = ContextVar(
+    "latest", default=None
+)
 # What the loops around are about, and how far they are: the outermost first.
 _loops: ContextVar[tuple[tuple[str, int, int, str], ...]] = ContextVar(
     "loops", default=()
@@ -85,15 +89,33 @@ def heard_by(one: Listener) -> Iterator[None]:
     It does not receive the reports of other threads.
     """
     token = _listener.set(one)
+    before = _latest.set(None)
     try:
         yield
     finally:
+        _latest.reset(before)
         _listener.reset(token)
 
 
 def doing(activity: str, done: int = 0, total: int = 0, unit: str = "") -> None:
     """Reports what is done from now on; see `Listener.doing`."""
+    _latest.set((activity, done, total, unit))
     _listener.get().doing(activity, done, total, unit)
+
+
+@contextlib.contextmanager
+def interlude(activity: str) -> Iterator[None]:
+    """Reports an activity for the time of the `with` block.
+
+    Afterwards, what was done before is reported again.
+    """
+    before = _latest.get()
+    doing(activity)
+    try:
+        yield
+    finally:
+        if before:
+            doing(*before)
 
 
 def track(

@@ -9,7 +9,13 @@ from helpers.listening import Heard
 import pytest
 
 from cns_drake.base import progress
-from cns_drake.base.progress import doing, heard_by, listener, track
+from cns_drake.base.progress import (
+    doing,
+    heard_by,
+    interlude,
+    listener,
+    track,
+)
 from cns_drake.base.progress_display import Display, shown, shown_times
 
 
@@ -88,6 +94,23 @@ def test_work_is_heard_by_one_listener():
         jobs.start("a")
         jobs.doing("a", "reading")
         jobs.end("a")
+
+
+def test_after_an_interlude_the_work_before_it_goes_on():
+    heard = Heard()
+    doing("before")
+    with heard_by(heard):
+        with interlude("loading"):
+            pass
+        doing("casting", 3, 8, "rays")
+        with pytest.raises(ValueError, match="stop"), interlude("compiling"):
+            raise ValueError("stop")
+    assert heard.said == [
+        ("loading", 0, 0, ""),
+        ("casting", 3, 8, "rays"),
+        ("compiling", 0, 0, ""),
+        ("casting", 3, 8, "rays"),
+    ]
 
 
 def test_after_an_inner_loop_the_outer_one_goes_on():
