@@ -173,23 +173,23 @@ class SeenTask(Task):
     ) -> Iterator[Number]:
         drives, query = found
         everywhere = np.ones(len(drives.names), bool)
-        for place, chosen in (("", everywhere), ("_here", query.is_noticed)):
+        for end, chosen in (("", everywhere), ("_here", query.is_noticed)):
             number = int(chosen.sum())
-            yield Number("", False, f"changed{place}", float(number), n=number)
-            if number == 0:
-                continue
-            share = float(drives.is_noticed[chosen].mean())
-            yield Number("", False, f"seen{place}", share, n=number)
             delays = drives.delay[chosen]
             delays = delays[~np.isnan(delays)]
+            values = {"changed": (float(number), number)}
+            if number:
+                share = float(drives.is_noticed[chosen].mean())
+                values["seen"] = share, number
             if len(delays):
-                for name, value in (
-                    ("delay_median", np.median(delays)),
-                    ("delay_95", np.percentile(delays, 95.0)),
-                ):
-                    yield Number(
-                        "", False, f"{name}{place}", float(value), n=len(delays)
-                    )
+                late = float(np.percentile(delays, 95.0))
+                values["delay_median"] = (
+                    float(np.median(delays)),
+                    len(delays),
+                )
+                values["delay_95"] = late, len(delays)
+            for name, (value, n) in values.items():
+                yield Number("", False, f"{name}{end}", value, n=n)
 
 
 def plain_source(source: DriveSource) -> SimulationSource:

@@ -143,6 +143,7 @@ def test_metrics_are_those_of_the_tasks():
         ("docs/studies.md", "about: What do leaves", 7),
         ("docs/studies.md", "name: how-many-drives", 4),
         ("docs/studies.md", "name: fleet", 3),
+        ("docs/studies.md", "name: my-sessions", 6),
         ("docs/ladder.md", "about: Do snow", 4),
         ("docs/tutorial.md", "maps: riverside", 3),
     ],
