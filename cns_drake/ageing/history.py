@@ -121,7 +121,8 @@ class _Lot:
 
     `height` is the usual height of buildings there [m]. `parts` are annexes,
     storeys and balconies. If `coming` is a building, it is finished in the year
-    `finished`, and replaces the building `old`, if any.
+    `finished`, and replaces the building `old`, if any. A building gets one
+    further storey at most (`is_raised`), and balconies once.
     """
 
     number: int
@@ -132,13 +133,16 @@ class _Lot:
     finished: int = 0
     coming: Structure | None = None
     old: str = ""
+    is_raised: bool = False
+    has_balconies: bool = False
 
 
 @dataclass
 class _Tree:
     """A tree that stands or was felled.
 
-    `name` is its present name. `whole` is the tree at the height `full`. Its
+    `name` is its present name. The name of `whole` is that of the first tree at
+    this place. `whole` is the tree at the height `full`. Its
     present height is 0 if it was felled, and `size` is the greatest height it
     can reach [m]. It is planted again in the year `replanted`.
     """
@@ -503,7 +507,7 @@ class AgeingCity:
         lot.coming, lot.old = coming, old
         lot.finished = self.year + 1 + int(rng.uniform() < _TWO_YEARS)
         for one in plots.site(plot, f"site_{ending}", rng):
-            fences = [part for part in lot.parts if "_fence_" in part]
+            fences = [p for p in lot.parts if self._class(p) == "fence"]
             if not self.near(one.footprint_W, fences):
                 self._put(one, event="site")
                 lot.parts.append(one.name)
@@ -513,6 +517,7 @@ class AgeingCity:
         for part in lot.parts:
             self._remove(part, event="plot")
         lot.parts = []
+        lot.is_raised = lot.has_balconies = False
 
     def _leave_empty(self, lot: _Lot) -> None:
         """Uses an empty lot as a car park, a market, a yard or a garden."""
@@ -588,8 +593,7 @@ class AgeingCity:
         rng = self._rng("extended", name)
         triangles = self._triangles(name)
         order = ["annex"]
-        is_raised = any("_storey_" in part for part in lot.parts)
-        if lot.height < _HIGHEST_RAISED and not is_raised:
+        if lot.height < _HIGHEST_RAISED and not lot.is_raised:
             order.insert(int(rng.integers(2)), "storey")
         one = None
         for kind in order:
@@ -611,6 +615,7 @@ class AgeingCity:
             return
         self._put(one)
         lot.parts.append(one.name)
+        lot.is_raised |= kind == "storey"
         self._tell("extended", name, one.name)
 
     def _is_free(self, area: BaseGeometry, building: str) -> bool:
@@ -639,14 +644,13 @@ class AgeingCity:
             self._structure(name), insulated, rng
         )
         words = ["colour", *(["insulation"] if insulated else [])]
-        has = any("_balconies_" in part for part in lot.parts)
-        has = (
-            has
-            or not _DWELLING.search(name)
-            or lot.height < _LEAST_WITH_BALCONIES
+        may_have = (
+            not lot.has_balconies
+            and _DWELLING.search(name)
+            and lot.height >= _LEAST_WITH_BALCONIES
         )
         added = ""
-        if rng.uniform() < _WITH_BALCONIES and not has:
+        if rng.uniform() < _WITH_BALCONIES and may_have:
             one = plots.balconies_on(
                 lot.plot, triangles, f"{name}_balconies_{self.year:03d}y", rng
             )
@@ -655,6 +659,7 @@ class AgeingCity:
             ):
                 self._put(one, Polygon())
                 lot.parts.append(one.name)
+                lot.has_balconies = True
                 added = one.name
                 words.append("balconies")
         if rng.uniform() < _SCAFFOLDED:
@@ -691,7 +696,7 @@ class AgeingCity:
         if self.near(place):
             return
         old = tree.name
-        tree.name = f"{re.sub('_[0-9]+y$', '', old)}_{self.year:03d}y"
+        tree.name = f"{tree.whole.name}_{self.year:03d}y"
         tree.height = round(
             float(self._rng("planted", old).uniform(*_PLANTED)), 2
         )
