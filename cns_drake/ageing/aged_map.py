@@ -89,11 +89,12 @@ def age_map(
         years: ascending years relative to today, from -200 to 200. Negative
             years are before today; they need the buildings' years of
             construction (column `built` of `structures.csv`).
-        seed: the seed of all random draws, not negative.
+        seed: the seed of all random numbers, not negative.
         rates: event -> rate per year, see `cns_drake.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
-        finish: called with the folder and the result when all else is done, to
-            add files of your own. The folder gets its final name afterwards.
+        finish: called with the folder and the result when all other work is
+            done, to add files of your own. The folder gets its final name
+            afterwards.
 
     Returns:
         The stages and the events.
@@ -179,8 +180,8 @@ def past(
 ) -> tuple[dict[str, Structure | None], list[Event]]:
     """Returns a city as it was in a past year, and the events since then.
 
-    Buildings built after that year are missing; their lots had another use.
-    Trees are smaller.
+    Buildings that were built after that year are missing, and their lots have
+    another use. Trees are smaller.
 
     Args:
         world: the city of today, with the buildings' years of construction.

@@ -74,7 +74,7 @@ def air_view(aged: AgedMap) -> View:
 
 
 def draw_pictures(folder: Path, aged: AgedMap) -> None:
-    """Writes a picture of each view in each year, and one of all together.
+    """Writes a picture of each view in each year, and one of all views.
 
     The files are `pictures/year_<year>_<view>.jpg` and `pictures/film.jpg` in
     the map's folder.

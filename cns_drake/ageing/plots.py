@@ -279,8 +279,8 @@ def scaffold_before(
 
     Args:
         plot: plot of the building.
-        height: height of the building [m]. The scaffold is as high, up to a
-            limit of its own.
+        height: height of the building [m]. The scaffold has the same height, up
+            to the greatest height of scaffolds.
         name: name of the scaffold.
         rng: random generator for the scaffold.
     """
@@ -396,7 +396,7 @@ def balconies_on(
 ) -> Structure | None:
     """Returns new balconies for the front of a building.
 
-    None is returned if the front is not plane, or the building is too high or
+    The result is None if the front is not plane, or the building is too high or
     too small for balconies.
 
     Args:

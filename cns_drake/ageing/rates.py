@@ -30,7 +30,7 @@ def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
 
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to
-            a distance [m]. What is not in the file keeps its default value.
+            a distance [m]. Values that are not in the file keep their defaults.
             None for all default values.
         factor: factor by which all rates, but not the distance, are multiplied.
 
@@ -124,7 +124,7 @@ class Tally:
             share: probability of the event in this draw.
             hit: whether the event happened.
             things: number of objects that this draw adds to `exposure`, the
-                number of objects to which the event can happen. It is 0 if an
+                number of objects to which the event can happen. Use 0 if an
                 earlier draw has added these objects.
         """
         self.expected[event] += share

@@ -1,4 +1,4 @@
-"""Random draws for buildings and objects."""
+"""Random numbers and choices for buildings and objects."""
 
 from collections.abc import Sequence
 from typing import TypeVar
@@ -10,7 +10,7 @@ Rgb = tuple[float, float, float]
 
 
 class Dice:
-    """Draws numbers and choices from a random generator.
+    """Samples numbers and choices with a random generator.
 
     Attributes:
         rng: the random generator.
@@ -45,7 +45,7 @@ class Dice:
         return choices[int(self.rng.integers(len(choices)))]
 
     def tinted(self, rgb: Rgb, low: float, high: float) -> Rgb:
-        """Returns a colour, each channel of it times a number of its own.
+        """Returns a colour whose channels are multiplied by random numbers.
 
         The three numbers are uniform from `low` to below `high`. Channels are
         rounded to three decimals.

@@ -106,16 +106,16 @@ class Fleet(Section):
     """Cars that drive through a city year by year, and make a database.
 
     Each drive has a route that is sampled at random, one of the viewpoints
-    `near`, `lane` and `reversed`, and trees with or without leaves. The draws
-    of a car in a year do not depend on the numbers of cars and of years, so a
-    greater fleet has the drives of a smaller one.
+    `near`, `lane` and `reversed`, and trees with or without leaves. The random
+    choices for a car in a year do not depend on the numbers of cars and of
+    years, so a larger fleet contains the drives of a smaller one.
 
     Attributes:
         cars: number of drives a year.
-        years: number of years. The first drives are so many years before the
-            query, the last ones are one year before it.
+        years: number of years. The first drives take place this number of years
+            before the query, and the last ones one year before it.
         length: smallest length of a route [m].
-        seed: seed of the draws; by default that of the condition.
+        seed: seed of the random choices; by default the seed of the condition.
     """
 
     cars: int = Field(ge=1, le=1000, strict=True)
@@ -153,21 +153,23 @@ class Compared:
     """The drives of the database and the query drive of one condition.
 
     Attributes:
-        database: the drive of the database; of several, the oldest one.
+        database: the drive of the database; if there are several, the oldest
+            one.
         query: the drive of the queries.
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
             database, to make recognition harder.
-        asked: field -> value, for the fields of the protocol by which the
-            condition turns, tilts or partly hides the queries.
+        asked: field -> value, for the fields of the protocol with which the
+            condition gives the queries a random yaw, a tilt or an occluded
+            sector.
         beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
             `evaluation.recognition.keeping.kept_places`.
         maintain: what updates the maps of older drives by newer ones, see
             `evaluation.map_update.upkeep`.
-        ages: the years by which the city has aged at each of `drives`; empty if
-            it does not age.
-        lengths: about how long each of `drives` is [m].
+        ages: the years by which the city has aged at the time of each of
+            `drives`; empty if it does not age.
+        lengths: approximate length of each of `drives` [m].
     """
 
     database: Scenario
@@ -783,9 +785,9 @@ class PairMaker:
 def control_drive(drive: Scenario, stage: str) -> Scenario:
     """Returns a copy of a drive that goes through another stage of the map.
 
-    Route and driver stay the same. A comparison of the copy with the usual
-    drive of the other stage shows the effect of the route alone, because both
-    go through the same city.
+    Route and driver stay the same. The copy and the usual drive of the other
+    stage go through the same city, so a comparison of these two shows only the
+    effect of the route.
 
     Args:
         drive: the drive.

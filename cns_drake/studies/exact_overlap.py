@@ -4,13 +4,12 @@ For simulated drives, rays cast in the world decide which points of a query's
 scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
 point is seen if
 
-- it is within the ranges of the LiDAR and of the protocol,
-- the place's beams cover its direction,
-- nothing hides it, and a surface lies within `TOLERANCE` of it on the line of
-  sight.
+- it is within the ranges of the LiDAR and of the protocol, - the place's beams
+  cover its direction, - nothing occludes it, and a surface lies within
+  `TOLERANCE` of it on the line of sight.
 
-The place's sensor sees the world of its own drive, with that drive's stage and
-traffic.
+The place's sensor sees the world of its own drive, with the stage and the
+traffic of this drive.
 """
 
 from collections.abc import Callable
@@ -53,7 +52,7 @@ class Sight:
         """Returns the points that the beams of the LiDAR can reach.
 
         These points are within the LiDAR's ranges and in its field of view.
-        Surfaces that hide them are not considered.
+        Surfaces that occlude them are not considered.
 
         Args:
             p_S: (N, 3) points in the LiDAR's frame S [m].

@@ -1,4 +1,4 @@
-"""How long jobs will take on this machine, and how much space they need."""
+"""Forecasts how long jobs take on this machine, and the space they need."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -24,10 +24,10 @@ _JOB_MEMORY = 1.2e9
 
 
 def measure_slowness() -> float:
-    """Returns how much longer this machine takes than that of the costs.
+    """Returns how much slower this machine is than the one of the costs.
 
-    A fixed piece of work is timed, which takes about a second. What else the
-    machine does at that time counts.
+    A fixed piece of work is timed, which takes about a second. Other load on
+    the machine at that time makes the result greater.
     """
     doing("measuring this machine")
     points, queries = np.random.default_rng(1).random((2, _POINTS, 3))
@@ -41,9 +41,9 @@ def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
     """Returns the time in which jobs can be done, at best [s].
 
     Args:
-        jobs: the jobs; jobs that they need and that are not among them are
+        jobs: the jobs. Jobs that they need and that are not among them count as
             done.
-        num_workers: how many jobs run at a time.
+        num_workers: number of jobs that run at a time.
     """
     ends: Mapping[str, float] = _ends({job.name: job for job in jobs})
     even = sum(job.cost for job in jobs) / num_workers

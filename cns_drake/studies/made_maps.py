@@ -1,4 +1,4 @@
-"""Maps that an experiment makes: aged, drawn anew or imported.
+"""Maps that an experiment makes: aged, redrawn or imported.
 
 The module also makes drives through other cities, whose places are added to a
 database to make recognition harder.
@@ -55,7 +55,7 @@ class AgeCity(MakeMap):
 
     Attributes:
         source: folder of the city's map.
-        years: the ages: numbers of years from today.
+        years: the ages of the city: numbers of years from today.
         seed: seed of the events.
         rates: events and their rates per year.
     """
@@ -159,8 +159,9 @@ class MadeMaps:
         """Requests that `make` generates a drive's city anew from a seed.
 
         Returns:
-            Folder of the drive's present map, and the present stage. `redrawn`
-            returns those of the new map, which `make` makes.
+            Folder of the drive's present map, and the present stage. For the
+            folder and the stage of the new map, which `make` makes, call
+            `redrawn`.
 
         Raises:
             InputError: the seed is out of range.
@@ -297,14 +298,14 @@ def distracting_drives(
     places: the shipped drives of other maps, each through its own stage; if the
     query's map is shipped, drives along its streets between other buildings;
     the drives of other maps through their other stages; and the drives of other
-    maps through their cities drawn anew.
+    maps through their redrawn cities.
 
     Args:
         query: the query drive. The returned drives have its LiDARs, and do not
             go through its city.
         number: approximate number of places.
         spacing: distance between two places [m].
-        output: folder for cities that are drawn anew.
+        output: folder for redrawn cities.
         cluster: runs the jobs.
         on_note: is called with each note for the user.
 

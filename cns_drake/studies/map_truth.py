@@ -1,17 +1,18 @@
 """Exact labels of two maps of one place: gone, new, kept or not observed.
 
-Rays that are cast in the worlds of both drives decide.
+Rays that are cast in the worlds of both drives determine the labels.
 
 - A drive **observes** a point if the LiDAR can see it from one of the drive's
   poses: the point is within the LiDAR's ranges and field of view, and no
   surface hides it. A surface hides a point that lies more than `NEAR` behind it
-  along the line of sight. At grazing angles the point must lie farther behind,
-  so that a wall that has moved a little does not hide its old position.
+  along the line of sight. At grazing angles, the point must lie farther behind
+  the surface, so that a wall that has moved a little does not occlude its old
+  position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
   perpendicular to the surface. Moving objects do not count.
 
 A point of the older map A is `kept` if B's drive observes it and a surface of
-B's world is there, `gone` if B's drive observes it and none is there, and
+B's world is there, `gone` if B's drive observes it and no surface is there, and
 `unobserved` if B's drive does not observe it. In the same way, A's drive and
 A's world decide whether a point of the newer map B is `kept`, `new` or `newly
 seen`.
@@ -152,8 +153,8 @@ def open_labelled(place: str | Path) -> LabelledDrive:
     """Opens a drive whose world is known, for exact labels of its map.
 
     Args:
-        place: a recording of cns-drake; or the name of a shipped drive or a
-            scenario file, which is then simulated.
+        place: a recording of cns-drake; or the name of a shipped drive, or a
+            scenario file, to simulate the drive.
 
     Raises:
         InputError: the drive cannot be used, its points do not name their

@@ -40,7 +40,7 @@ _KNOWN_WITHIN = 0.2
 
 @dataclass(frozen=True)
 class UpkeptSource:
-    """The source of a drive of a map that later drives updated.
+    """The source of a drive in a map that later drives have updated.
 
     Attributes:
         sources: sources of all drives of the map, from older to newer.
@@ -59,7 +59,7 @@ class UpkeptSource:
         return UpkeptDrive(drive, self.updates.read(), self.number)
 
     def identity(self) -> list[object]:
-        """Returns what the drive and the updates are made of."""
+        """Returns the identities of the drives and of the updates."""
         made_of = [one.identity() for one in self.sources]
         return [made_of, self.number, self.maintain, code_digest(__name__)]
 
@@ -106,7 +106,7 @@ def update_maps(
 
 
 def labelled_of(source: DriveSource) -> LabelledDrive:
-    """Returns a drive with its world, for exact labels of its map."""
+    """Returns a drive with its world, from which exact labels can be made."""
     if isinstance(source, SimulationSource):
         return simulate_labelled(source.scenario)
     assert isinstance(source, RecordingSource)

@@ -1,4 +1,4 @@
-"""Writes training data for place-recognition networks, with exact truth.
+"""Writes training data for place-recognition networks, with ground truth.
 
 The drives are simulated without recording them. Scans of drives through the
 same city can match each other. Cities are put `CITY_DISTANCE` apart, so that
@@ -73,8 +73,8 @@ class ExportOptions:
             OverlapNet and its like.
         spacing: distance between two clouds, along the path [m].
         scans: number of consecutive scans that are merged into a cloud.
-        max_range: points that are farther away than this along x, y or z are
-            left out [m].
+        max_range: greatest distance of a point along x, y or z [m]; farther
+            points are left out.
     """
 
     format: Format = "pointnetvlad"

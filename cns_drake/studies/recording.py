@@ -1,4 +1,4 @@
-"""Records drives as jobs that run side by side, each in its own process."""
+"""Records drives as parallel jobs, each in its own process."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -119,7 +119,7 @@ def plan_recordings(
 
 
 def usual_frames(scenarios: Sequence[Scenario]) -> int:
-    """Returns the number of frames of drives; a guess if it is not given."""
+    """Returns the number of frames of drives; an estimate if not given."""
     return sum(one.frames or _USUAL_FRAMES for one in scenarios)
 
 

@@ -1,13 +1,14 @@
-"""Redraws a map's city: the same streets, but everything else drawn anew.
+"""Redraws a map's city: the same streets, but all other structures are new.
 
-Roads and plan stay, and only the plan's seed changes: buildings, plants, cars
-and furniture are drawn anew. Each such city is a map folder.
+Roads and plan stay the same, and only the seed of the plan changes. Buildings,
+plants, cars and furniture are therefore sampled anew. Each such city is a map
+folder.
 
 Frozen redraws are redraws of the shipped maps that were not used to develop any
 method. They also have the map's stages, and its drives with realistic drivers.
 Some are rotated as a whole, so that their streets are not parallel to the axes
 of the world. `worlds/redraws.csv` contains the seeds and rotations, which were
-drawn before any method ran.
+chosen at random before any method ran.
 """
 
 import abc
@@ -59,7 +60,7 @@ def redraw_cities(
     output: Path,
     cluster: Cluster,
 ) -> dict[int, Path]:
-    """Draws the city of a map anew with several seeds.
+    """Generates the city of a map anew with several seeds.
 
     A city that exists is kept if its inputs and the program have not changed.
 
@@ -72,7 +73,7 @@ def redraw_cities(
 
     Raises:
         InputError: the map cannot be used, another file or folder has the name
-            of a city, or cities could not be drawn; the error names all of
+            of a city, or cities could not be generated; the error names all of
             them.
     """
     map_folder, output = map_folder.resolve(), output.resolve()
@@ -196,14 +197,14 @@ class RedrawCity(MakeMap):
             finish(draft)
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns name -> content of the files from which the city is drawn."""
+        """Returns name -> content of the files from which the city is made."""
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
         """Writes further input files, such as `stages.yaml`; by default none.
 
-        Override this function for files that contain names of structures, which
-        are not known before. To find them, call
+        Override this function for files that contain names of structures,
+        because these names are not known earlier. To find them, call
         `cns_drake.city.generation.city_structures.make_city` with `draft`.
 
         Args:
@@ -394,11 +395,11 @@ class RedrawFrozen(RedrawCity):
 
 
 def turned(values: Any, turn_deg: float) -> Any:
-    """Returns the content of `roads.yaml` or `city.yaml`, with a turned city.
+    """Returns the content of `roads.yaml` or `city.yaml` for a rotated city.
 
     Args:
         values: the content of the file.
-        turn_deg: angle by which all positions and headings are turned
+        turn_deg: angle by which all positions and headings are rotated
             anticlockwise about the world's origin [deg].
     """
     if isinstance(values, list):
@@ -437,9 +438,9 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns `stages.yaml` without structures that a new city lacks.
 
-    A city that is drawn anew can have fewer houses in a row than the original
-    city, for which the file was written. Groups that lose all their structures
-    are left out.
+    A redrawn city can have fewer houses in a row than the original city, for
+    which the file was written. Groups that lose all their structures are left
+    out.
 
     Args:
         stages: the content of the file.

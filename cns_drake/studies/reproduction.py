@@ -78,8 +78,8 @@ def reproduce_maps(
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
         with_tables: whether the report has wide tables, too.
-        on_note: is called with each note for the user, first with how long the
-            jobs take on this machine, and what space they need.
+        on_note: is called with each note for the user. The first note says how
+            long the jobs take on this machine, and how much space they need.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -172,7 +172,7 @@ def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
 def recording_info(
     scenario: Scenario, output: Path, is_waiting: bool
 ) -> RecordingInfo:
-    """Returns the description of a recording that need not exist yet.
+    """Returns the description of a recording, which need not exist yet.
 
     Args:
         scenario: scenario of the recording.

@@ -1,4 +1,4 @@
-"""The task `seen`: what the drives of a database see of a city's change."""
+"""The task `seen`: which changes of a city the drives of a database see."""
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -47,13 +47,13 @@ _DISAPPEARS = (
 
 @dataclass(frozen=True)
 class Sighting:
-    """The structures of which a drive gets returns, by name.
+    """The structures from which a drive gets returns, by name.
 
     Attributes:
         present: structures that stand in the drive's own world.
-        returned: those of which the drive gets returns.
-        before: structures of which it would get returns in the city of the
-            database's first drive.
+        returned: structures from which the drive gets returns.
+        before: structures from which the drive would get returns in the city of
+            the database's first drive.
     """
 
     present: list[str]
@@ -63,13 +63,13 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Noticed:
-    """What some drives notice of the structures that came and went.
+    """Which appearances and disappearances of structures drives notice.
 
     Attributes:
         names: the S structures that changed, in order.
         is_noticed: (S,) bool, whether a drive notices the change.
         delay: (S,) years from the change to the first drive that notices it;
-            NaN for a change that none notices, or of an unknown year.
+            NaN for a change that no drive notices, or whose year is unknown.
     """
 
     names: list[str]
@@ -85,9 +85,9 @@ def noticed(
 ) -> Noticed:
     """Returns which changes between the first drive and the query are noticed.
 
-    A structure that came is noticed by the first drive that gets returns of it.
-    A structure that went is noticed by the first drive after that which would
-    have got returns of it in the city of the first drive.
+    If a structure appeared, the first drive that gets returns from it notices
+    it. If a structure disappeared, the first later drive notices it that would
+    have got returns from it in the city of the first drive.
 
     Args:
         drives: year and sighting of each drive, from older to newer.
@@ -125,8 +125,8 @@ class SeenTask(Task):
     """Measures which changes of a city the drives of a database notice.
 
     The changes are the structures that came or went between the oldest drive of
-    the database and the query. Numbers whose names end in `_here` are of those
-    structures alone of which the query's own drive notices it.
+    the database and the query. Numbers whose names end in `_here` count only
+    structures whose change the query drive notices, too.
     """
 
     name = "seen"
@@ -206,7 +206,7 @@ def sight_structures(
     first: SimulationSource,
     spacing: float,
 ) -> Sighting:
-    """Returns of which structures a drive gets returns.
+    """Returns the structures from which a drive gets returns.
 
     Args:
         reporter: unused.

@@ -1,4 +1,4 @@
-"""Makes pairs of drives from an experiment on maps, and has them measured."""
+"""Makes and measures the pairs of drives of an experiment on maps."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -270,7 +270,7 @@ class Study:
         )
 
     def drives(self, maps: Sequence[str] = ()) -> list[Scenario]:
-        """Returns each drive that the study compares; makes their maps.
+        """Returns all drives that the study compares, after making their maps.
 
         Args:
             maps: names or folders of maps that replace those of the experiment.

@@ -1,4 +1,4 @@
-"""Trains the method `learned` on scans of drawn cities.
+"""Trains the method `learned` on scans of randomly generated cities.
 
 In a batch, scans of one drive are queries for places of another drive through
 the same city. Queries and places are compared as the method does. The loss is
@@ -98,7 +98,7 @@ class TrainingScans:
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
         overlaps: (N, N) share of each scan that is visible from the place of
-            each other scan. None if distances decide which places are right.
+            each other scan. None if distances determine which places are right.
     """
 
     images: np.ndarray
@@ -127,7 +127,7 @@ class TrainingScans:
 
 @dataclass(frozen=True)
 class Batch:
-    """Images of Q queries and P places, with the truth.
+    """Images of Q queries and P places, with the ground truth.
 
     Attributes:
         images: (Q + P, RINGS, SECTORS, CHANNELS) uint8 polar images, queries
@@ -142,7 +142,7 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches of scans for training.
+    """Samples batches of scans for training.
 
     A batch depends only on the seed and on the number of its step.
     """
@@ -152,7 +152,7 @@ class Sampler:
 
         Args:
             scans: all scans.
-            seed: seed of the draws.
+            seed: seed of the random sampling.
 
         Raises:
             InputError: no city has two drives.
@@ -282,9 +282,9 @@ def import_jax() -> None:
 
 
 def start_parameters(seed: int) -> Parameters:
-    """Returns random weights of the network, as training starts from them.
+    """Returns random weights of the network, with which training starts.
 
-    Their variance is that of He et al., ICCV 2015.
+    Their variance follows He et al., ICCV 2015.
     """
     rng = np.random.default_rng([seed, 0xC0DE])
     found: Parameters = {}
@@ -364,7 +364,7 @@ def train(
     Args:
         scans: images of the scans, and which scans show the same place.
         steps: number of batches.
-        seed: seed of all draws.
+        seed: seed of all random numbers.
         state: file with the state of the training. If it exists, the training
             continues from there.
         digest: digest of the scans.
@@ -487,7 +487,7 @@ def write_weights(
     seen: tuple[float, float],
     made_by: Mapping[str, Any],
 ) -> None:
-    """Writes a file of weights, as the method `learned` reads it.
+    """Writes a file of weights for the method `learned`.
 
     Args:
         path: the file.
@@ -526,8 +526,8 @@ class TrainingPlan:
         returns: whether some drives have calibrated returns and weather.
         driver: whether drivers wander and change lanes.
         drawn_streets: whether the streets of the cities are sampled at random.
-        graded: whether exact overlaps decide which places are right, instead of
-            distances.
+        graded: whether exact overlaps determine which places are right, instead
+            of distances.
     """
 
     cities: int
@@ -587,7 +587,7 @@ def make_weights(
 
     Raises:
         InputError: JAX is not installed, a file cannot be written, or cities
-            could not be drawn.
+            could not be generated.
     """
     import_jax()
     check_writable(output)

@@ -1,8 +1,9 @@
 """Drives for training: cities, stages and effects, all sampled at random.
 
-A city has the streets of a map, or streets sampled at random. Everything else
-is drawn anew, including two younger stages. Several drives follow the same
-route and differ as real visits do: in stage, effects, LiDAR and driver.
+A city has the streets of a map, or streets sampled at random. All other
+structures are sampled anew, and so are two earlier stages. Several drives
+follow the same route and differ as real visits do: in stage, effects, LiDAR and
+driver.
 """
 
 from collections.abc import Sequence
@@ -77,7 +78,7 @@ _OVERLAP_POINTS = 1000
 
 @dataclass(frozen=True)
 class SampledCity:
-    """A city with its drives, all drawn from a seed.
+    """A city with its drives, all sampled from a seed.
 
     Attributes:
         map_name: the shipped map whose streets the city has, or `DRAWN_STREETS`
@@ -111,7 +112,7 @@ class SampledCity:
         """Writes the map folder of the city.
 
         Raises:
-            InputError: the city cannot be drawn, or the folder cannot be
+            InputError: the city cannot be generated, or the folder cannot be
                 written.
         """
         with draft_folder(folder, replaces=True) as draft:
@@ -332,9 +333,10 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     """Returns random stages of a city, as the content of `stages.yaml`.
 
-    Before the last stage, which is the whole city, whole buildings are missing,
-    and with each of them what stands, grows or parks nearest to it. Some trees
-    are missing as well. A few buildings and trees are lower.
+    The last stage is the whole city. In earlier stages, whole buildings are
+    missing, and with each building the objects that stand, grow or park nearest
+    to it. Some trees are missing as well, and a few buildings and trees are
+    lower.
 
     Args:
         city: the city.

@@ -1,4 +1,4 @@
-"""Buildings of every archetype, drawn at random or fixed (landmarks).
+"""Buildings of every archetype, random or fixed (landmarks).
 
 An archetype is a kind of building. `archetypes.yaml` contains the limits of
 size and the colours of each archetype, and a subclass of `Building` draws and
@@ -90,7 +90,7 @@ def sample(
     name: str = "building",
     blind_edges: Collection[int] = (),
 ) -> Model:
-    """Returns a building of an archetype, with parameters drawn at random.
+    """Returns a building of an archetype, with random parameters.
 
     Args:
         archetype: key of `ARCHETYPES`.

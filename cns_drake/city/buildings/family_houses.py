@@ -143,7 +143,7 @@ class DetachedHouse(_FamilyHouse):
     """
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         self.plan = self.pick(("box", "ell", "tee", "cross", "ell"))
         self.mirrored = self.chance(0.5)
         self.roof = self.pick(("gable", "gable", "hip", "gambrel"))
@@ -305,7 +305,7 @@ class Bungalow(_FamilyHouse):
     """The bungalow: one long low storey, a carport or a garage."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         # `long`, `ell` (a wing to the front) or `court` (two of them).
         self.plan = self.pick(("long", "ell", "ell", "court"))
         # `garage` in the front wing, `carport` beside the house or `none`.
@@ -435,7 +435,7 @@ class SemiDetached(_FamilyHouse):
     """The pair of semi-detached houses: mirrored halves under one roof."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         self.roof = self.pick(("gable", "hip"))
         # Wanted slope of the roof.
         self.pitch_deg = self.uniform(30.0, 45.0)

@@ -31,7 +31,7 @@ class CourtBlock(Building):
     """The court block: wings around a court, a mansard roof with dormers."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         range_depth = self.uniform(10.0, 12.5)
         run = 1.3 * site.open_length
@@ -177,7 +177,7 @@ class WalkUp(Building):
     """The walk-up: brick flats around a stair, behind a raised entrance."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         depth = site.depth - _FRONT_M - _BACK_M
         is_free = not {1, 3} & site.blind_edges
@@ -351,7 +351,7 @@ class GardenFlats(Building):
     """Flats in a garden: staggered houses under gables, stacks of verandas."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.roof = self.pick(("gable", "gable", "hip"))
         # Wanted slope of the roofs.

@@ -28,7 +28,7 @@ class Barn(Building):
     """The barn or boat house: timber boards, wide doors, a lean-to."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         width = min(site.width, site.depth)
         aisle = round(self.uniform(0.2, 0.28) * width, 2)
@@ -198,7 +198,7 @@ class SportsHall(Building):
     """The sports hall: a wide roof on frames, a low front, high windows."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         # A `butterfly` is two sheds that fall to the middle.
         self.roof = self.pick(("barrel", "gable", "shed", "butterfly"))
@@ -337,7 +337,7 @@ class WaterfrontHall(Building):
     """
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.roof = self.pick(("gable", "barrel", "sawtooth"))
         self.dock_depth = self.uniform(2.5, 4.0, 1)

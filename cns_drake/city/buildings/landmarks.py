@@ -72,7 +72,7 @@ class Landmark(Building):
     """A landmark: a fixed model from a file, stretched to fit its site."""
 
     def draw(self) -> None:
-        """Draws one of the landmark's models."""
+        """Chooses one of the landmark's models at random."""
         self.folder = self.pick(LANDMARKS[self.kind.name])
 
     def build(self) -> None:

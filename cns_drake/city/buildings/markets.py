@@ -27,7 +27,7 @@ class ShopStrip(Building):
     """The strip of shops: low flat-roofed units side by side, all different."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         # Height of the shops without their parapets.
         self.ground = round(min(self.uniform(3.6, 4.2), self.height - 0.5), 2)
         self.unit_width = self.uniform(5.5, 9.0)
@@ -128,7 +128,7 @@ class KioskRow(Building):
     """The row of kiosks: small stalls with counters behind a common arcade."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         reach = self.uniform(1.6, 2.4, 2)
         # Wanted width of a stall.
@@ -245,7 +245,7 @@ class Supermarket(Building):
     """The supermarket: a low hall, a glazed front under a canopy, a dock."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         # Width of the entrance.
         self.entrance_width = round(

@@ -26,7 +26,7 @@ class BandedTower(Building):
     """The banded office tower: round corners, ribbon windows, garden floors."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         side = min(site.width, site.depth)
         self.radius = round(self.uniform(0.18, 0.42) * side, 2)
@@ -190,7 +190,7 @@ class GridTower(Building):
         return self.recess + 0.15
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         # `box`, `offset` (two slabs that slide past each other) or `notched`.
         self.plan = self.pick(("box", "offset", "notched"))
@@ -314,7 +314,7 @@ class UnfinishedTower(Building):
     """The tower under construction: core, frame, scaffolds, cladding."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         rise = self.height - self.uniform(3.5, 5.5)
         wanted = max(3, round(rise / self.uniform(3.4, 4.0)))
         # Storeys that are placed as one.

@@ -29,7 +29,7 @@ class GasStation(Building):
     """The gas station: pumps under a canopy, shop, car wash and price sign."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.canopy_top = round(min(self.height, self.uniform(5.0, 5.8)), 2)
         # Height of the canopy's edge.
@@ -182,7 +182,7 @@ class ParkPavilion(Building):
     """The park pavilion: a bandstand, a shelter with tables, or a tea house."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         long = not 0.67 < site.width / site.depth < 1.5
         self.floor = self.uniform(0.3, 0.9, 2)

@@ -27,7 +27,7 @@ class School(Building):
     """The school: classroom wings, a glazed entrance, a gymnasium."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         deep = min(self.uniform(9.0, 12.0), site.depth - 4.5)
         self.rise = round(self.uniform(0.26, 0.36) * deep, 2)
@@ -193,7 +193,7 @@ class Chapel(Building):
     """The chapel: a nave with a steep roof, a tower or bell cote, a porch."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         wide = min(site.width, site.depth, 18.0)
         # `front` (a tower in the middle of the front), `side` (a tower beside

@@ -283,7 +283,7 @@ class RowHouse(_HouseInARow):
     """The row house: one narrow house between its neighbours, with a stoop."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         width = self.site.width
         self.draw_house(width, _ROOFS[:5] if width < 9.5 else _ROOFS[:3])
         self.stoop = 1.3
@@ -330,7 +330,7 @@ class Terrace(_HouseInARow):
     """The terrace: a row of narrow houses, similar but not the same."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         # Wanted width of a house.
         self.unit_width = self.uniform(5.0, 6.6)
         self.draw_house(
@@ -400,7 +400,7 @@ class ShopHouse(_HouseInARow):
     """The shop house: shops on the ground floor, flats above them."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         width, depth = self.site.width, self.site.depth
         roofs = _ROOFS_ABOVE_SHOPS[: 5 if width < min(10.0, depth) else 3]
         self.draw_house(width, roofs if depth <= 14.0 else ("flat",))

@@ -30,7 +30,7 @@ class SlabTower(Building):
     """The concrete slab block: loggias, a stair tower, pillars, a pavilion."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.ground_height = self.uniform(4.2, 5.2, 2)
         self.storey_height = self.uniform(2.9, 3.2)
@@ -140,7 +140,7 @@ class BalconyFlats(Building):
     """The white slab block: stacks of balconies, staggered sections."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         room = site.depth - 2.0
         # Distance by which every other section stands back.
@@ -365,7 +365,7 @@ class GalleryFlats(Building):
     """The gallery block: walkways along the doors, loggias at the back."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.gallery = self.uniform(1.4, 1.8, 2)
         room = site.depth - self.gallery

@@ -28,7 +28,7 @@ class BrickBlock(Building):
     """The old brick block: punched windows, fire stairs, a water tower."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.storey_height = self.uniform(3.1, 3.7)
         free = [
@@ -151,7 +151,7 @@ class CornerBuilding(Building):
     """
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         side = min(site.width, site.depth, 24.0)
         self.corner = self.pick(site.free_corners or [0, 1])
@@ -315,7 +315,7 @@ class Office(Building):
     """
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         self.ground_height = self.uniform(4.4, 5.4, 2)
         self.storey_height = self.uniform(3.4, 3.9)
@@ -419,7 +419,7 @@ class CornerStore(Building):
     """The corner store: a door across the corner, flats above the shop."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         # Rise of the parapet above the corner.
         self.raised = self.uniform(0.3, 0.9, 2)

@@ -21,7 +21,7 @@ class ArtDecoTower(Building):
     """The art-deco tower: symmetric setbacks, tall piers, a stepped crown."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         # Where each tier above the base starts, as a part of the height.
         starts = self.pick(((0.5,), (0.3, 0.62)))
@@ -115,7 +115,7 @@ class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         edges = len(site.outline)
         starts = self.pick(((0.62,), (0.45, 0.78)))
@@ -245,7 +245,7 @@ class Hotel(Building):
     """The hotel: balconies along rounded walls, a forecourt, a roof-top bar."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         depth = site.depth - _FORECOURT_M
         self.pitch = max(self.uniform(3.6, 4.6), site.width / 11)
@@ -359,7 +359,7 @@ class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
 
     def draw(self) -> None:
-        """Draws sizes and style."""
+        """Samples sizes and style."""
         site = self.site
         podium, tower = (
             self.kind.choices[part] for part in ("podium", "tower")

@@ -1,4 +1,4 @@
-"""The base class of buildings: site, random draws, collected parts."""
+"""The base class of buildings: site, random choices, collected parts."""
 
 from __future__ import annotations
 
@@ -169,11 +169,11 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         party_walls: whether a building can stand wall to wall with a neighbour;
             otherwise it keeps the distance `overhang` from the edges of the
             footprint towards neighbours.
-        colours: name of a part -> colours, of which each building draws one; or
-            the name of an earlier part, whose colour this part gets as well.
-            The colour of the first part is that of all parts without an entry.
-        choices: further lists of colours, by name, from which single elements
-            of a building draw.
+        colours: name of a part -> colours, of which each building has one at
+            random; or the name of an earlier part, whose colour this part has
+            as well. Parts without an entry have the colour of the first part.
+        choices: further lists of colours, by name, for single elements of a
+            building.
         materials: names of the parts that are made of many pieces, such as
             `trim`; each is a key of `colours`, or `glass`.
     """
@@ -198,12 +198,12 @@ HEAD_ROOM_M = 2.3
 
 @dataclass
 class Assembly(Dice):
-    """Collects the parts and meshes of one building, and draws for it.
+    """Collects the parts of one building, and makes its random choices.
 
     `add` makes one part from the given meshes. `add_to` collects meshes by
     material, and `paint` sets the materials' colours: each material becomes one
     part, so that a building of many small pieces has few visuals. Parts without
-    a finish of their own have that of the `walls`.
+    their own finish have the finish of the `walls`.
     """
 
     site: Site
@@ -216,7 +216,7 @@ class Assembly(Dice):
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
 
     def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first words of a text; how many of them is random.
+        """Returns the first words of a text, a random number of them.
 
         The number of words is at least `low` and less than `high`.
         """
@@ -360,10 +360,10 @@ class Assembly(Dice):
 class Building(Assembly, abc.ABC):
     """The base class of buildings; each archetype has a subclass.
 
-    The constructor calls `draw`, which draws the sizes and the style of the
-    building at random, and then draws its colours. From these attributes,
-    `build` makes the parts of the building. Only roof equipment and chimneys
-    may rise above its `height` [m].
+    The constructor calls `draw`, which samples the sizes and the style of the
+    building, and then samples its colours. From these attributes, `build` makes
+    the parts of the building. Only roof equipment and chimneys may rise above
+    its `height` [m].
     """
 
     def __init__(
@@ -373,7 +373,7 @@ class Building(Assembly, abc.ABC):
         height: float,
         rng: np.random.Generator,
     ) -> None:
-        """Draws sizes and style, and then the colours of the building."""
+        """Samples sizes and style, and then the colours of the building."""
         super().__init__(site, rng)
         self.kind = kind
         self.height = height
@@ -395,8 +395,8 @@ class Building(Assembly, abc.ABC):
     def draw(self) -> None:
         """Sets the attributes that differ between buildings of one archetype.
 
-        Lengths are in metres. The order of the draws is part of each city: it
-        decides which numbers a building gets.
+        Lengths are in metres. Do not change the order in which random numbers
+        are sampled, because it determines the numbers that a building gets.
         """
 
     @abc.abstractmethod

@@ -20,7 +20,7 @@ _PANE_OVERLAP = 0.004
 
 
 def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
-    """Adds awnings to a building, all in one colour drawn at random.
+    """Adds awnings to a building, all in the same random colour.
 
     `pieces` contains the awnings in the building's frame. Without any, nothing
     is added.
@@ -238,7 +238,7 @@ def shaft_walls(
 ) -> Facade:
     """Returns the walls of a stair tower: one bay in front and one behind.
 
-    Each bay is in the middle of its wall; the other walls are plain.
+    Each bay is in the middle of its wall. The other walls are plain.
 
     Args:
         height: height of the walls [m].

@@ -1,4 +1,4 @@
-"""Houses of several wings: boxes that can overlap, each with its own roof.
+"""Houses with several wings: boxes that can overlap, each with its own roof.
 
 Walls have windows and doors where no other wing hides them.
 

@@ -1,4 +1,4 @@
-"""Parked vehicles, drawn from body types and colours.
+"""Parked vehicles of random body types and colours.
 
 Vehicle frame: x forward, y left, z up; the origin is on the ground below the
 middle of the vehicle.

@@ -1,4 +1,4 @@
-"""Things on construction sites and at roadworks."""
+"""Objects on construction sites and at roadworks."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Things of squares, parks and yards: monuments, shelters, stalls."""
+"""Objects in squares, parks and yards: monuments, shelters, stalls."""
 
 import math
 

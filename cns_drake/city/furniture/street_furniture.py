@@ -1,4 +1,4 @@
-"""Things on a sidewalk; the front of each faces +x."""
+"""Objects on a sidewalk; the front of each faces +x."""
 
 import math
 

@@ -67,7 +67,7 @@ class Streets(NamedTuple):
         reserved: further area in which nothing is built or planted.
         structures: structures of the streets themselves.
         furnish: function that places the objects of the streets. It is called
-            after the buildings are placed and before everything else.
+            after the buildings are placed and before all other objects.
         park: function that parks cars in the streets. It is called last.
         kerbs: height of the kerb by place; None if it is `kerb_height`
             everywhere.

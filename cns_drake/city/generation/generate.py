@@ -391,8 +391,8 @@ def structure_table(
 
     Args:
         structures: the structures.
-        versions: the structures as they are in all stages; each may have parts
-            that it lacks in another stage.
+        versions: the structures as they are in all stages. A structure can have
+            parts in one stage that it lacks in another.
     """
     names = (
         "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags",
@@ -537,7 +537,7 @@ def generate_city(
     Raises:
         InputError: if an input cannot be used or a file cannot be written; if a
             structure in `stages.yaml` has another name now and `repair_stages`
-            is false; or if such a structure no longer exists.
+            is false; or if a structure in `stages.yaml` no longer exists.
     """
     world = Path(world)
     if (world / MESH_FOLDER).is_symlink():

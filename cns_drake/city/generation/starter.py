@@ -51,11 +51,11 @@ def start_city(
 
     `city.yaml` gets a district for each block between the roads. `stages.yaml`
     gets a stage 01 without the buildings and trees in the east, and a stage 02
-    with everything. Each stage gets a drive on a random route. `progress` is
-    called with a line for each file that is written or kept.
+    with all structures. Each stage gets a drive on a random route. `progress`
+    is called with a line for each file that is written or kept.
 
     Returns:
-        The files written; existing files stay as they are.
+        The files that were written. Existing files are not changed.
 
     Raises:
         InputError: if the roads cannot be used, or a file cannot be written.

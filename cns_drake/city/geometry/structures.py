@@ -67,7 +67,7 @@ class Finish(NamedTuple):
 
     @classmethod
     def given(cls, value: Any) -> "Finish":
-        """Reads a finish of a file: a colour, or a material with its colour.
+        """Reads a finish from a file: a colour, or a material with its colour.
 
         For example `[0.8, 0.7, 0.6]`, or `{brick: [0.5, 0.3, 0.2]}`.
 
@@ -206,16 +206,15 @@ class Builder:
     """A kind of object, and the function that makes objects of this kind.
 
     `make(rng, **parameters)` returns a `Model`. Every parameter has a default;
-    most defaults are drawn at random from `rng`. The same state of `rng` gives
-    the same model. `semantic_class` is a key of
-    `cns_drake.scene.semantics.CLASS_IDS`.
+    most defaults are sampled from `rng`. The same state of `rng` gives the same
+    model. `semantic_class` is a key of `cns_drake.scene.semantics.CLASS_IDS`.
     """
 
     semantic_class: str
     make: Callable[..., Model]
 
     def build(self, rng: np.random.Generator, **parameters: Any) -> Model:
-        """Returns an object; what is not given is drawn at random from `rng`.
+        """Returns an object; parameters that are not given come from `rng`.
 
         Raises:
             TypeError: there is no such parameter, or its type is wrong.

@@ -43,7 +43,7 @@ def share_out(
 
     Raises:
         InputError: if a district has no ground, because its ground is outside
-            the city, below streets or part of a district before; or if some
+            the city, below streets or part of an earlier district; or if some
             ground belongs to no district.
     """
     free = snap(box(*plan.bounds)).difference(streets)

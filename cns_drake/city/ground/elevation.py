@@ -88,8 +88,8 @@ class SlopingGround:
                 or by place.
             streets: area of carriageways, sidewalks and medians in W [m].
             bounds: x0, y0, x1, y1 of the city in W [m].
-            pads: level areas outside the streets; of two that meet, the first
-                one takes precedence.
+            pads: level areas outside the streets. Where two of them meet, the
+                first one takes precedence.
         """
         self.pads = tuple(pads)
         self._surface = surface

@@ -1,4 +1,4 @@
-"""Makes a building as it was before its upper storeys were added.
+"""Makes earlier, lower versions of a building, without its upper storeys.
 
 The part below the new height stays unchanged, to the millimetre, so that the
 street front looks the same. The building gets a new roof.

@@ -130,9 +130,10 @@ def _beside(part: Part, xy: tuple[float, float]) -> Part:
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     """Returns a large axis-aligned rectangle that lies within a footprint.
 
-    Its sides pass through corners of the footprint. Of these rectangles, it is
-    the largest one, unless the footprint has so many corners that only some of
-    them are tried. It is tiny if no such rectangle lies within the footprint.
+    The sides of the rectangle pass through corners of the footprint. It is the
+    largest such rectangle, unless the footprint has so many corners that only
+    some are tried. If no such rectangle lies within the footprint, the result
+    is tiny.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
     xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
@@ -166,10 +167,11 @@ USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
 def use_by_size(structure: Structure) -> LotUse:
-    """Returns what a lot without its building is used for by default.
+    """Returns the default use of a lot before its building is built.
 
-    With increasing area of the lot, this is a garden, a yard, a market or a car
-    park. `structure` is the building that stands on the lot in other stages.
+    The use depends on the area of the lot: from small to large, it is a garden,
+    a yard, a market or a car park. `structure` is the building that stands on
+    the lot in other stages.
     """
     area = structure.model.footprint.area
     if area > 900:
@@ -259,7 +261,7 @@ class GrowingCity:
     ):
         """Adds the objects on lots to the structures of the whole city.
 
-        The whole city is that of the last stage. `cars` maps parked cars to
+        The whole city is the city in the last stage. `cars` maps parked cars to
         their weights in the random choice.
         """
         self._stages = stages

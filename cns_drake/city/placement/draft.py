@@ -91,8 +91,8 @@ class Draft:
         """Returns the random generator of a task, such as placing trees.
 
         Each task has its own generator, so that a change in one district does
-        not change the random draws in other districts. `words` are the name of
-        the task.
+        not change the random numbers in other districts. `words` are the name
+        of the task.
         """
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self.plan.seed, zlib.crc32(key)])
@@ -166,8 +166,8 @@ class Draft:
         """Places an object on the finished ground, if there is room for it.
 
         Returns the new structure, or None if there is no room or the ground is
-        too steep. Even then, a number is used up for the name, so that the
-        names of later objects do not depend on whether this one fits.
+        too steep. A number is used for the name even if the result is None, so
+        the names of later objects do not depend on whether this object fits.
 
         Args:
             name: kind of object, a key of `OBJECTS`.

@@ -98,8 +98,8 @@ class RowPlan(_Model):
             fronts [m].
         archetypes: weights of the archetypes in the random choice, by name,
             such as `{house: 3, office: 1}`.
-        width: smallest and largest width of a lot [m]. Each lot's width is
-            drawn at random between them.
+        width: smallest and largest width of a lot [m]. The width of each lot is
+            sampled between these limits.
         depth: smallest and largest depth of a lot [m].
         height: smallest and largest height of a building's parapet, ridge or
             spire [m].
@@ -265,7 +265,7 @@ class DistrictPlan(_Model):
 
     Attributes:
         name: unique name, from lower-case letters, digits and underscores. The
-            random draws in the district depend on it.
+            random numbers of the district depend on it.
         block: `[x, y]` of a point [m]. The district fills the block between
             streets that contains this point. Give `block`, `area` or neither.
         area: corners of the district [m]. A district with neither `block` nor
@@ -308,10 +308,10 @@ class DistrictPlan(_Model):
 
 
 class CityPlan(_Model):
-    """The file `city.yaml`: everything in a city except its roads.
+    """The file `city.yaml`: all parts of a city except its roads.
 
     Attributes:
-        seed: seed of all random draws. Another seed makes another city along
+        seed: seed of all random numbers. Another seed makes another city along
             the same streets.
         bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
             world [m].

@@ -27,8 +27,8 @@ class Growth(_Model):
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
             for any text and `?` for any one character.
-        but: names of structures to which this does not apply, although they are
-            in `structures`.
+        but: names of structures that are exceptions, although they match
+            `structures`.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -40,7 +40,7 @@ class Stage(_Model):
     """One stage: its story, and how it differs from the next stage.
 
     Attributes:
-        story: text that says what a visitor would see change until the next
+        story: text that says which changes a visitor would see until the next
             stage.
         absent: structures that exist in the next stage but not in this one:
             lists of names, each list under a heading of your choice. Not in the

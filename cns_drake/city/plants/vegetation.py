@@ -1,4 +1,4 @@
-"""Trees: their species, and single trees drawn at random."""
+"""Trees: their species, and random single trees."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -68,7 +68,7 @@ def tree(
     height: float | None = None,
     variant: int | None = None,
 ) -> Model:
-    """Returns one tree; what is not given is drawn at random.
+    """Returns one tree; parameters that are not given are random.
 
     Args:
         rng: random generator.
