@@ -129,7 +129,7 @@ def export(
         drives: Drives to export. By default, pointnetvlad and overlap export
             all shipped drives, or none with --vary.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan), tum (only the trajectory), mcap (a whole file);
+            mulran (MulRan), tum (only the trajectory), mcap (a repaired copy);
             pointnetvlad (clouds and pickle files as PointNetVLAD reads them),
             overlap (scans and the exact overlap of each pair), overlap-table
             (only a table of the overlaps between a database and a query drive,

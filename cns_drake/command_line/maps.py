@@ -199,8 +199,9 @@ def import_city(
         seed: Seed of all random choices: which buildings are missing or lower
             in the first stage (--grow), what is added to buildings and streets,
             and, for an OpenDRIVE file, which has no buildings, the whole city.
-        along: CSV file with the path of a drive of your own, x and y in the map
-            [m]. This drive replaces the two proposed drives.
+        along: CSV file with the path of a drive of your own: columns x and y in
+            the frame of the map [m]. This drive replaces the two drives that
+            the command otherwise makes.
         within: Leave out structures that are farther than this from the drives
             [m], to save memory. By default, no structure is left out.
         drive_on: Side of the street on which cars drive; by default as the file

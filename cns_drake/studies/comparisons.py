@@ -911,8 +911,8 @@ def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
 
     Args:
         compared: the drives.
-        worlds: digests of the files of worlds that are known already, to which
-            those of these drives are added.
+        worlds: cache, world file -> digest of the files of its world. The
+            digests of the worlds of these drives are added in place.
 
     Raises:
         InputError: a file of a world cannot be read.

@@ -1,4 +1,4 @@
-"""Checks a method's scores, verifies places by their poses, ranks them."""
+"""Checks scores, verifies candidates geometrically, and ranks the places."""
 
 from collections.abc import Mapping, Sequence
 import contextlib

@@ -1,4 +1,4 @@
-"""Pairs of recordings, which a study compares without changes.
+"""Pairs of recordings, which a study compares as they were recorded.
 
 A recording is read once, for all that a study needs of it.
 """

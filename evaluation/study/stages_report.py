@@ -132,9 +132,9 @@ class StagesReport:
     def jobs(self) -> list[Job]:
         """Returns the jobs whose results `assemble` puts into a report.
 
-        For a city with one stage, only its route is drawn. Descriptions that
-        an earlier report removed (see `assemble`) are made again by the jobs if
-        new results need them.
+        For a city with one stage, only its route is drawn. If new results need
+        descriptors that an earlier report removed (see `assemble`), the jobs
+        compute these again.
 
         Raises:
             InputError: see `cities`.

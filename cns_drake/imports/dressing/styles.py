@@ -59,8 +59,8 @@ class Style:
         balconies: whether every other window may have a balcony.
         plinth: height of the plinth; 0 for none.
         cornice: height of the cornice; 0 for none.
-        by_tag: those of `use`, `levels` (the number of storeys), `wall` and
-            `roof` that come from tags of the file.
+        by_tag: which of the names `use`, `levels` (the number of storeys),
+            `wall` and `roof` the tags of the file determine.
     """
 
     use: str
