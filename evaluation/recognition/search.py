@@ -64,13 +64,12 @@ class Search:
         self.query_ms = np.zeros(len(rows))
         shares = self._shares(query, rows, is_known)
         scores = np.empty(is_known.shape)
-        for number, group, database in self._each():
+        for number, group in self._each():
             for k in self._tracked(query, rows):
                 start = process_time_ns()
                 scores[k, group] = self._score(
                     query,
                     rows[k],
-                    database,
                     is_known[k],
                     group,
                     None if shares is None else int(shares[k, number]),
@@ -97,14 +96,14 @@ class Search:
         """
         method = self._method
         found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
-        for _, group, database in self._each():
+        for _, group in self._each():
             for row, places in enumerate(wanted):
                 here = places[(group.start <= places) & (places < group.stop)]
                 if len(here) == 0:
                     continue
                 poses = method.relative_poses(
                     query.queries.descriptors[row],
-                    database,
+                    self._database,
                     (here - group.start).tolist(),
                 )
                 check_number(method, "relative_poses", poses, len(here))
@@ -130,13 +129,13 @@ class Search:
         lists: list[list[np.ndarray]] = [
             [np.empty(0)] * len(self._groups) for _ in rows
         ]
-        for number, _, database in self._each():
+        for number, _ in self._each():
             for k in self._tracked(query, rows):
                 if not is_known[k].all():
                     continue
                 start = process_time_ns()
                 lists[k][number] = method.shortlist(
-                    query.queries.descriptors[rows[k]], database
+                    query.queries.descriptors[rows[k]], self._database
                 )
                 self.query_ms[k] += (process_time_ns() - start) * 1e-6
         shares = np.zeros((len(rows), len(self._groups)), np.int64)
@@ -151,7 +150,6 @@ class Search:
         self,
         query: DriveDescriptors,
         row: int,
-        database: Any,
         is_known: np.ndarray,
         group: slice,
         share: int | None,
@@ -161,39 +159,50 @@ class Search:
         method = self._method
         is_whole = bool(is_known.all())
         if share is not None and is_whole:
-            found = method.score_best(queries.descriptors[row], database, share)
+            found = method.score_best(
+                queries.descriptors[row], self._database, share
+            )
             number = group.stop - group.start
             return checked_scores(method, "score_best", found, number)
         return score_places(
             method,
             queries.descriptors[: row + 1],
             queries.clouds[row] if queries.clouds else None,
-            database,
+            self._database,
             self._places.clouds,
             is_known[group],
             exhaustive=not is_whole,
             where=f"{query.name}: query at frame {queries.frames[row]}",
         )
 
-    def _each(self) -> Iterator[tuple[int, slice, Any]]:
-        """Yields the number, the places and the database of each group.
+    def _each(self) -> Iterator[tuple[int, slice]]:
+        """Yields the number and the places of each group, and builds it.
 
-        The group that is in memory comes first.
+        The group that is in memory comes first. Nothing else may hold a
+        database, so that only one is in memory.
         """
         numbers = range(len(self._groups))
         if self._built is not None and self._built[0] == numbers[-1]:
             numbers = numbers[::-1]
         for number in numbers:
-            group = self._groups[number]
             if self._built is None or self._built[0] != number:
                 self._built = None
-                descriptors = self._places.descriptors[group]
-                start = process_time_ns()
-                database = self._method.build_database(descriptors)
-                passed_ms = (process_time_ns() - start) * 1e-6
-                self._build_ms[number] = passed_ms
-                self._built = number, database
-            yield number, group, self._built[1]
+                self._build(number)
+            yield number, self._groups[number]
+
+    def _build(self, number: int) -> None:
+        """Builds the database of a group."""
+        descriptors = self._places.descriptors[self._groups[number]]
+        start = process_time_ns()
+        database = self._method.build_database(descriptors)
+        self._build_ms[number] = (process_time_ns() - start) * 1e-6
+        self._built = number, database
+
+    @property
+    def _database(self) -> Any:
+        """The database of the present group."""
+        assert self._built is not None
+        return self._built[1]
 
     def _tracked(
         self, query: DriveDescriptors, rows: Sequence[int]

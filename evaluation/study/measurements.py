@@ -90,7 +90,7 @@ def shown_overlaps(
         Radius -> (Q,) overlaps; NaN without a match.
     """
     choice.make()  # It registers the type of its descriptions.
-    (_, database), (_, query) = (part.read() for part in described)
+    _, query = described[1].read()
     asked = scans[1].read()
     if not isinstance(asked, list):
         asked = [
@@ -98,7 +98,7 @@ def shown_overlaps(
             for frame in query.queries.frames.tolist()
         ]
     searched = crowded(
-        database,
+        described[0],
         (),
         0,
         [places for _, places in beside],
@@ -179,13 +179,13 @@ def measure_method(
     # The method comes first, because it registers the type of its
     # descriptions.
     method = choice.make()
-    (placed, mapped), (placed_query, asked) = database.read(), query.read()
+    placed, (placed_query, asked) = database.read()[0], query.read()
     check_same_world(placed, placed_query, across_maps=True)
     shown = {} if overlaps is None else overlaps.read()
     return _compare(
         (choice, method),
         crowded(
-            mapped,
+            database,
             distractors,
             num_distractors,
             beside,
@@ -389,7 +389,7 @@ def _describe(
 
 
 def crowded(
-    database: DriveDescriptors,
+    database: DriveDescriptors | Part,
     distractors: Sequence[Part],
     num_others: int,
     beside: Sequence[Part] = (),
@@ -405,7 +405,8 @@ def crowded(
     there are fewer.
 
     Args:
-        database: a drive, with a method's descriptions of its places.
+        database: a drive, with a method's descriptions of its places, or the
+            file with it.
         distractors: for each drive through another city, the file with the
             same method's descriptions of its places.
         num_others: number of places to append.
@@ -417,10 +418,10 @@ def crowded(
         divides: whether descriptors are read while they are searched, if they
             are too large for the memory; see `Method.divides`.
     """
-    parts = [*beside, *distractors]
+    parts = [database, *beside, *distractors]
     store = StoredDrives(
-        [lambda: database, *(partial(_described_in, one) for one in parts)],
-        [0, *(one.size() for one in parts)],
+        [partial(_described_in, one) for one in parts],
+        [one.size() if isinstance(one, Part) else 0 for one in parts],
         MOST_BYTES if divides else math.inf,
     )
     num_near = 1 + len(beside)
@@ -434,7 +435,7 @@ def crowded(
     stored = [drive_of[rows]]
     stored_rows = [own_row[rows]]
     most = len(rows) + num_others
-    for k in range(num_near, len(parts) + 1):
+    for k in range(num_near, len(parts)):
         if sum(map(len, stored)) >= most:
             break
         every.append(store.undescribed(k))
@@ -443,11 +444,10 @@ def crowded(
     places = joined_scans(every, range(len(every)), most)
     of = np.concatenate(stored)[:most]
     return Searched(
-        replace(
-            database,
-            places=store.described(
-                places, of, np.concatenate(stored_rows)[:most]
-            ),
+        DriveDescriptors(
+            store.name(0),
+            store.described(places, of, np.concatenate(stored_rows)[:most]),
+            here.chosen(np.arange(0)),
         ),
         [store.name(k) for k in of.tolist()],
         len(rows),
@@ -455,6 +455,6 @@ def crowded(
     )
 
 
-def _described_in(part: Part) -> DriveDescriptors:
-    """Returns the drive with a method's descriptions in a file."""
-    return part.read()[1]
+def _described_in(source: DriveDescriptors | Part) -> DriveDescriptors:
+    """Returns a drive with a method's descriptions, which a file may hold."""
+    return source.read()[1] if isinstance(source, Part) else source

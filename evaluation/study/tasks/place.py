@@ -247,7 +247,7 @@ def measure_costs(
         others = [parts[k] for parts in distractors]
         near = [parts[k] for parts in beside]
         searched = crowded(
-            database[k].read()[1],
+            database[k],
             others,
             num_distractors,
             near,
