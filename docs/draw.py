@@ -379,6 +379,35 @@ def years(path: Path) -> None:
     figure.savefig(path, dpi=_DPI)
 
 
+def sessions(path: Path) -> None:
+    """Draws R@1 of a map of January in NCLT, and as predicted in Suburbia."""
+    with open(ROOT / "docs/notes/nclt_sessions.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    figure = Figure(figsize=(_WIDTH, 4.4), layout="constrained")
+    axes = figure.subplots()
+    for where, name in (("suburbia", "layered-overlap"), ("nclt", "btc")):
+        colour, style, marker = METHOD_STYLES[name]
+        days, middle, low, high = np.array(
+            [
+                [float(row[key]) for key in ("days", "r1", "low", "high")]
+                for row in rows
+                if row["where"] == where
+            ]
+        ).T
+        axes.fill_between(days, low, high, color=colour, alpha=0.15, lw=0)
+        label = {"suburbia": "Suburbia, predicted", "nclt": "NCLT"}[where]
+        axes.plot(days, middle, style, color=colour, marker=marker, label=label)
+    axes.axvspan(107, 288, color=PALE, alpha=0.25, lw=0)
+    axes.text(197, 0.03, "leaves in Suburbia", ha="center", color=INK)
+    axes.set_xlabel("days after the map of January 2012")
+    axes.set_ylabel("R@1")
+    axes.set_ylim(0.0, 1.02)
+    _plain(axes, "both")
+    axes.legend(loc="lower right", frameon=False)
+    _head(figure, "Summer costs a map of January nothing in Suburbia")
+    figure.savefig(path, dpi=_DPI)
+
+
 def ladder(path: Path) -> None:
     """Draws the ladder of Suburbia."""
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
