@@ -404,7 +404,7 @@ def sessions(path: Path) -> None:
     axes.set_ylim(0.0, 1.02)
     _plain(axes, "both")
     axes.legend(loc="lower right", frameon=False)
-    _head(figure, "Summer costs a map of January nothing in Suburbia")
+    _head(figure, "Leaves cost nothing in Suburbia")
     figure.savefig(path, dpi=_DPI)
 
 
