@@ -17,7 +17,6 @@ OF_FORMER_CITIES = {
     "map_update.jpg",
     "track.png",
     "metropolis_page.jpg",
-    "drive.webp",
 }
 
 

@@ -964,6 +964,8 @@ NOT_RUN = {
     "test_fields compares the pages with what is there",
     ".venv/bin/python docs/draw.py": "writes into this project; test_pictures "
     "compares the pictures with their data",
+    "name: my-sessions": "needs recordings of a user; test_recorded_studies "
+    "has some",
     "mkdocs serve": "a server, which does not end; test_site builds the site",
     "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
     "the same",
