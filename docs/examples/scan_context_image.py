@@ -16,7 +16,8 @@ import numpy as np
 
 from evaluation.methods import Method, MethodConfig, register
 
-RINGS, SECTORS = 40, 120
+RINGS = 40
+SECTORS = 120
 REACH = 80.0  # Range of the outermost ring [m].
 HIGHEST = 15.0  # The authors colour heights from 0 to 15 m.
 CHANNELS = 1, 8, 16, 32  # The authors have 3, 64, 128 and 256.

@@ -160,9 +160,9 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
-    result = _density(p, ring, tree)
-    if np.isfinite(bright).all():
-        result |= _intensity(bright, tree)
+    has_intensity = np.isfinite(bright).all()
+    result = _intensity(bright, tree) if has_intensity else {}
+    result |= _density(p, ring, tree)
     low = np.quantile(p[:, 2], 0.05)
     height = p[:, 2] - low
     for part in (0.25, *_QUANTILES, 0.99):

@@ -10,12 +10,14 @@ import pytest
 
 from cns_drake import load_scenario
 from cns_drake.pictures.drive_page import (
-    _MAX_POINTS_PER_SCAN,
-    _MAX_SCANS,
     DriveRecord,
     ShownStages,
     make_drive_page,
     moving_frames,
+)
+from cns_drake.pictures.meshcat_recorder import (
+    _MAX_POINTS_PER_SCAN,
+    _MAX_SCANS,
 )
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scene.world import load_world
