@@ -57,6 +57,7 @@ BY_NIGHT = {
     "effects.py",
     "many_houses.py",
     "ray_casting_rates.py",
+    "recording.py",
     "start.py",
     "tcr_of_large_maps.py",
 }

@@ -170,6 +170,7 @@ def test_what_lanes_of_a_junction_enclose_is_road(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_buildings_stand_apart_from_streets_and_each_other(source, town):
     lanes = []
     for band in bands_of(source):
@@ -189,6 +190,7 @@ def test_buildings_stand_apart_from_streets_and_each_other(source, town):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_no_ground_lies_on_kerbs(town):
     areas = {one.name: one.footprint_W for one in town.city.structures}
     kerbs = areas.pop("kerbs")
@@ -200,6 +202,7 @@ def test_no_ground_lies_on_kerbs(town):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_everything_has_its_class(town):
     classes = {s.name: s.semantic_class for s in town.city.structures}
     assert classes["carriageway"] == "road"
@@ -209,6 +212,7 @@ def test_everything_has_its_class(town):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_drives_keep_to_their_lanes(source, town):
     assert len(town.drives) == 2
     middle = {}
@@ -376,6 +380,7 @@ def test_options_of_other_formats(source, tmp_path, option, value):
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_a_drive_of_ones_own_through_what_stands_near(source, town):
     xy = np.array([[20.0, -1.75], [60.0, -1.75], [100.0, -1.75]])
     own = WaypointRoute(xy, xy)

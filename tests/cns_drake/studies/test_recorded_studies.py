@@ -215,7 +215,7 @@ def test_several_recordings_are_a_database(folder, tmp_path):
     results = measure(
         tmp_path / "both",
         folder,
-        tasks=["place", "localise"],
+        tasks={"place": {}, "localise": {"methods": ["icp"]}},
         database={"sessions": SESSIONS, "keep": ["all", 1]},
     )
     alone = measure(tmp_path / "alone", folder, tasks=["place"])

@@ -159,6 +159,7 @@ class Scanned:
 
 
 @pytest.mark.slow
+@pytest.mark.night
 def test_images_are_told_from_images_of_scans(tmp_path, monkeypatch):
     judge = pytest.importorskip("evaluation.real.judge")
     monkeypatch.setattr(judge, "_TREES", 10)

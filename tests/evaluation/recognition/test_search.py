@@ -95,8 +95,12 @@ def stored(drives, most_bytes, reads):
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        ("btc", {"min_votes": 1, "candidates": 7}),
-        ("learned", {}),
+        pytest.param(
+            "btc",
+            {"min_votes": 1, "candidates": 7},
+            marks=pytest.mark.night,
+        ),
+        pytest.param("learned", {}, marks=pytest.mark.night),
         ("ring++", {"cells": 20}),
         ("scan-context++", {"candidates": 7}),
         ("scan-context++", {"candidates": 7, "variant": "cart"}),

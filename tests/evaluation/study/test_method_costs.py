@@ -16,6 +16,7 @@ from evaluation.study.stages_report import StagesReport
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.night
 @pytest.mark.usefixtures("unrendered_figures")
 def test_costs_in_the_report(tmp_path, monkeypatch):
     # A clock that advances by 1 ms whenever it is read.
