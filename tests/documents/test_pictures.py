@@ -16,7 +16,6 @@ REGISTRY = yaml.safe_load(draw.REGISTRY.read_text())
 OF_FORMER_CITIES = {
     "map_update.jpg",
     "track.png",
-    "metropolis_page.jpg",
 }
 
 
