@@ -74,13 +74,13 @@ def measure_search(
         queries: drive with described queries.
     """
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
-    search, times = _searched(method, places, queries)
+    search = _searched(method, places, queries)
     return QueryCost(
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
         memory=sum(sizes),
         build_ms=search.build_ms,
-        query_ms=float(np.median(times[1:])),
+        query_ms=_median_ms(search),
     )
 
 
@@ -127,21 +127,25 @@ def query_ms(
         places: described places, all of them candidates.
         queries: drive with described queries.
     """
-    _, times = _searched(method, places, queries)
-    return float(np.median(times[1:]))
+    return _median_ms(_searched(method, places, queries))
 
 
 def _searched(
     method: Method, places: DescribedScans, queries: DriveDescriptors
-) -> tuple[Search, np.ndarray]:
-    """Returns a search after some queries, and the CPU time of each [ms]."""
+) -> Search:
+    """Returns a search after some queries."""
     search = Search(method, places)
     last = len(queries.queries.frames) - 1
     rows = np.linspace(0, last, NUM_TRIALS).astype(int).tolist()
     is_known = np.ones((len(rows), len(places.frames)), dtype=bool)
     with threadpool_limits(limits=1):
         search.scores(queries, rows, is_known)
-    return search, search.query_ms
+    return search
+
+
+def _median_ms(search: Search) -> float:
+    """Returns the median CPU time of all queries but the first [ms]."""
+    return float(np.median(search.query_ms[1:]))
 
 
 def cpu_ms(function: Callable[[Any], object], argument: object) -> float:

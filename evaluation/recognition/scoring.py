@@ -82,10 +82,27 @@ def gated(
     best = tested_places(scores)
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
-    found = method.relative_poses(query, database, best.tolist())
-    check_number(method, "relative_poses", found, len(best))
-    poses = [checked_pose(method, X_PQ) for X_PQ in found]
+    poses = estimated_poses(method, query, database, best.tolist())
     return gated_at(scores, dict(zip(best.tolist(), poses, strict=True)), radii)
+
+
+def estimated_poses(
+    method: Method, query: Any, database: Any, places: Sequence[int]
+) -> list[np.ndarray | None]:
+    """Returns the pose X_PQ (4, 4) of a query at each place, or None.
+
+    Args:
+        method: method that estimates the poses.
+        query: descriptor of the query by the method.
+        database: database of places, made by the method.
+        places: places in the database.
+
+    Raises:
+        InputError: if the method returns something other than poses.
+    """
+    found = method.relative_poses(query, database, places)
+    check_number(method, "relative_poses", found, len(places))
+    return [checked_pose(method, X_PQ) for X_PQ in found]
 
 
 def tested_places(scores: np.ndarray) -> np.ndarray:

@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.progress import track
-from evaluation.methods.method import Method, check_number
+from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedScans, DriveDescriptors
-from evaluation.recognition.pose_errors import checked_pose
-from evaluation.recognition.scoring import checked_scores, score_places
+from evaluation.recognition.scoring import (
+    checked_scores,
+    estimated_poses,
+    score_places,
+)
 from evaluation.recognition.stored_places import StoredDescriptors
 
 
@@ -94,21 +97,19 @@ class Search:
         Raises:
             InputError: the method returns something other than poses.
         """
-        method = self._method
         found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
         for _, group in self._each():
             for row, places in enumerate(wanted):
                 here = places[(group.start <= places) & (places < group.stop)]
                 if len(here) == 0:
                     continue
-                poses = method.relative_poses(
+                poses = estimated_poses(
+                    self._method,
                     query.queries.descriptors[row],
                     self._database,
                     (here - group.start).tolist(),
                 )
-                check_number(method, "relative_poses", poses, len(here))
-                for place, X_PQ in zip(here.tolist(), poses, strict=True):
-                    found[row][place] = checked_pose(method, X_PQ)
+                found[row].update(zip(here.tolist(), poses, strict=True))
         return found
 
     def _shares(
@@ -207,11 +208,5 @@ class Search:
     def _tracked(
         self, query: DriveDescriptors, rows: Sequence[int]
     ) -> Iterator[int]:
-        return iter(
-            track(
-                range(len(rows)),
-                f"querying {query.name}",
-                len(rows),
-                "queries",
-            )
-        )
+        activity = f"querying {query.name}"
+        return track(range(len(rows)), activity, len(rows), "queries")
