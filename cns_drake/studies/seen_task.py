@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cns_drake.ageing.aged_map import HISTORY_NAME
+from cns_drake.ageing.history import PUT_UP, TAKEN_DOWN
 from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -33,7 +34,7 @@ from evaluation.study.tasks.task import (
 
 # Events in which a structure appears under its own name; in all others, the
 # successor appears.
-_APPEARS = ("built", "put_up")
+_APPEARS = ("built", PUT_UP)
 # Events in which a structure disappears.
 _DISAPPEARS = (
     "demolished",
@@ -41,7 +42,7 @@ _DISAPPEARS = (
     "furniture",
     "removed",
     "replaced",
-    "taken_down",
+    TAKEN_DOWN,
 )
 
 

@@ -683,9 +683,8 @@ class Study:
         if names is None:
             return ()
         where = f"{self.source}: database.{SESSIONS}"
-        if not (
-            isinstance(names, list) and all(map(_is_text, names)) and names
-        ):
+        is_list = isinstance(names, list) and bool(names)
+        if not (is_list and all(isinstance(one, str) for one in names)):
             raise InputError(f"{where}: not a list of names of recordings")
         return chosen_sessions(city, names, where)
 
@@ -735,10 +734,6 @@ def _has_several(condition: Condition) -> bool:
         ):
             return True
     return False
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 def _base_name(database: Scenario) -> str:

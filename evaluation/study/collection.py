@@ -105,15 +105,18 @@ class MapDrives:
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
 
+    @property
+    def last(self) -> RecordingInfo:
+        """The drive through the last stage."""
+        return self.stages[max(self.stages, key=natural_key)]
+
     def change_pairs(self) -> list[Recordings]:
         """Returns the pairs of drives between which change is measured.
 
         Each drive of an earlier stage is paired with that of the last stage.
         """
-        *earlier, last = (
-            self.stages[key] for key in sorted(self.stages, key=natural_key)
-        )
-        return [(recording, last) for recording in earlier]
+        *earlier, _ = sorted(self.stages, key=natural_key)
+        return [(self.stages[key], self.last) for key in earlier]
 
     def recognition_pairs(
         self, *, with_itself: bool = False

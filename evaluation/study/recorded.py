@@ -131,7 +131,7 @@ def chosen_sessions(
     known = {one.name: one for one in (*city.stages.values(), *city.others)}
     for name in repeated(names):
         raise InputError(f"{where}: {name}: the same drive twice")
-    query = _query_of(city)
+    query = city.last
     placed = query.source()
     for name in names:
         if name not in known:
@@ -158,16 +158,11 @@ def chosen_sessions(
     )
 
 
-def _query_of(city: MapDrives) -> RecordingInfo:
-    """Returns the recording of the last stage."""
-    return city.stages[max(city.stages, key=natural_key)]
-
-
 def _of_sessions(
     city: MapDrives, conditions: Iterable[RecordedCondition], seed: int
 ) -> Iterator[Pair]:
     """Yields the pairs of databases of several recordings and the query."""
-    query = _query_of(city)
+    query = city.last
     for one in conditions:
         drives = [session.named for session in one.sessions]
         digest = fingerprint(
