@@ -71,6 +71,7 @@ class RoadNetwork:
         self.roads = roads
         self.junctions = junctions
         self._lane_ends: dict[tuple[LaneRef, str], _Pose] = {}
+        self._connections: dict[str, list[Connection]] = {}
 
     def exit_junction(self, lane: LaneRef) -> str:
         """Returns the name of the junction to which a lane leads."""
@@ -175,15 +176,19 @@ class RoadNetwork:
 
     def connections(self, junction: str) -> list[Connection]:
         """Returns every legal path through a junction."""
+        if junction not in self._connections:
+            self._connections[junction] = list(self._ways(junction))
+        return self._connections[junction]
+
+    def _ways(self, junction: str) -> Iterator[Connection]:
         lanes = list(self.lanes())
         incoming = [a for a in lanes if self.exit_junction(a) == junction]
         outgoing = [b for b in lanes if self.entry_junction(b) == junction]
-        ways = [
-            self.connection(a, b)
-            for a, b in itertools.product(incoming, outgoing)
-            if not self._is_u_turn(a, b)
-        ]
-        return [way for way in ways if self.is_legal(way)]
+        for a, b in itertools.product(incoming, outgoing):
+            if not self._is_u_turn(a, b):
+                way = self.connection(a, b)
+                if self.is_legal(way):
+                    yield way
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:

@@ -16,8 +16,8 @@ from cns_drake.base.csv_files import read_records, whole_number
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import natural_key
-from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import draw_route
+from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.roads.route import Route, draw_route
 from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import combined_digest, digest_inputs
@@ -265,6 +265,10 @@ class PairMaker:
         }
         # Worlds, with what they lack, that were loaded without an error.
         self._loaded: set[tuple[Path, tuple[str, ...]]] = set()
+        # File of roads, length [m], seed -> a route that its map can drive;
+        # many drives of a fleet share one.
+        self._drawn: dict[tuple[Path, float, int], Route] = {}
+        self._networks: dict[Path, RoadNetwork] = {}
 
     def build(self, condition: Condition, seed: int) -> Compared:
         """Returns the database drive and the query drive under a condition.
@@ -638,11 +642,14 @@ class PairMaker:
         if isinstance(left.get("route"), Mapping):
             where = f"{self.source}: {side}.route"
             drawn = validated(DrawnRoute, left.pop("route"), where)
-            roads = load_road_network(drive.folder.roads)
-            rng = np.random.default_rng(drawn.seed)
-            route = draw_route(roads, drawn.length, rng)
-            drive = drive.replaced(route=route, waypoints=None)
-            self._check_map(side, drive, {"route": route})
+            wanted = drive.folder.roads, drawn.length, drawn.seed
+            route = self._drawn.get(wanted)
+            drive = drive.replaced(
+                route=route or self._draw(*wanted), waypoints=None
+            )
+            if route is None:
+                self._check_map(side, drive, {"route": drive.route})
+                self._drawn[wanted] = drive.route
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}
@@ -657,6 +664,12 @@ class PairMaker:
             if getattr(drive, name).replaced(seed=plain.seed) == plain:
                 drive = drive.replaced(**{name: plain})
         return drive
+
+    def _draw(self, file: Path, length: float, seed: int) -> Route:
+        if file not in self._networks:
+            self._networks[file] = load_road_network(file)
+        rng = np.random.default_rng(seed)
+        return draw_route(self._networks[file], length, rng)
 
     def _elsewhere(
         self,
