@@ -517,8 +517,9 @@ RECIPES = {
         makes=("drive.html",),
     ),
     "a look first": Recipe(
-        ".venv/bin/cns-drake simulate riverside_01 --output first --recording",
+        "python3 -m venv .venv && .venv/bin/pip install .\n",
         changes=(
+            ("python3 -m venv .venv && .venv/bin/pip install .\n", ""),
             ("--frames 200", "--frames 2"),
             ("riverside_01", "town/sequence_01.yaml"),
         ),
