@@ -28,9 +28,9 @@ def make_uniform_spline(
 ) -> BsplineTrajectory:
     """Returns a quintic B-spline with evenly spaced control points.
 
-    The spline starts at the first control point and ends at the last one. It
-    passes near the others: near control point i at the parameter i * spacing.
-    Control points on a straight line give a straight line.
+    The spline starts at the first control point and ends at the last control
+    point. At the parameter i * spacing, the spline passes near control point i.
+    If all control points lie on a straight line, the spline is this line.
 
     A bound on all control points is also a bound on the spline. A bound on
     their difference quotients is also a bound on its derivatives.
@@ -54,7 +54,7 @@ def make_uniform_spline(
 
 
 class SplineDerivatives:
-    """A spline and its first derivatives, for evaluation at many parameters."""
+    """A spline and its lower derivatives, to evaluate at many parameters."""
 
     def __init__(self, spline: BsplineTrajectory, count: int):
         """Takes the spline and the number of derivatives to prepare."""
@@ -65,9 +65,9 @@ class SplineDerivatives:
     def evaluate(self, parameter: ArrayLike) -> list[np.ndarray]:
         """Returns the value and the derivatives of the spline at N parameters.
 
-        The list begins with the value, followed by the derivatives in order.
-        Each is (N, D) for a spline of D dimensions. Parameters beyond an end of
-        the spline count as this end.
+        The list contains the values, the first derivatives, the second
+        derivatives, and so on. Each entry has the shape (N, D) for a spline of
+        D dimensions. Parameters beyond an end of the spline count as this end.
         """
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]
@@ -116,8 +116,8 @@ class SmoothPath:
     """A quintic B-spline along the points of a lane path.
 
     The points are control points: the curve does not pass through them. In a
-    bend of radius r, the curve runs spacing^2 / (4 r) inside the points. Its
-    curvature has no steps. The parameter u runs from 0 to `end`, in metres
+    bend of radius r, the curve runs spacing^2 / (4 r) inside the points. The
+    curvature is continuous. The parameter u runs from 0 to `end`, in metres
     along the points.
     """
 
@@ -195,9 +195,11 @@ class SmoothPath:
         )
 
     def tightest_bend(self) -> tuple[float, np.ndarray]:
-        """Returns the smallest radius of the path [m], and where it is.
+        """Returns the smallest radius of curvature of the path, and its place.
 
-        The place is a point (3,) of the path in W [m].
+        Returns:
+            The radius [m], and the point (3,) of the path in W at which the
+            path has this radius [m].
         """
         jet = self.evaluate(self._places())
         curvature = np.abs(jet.turn) / jet.speed
@@ -207,8 +209,9 @@ class SmoothPath:
     def integral(self, integrand: Callable[[PathJet], np.ndarray]) -> PPoly:
         """Returns the integral of a function along the path, from 0 to u.
 
-        The result is a function of u. Its error is far below a micrometre if
-        the integrand is as smooth as the path.
+        The result is a function of the path parameter u. The error of the
+        integral is far below a micrometre if the integrand is as smooth as the
+        path.
 
         Args:
             integrand: function that takes the path at N parameters and returns

@@ -28,7 +28,7 @@ _GRAVITY = 9.81
 
 
 class AxleRates(BaseModel):
-    """A rate, for example of a spring, on each of the two axles.
+    """A rate, such as the stiffness of a spring, for each of the two axles.
 
     Attributes:
         front: rate on the front axle.

@@ -263,7 +263,7 @@ class Trajectory:
         return float(self._travelled(self.path.end))
 
     def path_parameter(self, t: ArrayLike) -> list[np.ndarray]:
-        """Returns the path parameter u and its rates u', u'' at times (N,)."""
+        """Returns path parameter u, u' and u'', each (N,), at times (N,)."""
         values = self._time_scaling.evaluate(np.atleast_1d(t))
         return [value[:, 0] for value in values]
 

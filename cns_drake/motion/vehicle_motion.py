@@ -151,9 +151,9 @@ class _State(NamedTuple):
 class VehicleMotion(LeafSystem):
     """A system that moves a vehicle along a trajectory, wheels included.
 
-    It has the kinematic output ports of a MultibodyPlant and can replace a
-    plant as input of sensors and a SceneGraph, since a plant cannot have a
-    prescribed motion.
+    A MultibodyPlant of Drake cannot have a prescribed motion. This system can
+    take the place of a plant: it has the kinematic output ports of a plant, to
+    which sensors and a SceneGraph can be connected.
 
     The vehicle's floating base B follows the trajectory. Revolute joints about
     the y axis of B roll the wheels and revolute joints about z steer them, so

@@ -77,7 +77,7 @@ class Primitives(NamedTuple):
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
-    """Yields what a group adds to the first of a scene's two hierarchies.
+    """Yields the Embree geometries of a group for the first hierarchy.
 
     Every group adds its triangles. A group that can move also adds its curved
     shapes; any other group adds a polyhedron around each curved shape instead.
@@ -104,7 +104,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields what a group adds to the second of a scene's two hierarchies.
+    """Yields the Embree geometries of a group for the second hierarchy.
 
     A group that cannot move adds its curved shapes; any other group adds
     nothing. A ray is cast on the second hierarchy only if it hits one of the

@@ -1,8 +1,9 @@
-"""Rays on triangles in double precision, for single rays that must be right.
+"""Casts single rays on triangles in double precision.
 
 Embree works in single precision. Where a ray runs nearly in the plane of a
-triangle, or through a vertex, it may then miss what it meets, or meet what it
-misses. A scan accepts this for its speed; see the notes on the LiDAR.
+triangle, or through a vertex, Embree may therefore lose a hit, or report a hit
+where there is none. Scans accept these errors because Embree is fast; see the
+notes on the LiDAR.
 """
 
 from __future__ import annotations
@@ -84,12 +85,12 @@ class ExactTriangles:
     def cast(
         self, p_Oset: np.ndarray, d_Oset: np.ndarray, time: float, hits: Hits
     ) -> None:
-        """Updates the hits of rays that meet a triangle before.
+        """Replaces the hits of rays that hit a triangle at a shorter range.
 
         Args:
             p_Oset: (N, 3) origins [m].
             d_Oset: (N, 3) unit directions.
-            time: time of the cast, as a fraction of the turn.
+            time: time of the cast, as a fraction of the LiDAR's revolution.
             hits: N hits with normals, changed in place; the `ranges` of misses
                 are the maximum ranges.
         """

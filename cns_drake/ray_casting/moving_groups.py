@@ -141,7 +141,7 @@ class MovingGroups:
 
         Args:
             calc_X_WF: function that returns the pose of a frame in the world.
-            motions: motions of frames that move during the turn.
+            motions: motions of frames that move during the LiDAR's revolution.
             known: poses that are used, where they exist, instead of calling
                 `calc_X_WF`.
             seen: ball in the world that contains all rays.

@@ -127,7 +127,7 @@ class RayCastingScene:
 
         Args:
             calc_X_WF: function that returns the pose of a frame in the world.
-            motions: motions of frames that move during the turn.
+            motions: motions of frames that move during the LiDAR's revolution.
             known: poses that are used, where they exist, instead of calling
                 `calc_X_WF`.
             seen: ball that contains all rays; geometry outside of it is not
@@ -170,9 +170,9 @@ class RayCastingScene:
     ) -> SceneHits:
         """Returns the first hits of N rays from one or several poses of S.
 
-        S is a sensor, such as a LiDAR, which may move during its turn. Ray i
-        has direction i. From every other array of length n it uses entry
-        i mod n.
+        S is a sensor, such as a LiDAR, which may move during its revolution.
+        Ray i has direction i. Of every other array, ray i uses entry i mod n,
+        where n is the length of the array.
 
         Args:
             p_WSset: (3,) or (K, 3) origins in the world [m].
@@ -180,13 +180,13 @@ class RayCastingScene:
             max_range: greatest range [m], one for all rays or (M,).
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
             times: (T,) times at which rays are cast, from 0 at the start of the
-                sensor's turn to 1 at its end; by default 0.
+                revolution to 1 at its end; by default 0.
             with_normals: whether to return also the normals of the surfaces, as
-                they are at the start of the turn.
-            exact: whether rays meet triangles in double precision, from exact
-                origins. This takes several times as long, and the first time
-                as long as building the scene. Then normals must be asked for,
-                and all rays have the same time.
+                they are at the start of the revolution.
+            exact: whether rays are cast on triangles in double precision, from
+                exact origins. A cast then takes several times as long; the
+                first such cast takes as long as building the scene. Exact casts
+                require `with_normals` and the same time for all rays.
 
         Raises:
             ValueError: N is not a multiple of K, L, M or T.

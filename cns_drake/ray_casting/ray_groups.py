@@ -32,16 +32,16 @@ Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
 class Motion(NamedTuple):
-    """The motion of a frame F in the scene's frame O during a LiDAR's turn.
+    """Motion of a frame F in the scene's frame O during a revolution.
 
     The velocities are constant.
 
     Attributes:
         w: (3,) angular velocity of F, expressed in O [rad/s].
         v: (3,) velocity of the origin of F, expressed in O [m/s].
-        duration: duration of the turn [s].
-        start: time of the start of the turn, counted from the time at which the
-            pose of F is known [s].
+        duration: duration of the LiDAR's revolution [s].
+        start: time at which the revolution starts, counted from the time at
+            which the pose of F is known [s].
     """
 
     w: np.ndarray
@@ -65,10 +65,10 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the motion of F at given times of the turn.
+        """Returns the motion of F at given times of the revolution.
 
         Args:
-            times: (N,) fractions of the turn, from 0 to 1.
+            times: (N,) fractions of the revolution, from 0 to 1.
 
         Returns:
             (N, 3, 3) rotations, and (N, 3) displacements of F's origin [m],
@@ -91,10 +91,10 @@ class RayGroup:
         is_merged_world: whether the group is the merged geometry that never
             moves; L then has the axes of the world and the origin of O.
         X_OL: (3, 4) affine map from L to the scene's frame O, at the start of a
-            turn; it does not exist before `place` is called.
-        motion: motion of F during the turn; None if F does not move.
+            revolution; it does not exist before `place` is called.
+        motion: motion of F during the revolution; None if F does not move.
         in_sight: whether rays can meet the group. If not, `X_OL` and `motion`
-            are those of an earlier turn.
+            are those of an earlier revolution.
     """
 
     frame_id: FrameId | None
@@ -125,10 +125,10 @@ class RayGroup:
         self.X_OL[:, 3] -= p_WO
 
     def X_OL_at(self, times: np.ndarray) -> np.ndarray:
-        """Returns `X_OL` at several times of the turn, (N, 3, 4).
+        """Returns `X_OL` at several times of the revolution, (N, 3, 4).
 
         Args:
-            times: (N,) fractions of the turn, from 0 to 1.
+            times: (N,) fractions of the revolution, from 0 to 1.
         """
         if self.motion is None:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))

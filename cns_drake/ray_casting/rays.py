@@ -26,7 +26,7 @@ class Rays(NamedTuple):
         max_ranges: (M,) float32 greatest ranges [m].
         d_Sset: (N, 3) float64 unit directions, expressed in S.
         times: (T,) float32 times at which rays are cast, as fractions of the
-            turn, from 0 to 1.
+            LiDAR's revolution, from 0 to 1.
     """
 
     p_OSset: np.ndarray

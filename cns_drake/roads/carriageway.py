@@ -104,7 +104,7 @@ def junction_area(
     The area is made in three steps. All roads are extended to the junction's
     position and united; the corners between them are filled, so that kerbs have
     the junction's radius; the roads outside the junction are cut off. At a dead
-    end, the area is a disc with the end of the road.
+    end, the area is a disc around the end of the road.
     """
     stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
     parts = [

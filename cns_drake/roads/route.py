@@ -103,9 +103,9 @@ def make_lane_path(
         spacing: distance between the points, rounded so that it divides the
             length of the route [m].
         source: file or other source, named in error messages.
-        aside: offset of the path to the right of the lanes' middle [m]. It
-            applies along each road between its junctions, as far as the road
-            has room.
+        aside: lateral offset of the path from the lanes' middle, positive to
+            the right [m]. The offset applies along each road between its
+            junctions, as far as the road has room.
 
     Raises:
         InputError: a leg names an unknown lane, does not follow from the leg

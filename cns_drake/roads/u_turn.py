@@ -93,8 +93,8 @@ class Loop(NamedTuple):
 
     Attributes:
         begin: distance along the lane at which the loop begins [m].
-        points: (N, 2) points of the loop, from there to the opposite place in
-            the other lane [m].
+        points: (N, 2) points of the loop, from `begin` to the place beside
+            `begin` in the opposite lane [m].
     """
 
     begin: float

@@ -54,9 +54,9 @@ def load_waypoint_path(
             loop is at the waypoint. Without `u_turns`, such a turn is an error.
 
     Raises:
-        InputError: a line of the file is not usable, the path turns too
-            sharply, or its length is not that of a drive. The message names the
-            file and, where there is one, the line.
+        InputError: a line of the file is not usable, or the path turns too
+            sharply, is too short or is too long for a drive. The message names
+            the file and, if the fault is in one line, this line.
     """
     path = Path(path)
     points, lines = read_waypoints(path)

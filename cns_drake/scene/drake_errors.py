@@ -19,11 +19,12 @@ PARSER_ERRORS = (
 
 @contextlib.contextmanager
 def collected_errors() -> Iterator[list[str]]:
-    """Collects the error messages that Drake logs during the block.
+    """Context manager that collects the errors that Drake logs.
 
-    They are not printed. Drake's warnings are printed at the end of the block,
-    but not after an exception, since a command prints only one line for an
-    error.
+    The context variable is the list of error messages, which are not printed.
+    Drake's warnings are printed at the end of the `with` block. After an
+    exception they are not printed, because a command prints only one line for
+    an error.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

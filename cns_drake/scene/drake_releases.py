@@ -14,8 +14,8 @@ def find_bus(
 ) -> Any:
     """Returns the LCM interface of a bus, like Drake's `LcmBuses.Find`.
 
-    In Python with Drake 1.58, any use of what `LcmBuses.Find` returns crashes
-    the process.
+    Use this function instead of `LcmBuses.Find`: in Python with Drake 1.58, any
+    use of the result of `LcmBuses.Find` crashes the process.
 
     Args:
         builder: builder of the diagram with the interface.
@@ -36,9 +36,9 @@ def find_bus(
 def takes_screen_colours() -> bool:
     """Returns whether Drake's renderer reads vertex colours as sRGB.
 
-    Up to Drake 1.53, it reads them as linear colours. If the version of Drake
-    is unknown, because Drake was not installed as a Python package, the result
-    is True.
+    Up to Drake 1.53, the renderer reads vertex colours as linear. If the
+    version of Drake is unknown, because Drake was not installed as a Python
+    package, the result is True.
     """
     version = installed_versions(["drake"]).get("drake", "1.54")
     return tuple(map(int, re.findall(r"\d+", version)[:2])) >= (1, 54)

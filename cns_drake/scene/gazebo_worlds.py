@@ -3,7 +3,7 @@
 Drake rejects many elements of such worlds, and crashes on an infinite collision
 plane if there are many other collision shapes. Only the visuals are kept, at
 their initial places, and nothing in such a world moves. Models and files to
-which a world refers are searched in the same folders as by Gazebo.
+which a world refers are searched for in the folders in which Gazebo searches.
 """
 
 from collections import Counter
@@ -231,7 +231,7 @@ def simplify_world(
         The new world as SDF text; notes for the user on what was left out.
 
     Raises:
-        InputError: a model that was found cannot be read, or the place of a
+        InputError: a model that was found cannot be read, or the pose of a
             model or visual cannot be determined.
     """
     simplifier = _Simplifier(path, model_paths)

@@ -15,7 +15,7 @@ OTHER_MOVING_ID = 259
 
 
 class Labels(NamedTuple):
-    """The labels that points on each of G geometries get.
+    """Labels and instance ids of the points on each of G geometries.
 
     Attributes:
         label: (G,) uint16 class.

@@ -57,7 +57,7 @@ class MapFolder:
         Hidden files, such as locks of editors, and dead links are left out.
 
         Raises:
-            InputError: there is a pipe or a device.
+            InputError: the folder contains a pipe or a device.
         """
         found = [
             path
@@ -81,7 +81,7 @@ class MapFolder:
         }
 
     def drive(self, number: str) -> Path:
-        """Returns the path of a drive's scenario file (for example, `01`'s)."""
+        """Returns the path of the scenario file of a drive, such as `01`."""
         return self.path / f"sequence_{number}.yaml"
 
     def drives(self) -> list[Path]:
@@ -114,7 +114,7 @@ def drive_name(path: Path) -> str:
 
 
 def check_new_map(output: Path) -> None:
-    """Checks the folder of a map that will be written.
+    """Checks that a new map can be written to a folder.
 
     Raises:
         InputError: the folder exists already, or its name contains more than

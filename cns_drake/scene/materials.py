@@ -1,11 +1,11 @@
 """The materials of surfaces: one table for cameras and LiDARs.
 
-A part of a structure has a material: that of its row in the structure table or,
-if the table does not say, the usual material of the structure's class.
-Reflectivities of diffuse materials are those of the ECOSTRESS spectral library
-(Meerdink et al., 2019) near 0.9 um, rounded; those of markings, signs and
-plates follow from the minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30
-m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
+Each part of a structure has a material. The structure table can name the
+material of a part; otherwise the part has the usual material of the structure's
+class. Reflectivities of diffuse materials are those of the ECOSTRESS spectral
+library (Meerdink et al., 2019) near 0.9 um, rounded; those of markings, signs
+and plates follow from the minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at
+30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
 """
 
 from collections import Counter
@@ -50,8 +50,10 @@ OF_CLASSES: dict[str, str] = _TABLE["of_classes"]
 def as_cell(semantic_class: str, parts: Mapping[str, str]) -> str:
     """Returns the cell `material` of a structure's row in the structure table.
 
-    The cell lists words: the material of most parts, unless it is that of the
-    class, and `part=material` for each other part. `from_cell` reads it.
+    The cell is a list of words. The first word is the material of most parts;
+    this word is left out if it is the usual material of the class. One word
+    `part=material` follows for each part with another material. `from_cell`
+    reads the cell.
 
     Args:
         semantic_class: class of the structure.
@@ -65,7 +67,7 @@ def as_cell(semantic_class: str, parts: Mapping[str, str]) -> str:
 
 
 def as_word(part: str, material: str) -> str:
-    """Returns a word of a cell `material`, `part=material`.
+    """Returns the word `part=material` for a cell `material`.
 
     Spaces and other special characters of the part's name are percent-encoded.
     """
@@ -80,7 +82,7 @@ def from_cell(text: str) -> dict[str, str]:
         parts that are not named.
 
     Raises:
-        ValueError: a word is no material, or a part has two.
+        ValueError: a word names no known material, or a part has two materials.
     """
     found: dict[str, str] = {}
     for word in text.split():

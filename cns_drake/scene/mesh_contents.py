@@ -1,8 +1,8 @@
-"""Checks what mesh files contain beyond what is read of them.
+"""Finds contents of mesh files that the readers of these files ignore.
 
 Open3D reads glTF, COLLADA, STL and PLY, and Drake reads OBJ. Both read some
-files only in part, without a word. Such a file is refused if surfaces would be
-missing. Specification of glTF:
+files only in part, without a warning. This module refuses such a file if
+surfaces would be missing. Specification of glTF:
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
@@ -348,7 +348,7 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Checks the vertices of an OBJ file, and that faces only use these.
+    """Checks that the faces of an OBJ file only use vertices that exist.
 
     Raises:
         ValueError: a vertex does not exist, or is not made of numbers; or there

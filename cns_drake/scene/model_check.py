@@ -1,8 +1,8 @@
 """Checks models before Drake parses them.
 
-Without these checks, a text that is not a number or a valid size is used only
-in part or replaced by 1 (by libsdformat), or crashes the process (in Drake).
-Long names crash the process, too.
+Without these checks, libsdformat uses only a part of a text that is not a
+number or a valid size, or replaces the text by 1. Other such texts, and long
+names, crash the process in Drake.
 """
 
 import math
@@ -55,8 +55,8 @@ def check_model(path: Path) -> Element | None:
     """Checks an SDF or URDF file, and the SDF files that it includes.
 
     Returns:
-        The root element of the file; None if it is of another kind, of which
-        nothing is checked.
+        The root element of the file; None for a file of another kind, which is
+        not checked.
 
     Raises:
         InputError: a file cannot be read, is not XML, or has an invalid number,

@@ -89,8 +89,9 @@ def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
     Args:
         geometry_name: scoped name of the geometry, such as
             `left::gripper::finger`.
-        is_scoped: whether a model has its whole name, such as `left::gripper`.
-            By default it is `gripper`, as in structure tables.
+        is_scoped: whether to return the whole name of a model, such as
+            `left::gripper`. By default, only `gripper` is returned, as in
+            structure tables.
     """
     model, _, visual = geometry_name.rpartition("::")
     structure, slash, _ = visual.partition("/")
@@ -364,12 +365,13 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
 
 
 def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
-    """Returns a port whose value is the geometry with a role, `GeometryList`.
+    """Returns an output port whose value is a `GeometryList` of a role.
 
-    It is a function of the Context, and is computed anew only after geometry
-    has been added, removed, replaced, reshaped, or given another role. A new
-    pose of a frame does not count. Drake's own `geometry_version` is not
-    enough: it does not change with all perception geometry.
+    The value is a function of the Context. It is computed anew only after
+    geometry has been added, removed, replaced, reshaped, or given another role.
+    A new pose of a frame does not count. Drake's own `geometry_version` cannot
+    serve for this, because some changes of perception geometry do not change
+    it.
 
     The first call with a role adds the port to the SceneGraph, and must come
     before a Diagram is built from it.

@@ -92,7 +92,8 @@ class FcdTrace:
         begin: the first time [s].
         dt: time between two entries [s].
         num_steps: number of times.
-        vehicles, persons: in the order in which they appear.
+        vehicles, persons: the vehicles and the persons of the trace, each in
+            the order in which they appear.
         notes: notes for the user on what is left out.
     """
 
@@ -394,7 +395,7 @@ class Heights:
     def at(self, xy: np.ndarray) -> np.ndarray:
         """Returns the heights (N,) of the ground at places (N, 2) [m].
 
-        Each is a mean of the heights of the nearest points, weighted by
+        Each height is a mean of the heights of the nearest points, weighted by
         nearness.
         """
         distance, near = self._tree.query(xy, k=min(4, len(self._z)))
@@ -410,8 +411,8 @@ class Heights:
 
         Where two roads cross at different heights, the road user is on the road
         whose height is nearest to the height in the trace. Without heights in
-        the trace, it is on the road on which it arrived, or else on a road with
-        a lane in its direction.
+        the trace, the road user stays on the road on which it arrived, or else
+        is on a road with a lane in its direction.
 
         Args:
             xy: (M, 2) places [m].
@@ -497,7 +498,7 @@ def _vehicle_rows(
 
 
 def _person_rows(one: TracedObject, heights: Heights, dt: float) -> np.ndarray:
-    """Returns the coordinates (M, 5) of a walker; see `TrafficPlan`."""
+    """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`."""
     steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
     turned = dt * gait_rate(steps / dt)
     start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi

@@ -12,22 +12,22 @@ from shapely.geometry.base import BaseGeometry
 
 # Greatest distance between the points of a piece [m].
 SPACING = 0.5
-# Walkers' middles keep this distance from objects, so that their boxes clear
-# them in any direction [m].
+# Pedestrians' middles keep this distance from objects, so that their boxes
+# clear them in any direction [m].
 _CLEARANCE = 0.53
 # Where objects with this clearance take more than this share of a walkway's
 # width, the walkway is narrow.
 _NARROW_SHARE = 0.5
-# On a narrow walkway, walkers keep this distance, as far as their sides need
-# [m].
+# On a narrow walkway, pedestrians keep this distance, as far as their sides
+# need [m].
 _SIDE_CLEARANCE = 0.36
-# Walkers begin a walkway at most this many points before its first one.
+# Pedestrians begin a walkway at most this many points before its first one.
 _BEFORE = 4
 # Number of places across a walkway.
 _ACROSS = 21
 # Least number of points along a walkway.
 _LEAST_POINTS = 4
-# Walkers move aside by at most this many places from one point to the next.
+# Pedestrians move aside by at most this many places from one point to the next.
 _ASIDE = 2
 # A crossing without marks leads over at most this many lanes.
 _MOST_LANES = 4
@@ -40,7 +40,7 @@ _FROM_WAYS = 5.0
 _FROM_WALKWAY_ENDS = 4.0
 # Its width [m].
 _CROSSING_WIDTH = 2.4
-# Half the width of the walkers' path on it [m].
+# Half the width of the pedestrians' path on it [m].
 _CROSSING_HALF_PATH = 0.5
 # Half the width of a lane [m].
 _HALF_LANE = 1.75
@@ -87,14 +87,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A place where walkers cross the lanes, at the end of a road or elsewhere.
+    """A place where pedestrians cross lanes, at the end of a road or elsewhere.
 
     Attributes:
         line: (2, 3) from kerb to kerb, or from sidewalk to sidewalk [m].
-        area: area where walkers are while they cross.
-        marked: whether vehicles give way to waiting walkers. At a crossing
-            without marks, which is never at the end of a road, walkers wait for
-            a gap in the traffic.
+        area: area where pedestrians are while they cross.
+        marked: whether vehicles give way to waiting pedestrians. At a crossing
+            without marks, which is never at the end of a road, pedestrians wait
+            for a gap in the traffic.
     """
 
     line: np.ndarray
@@ -105,12 +105,12 @@ class Crossing:
 def make_crossing(
     line: np.ndarray, width: float, marked: bool = True
 ) -> Crossing:
-    """Returns a crossing for walkers.
+    """Returns a crossing for pedestrians.
 
     Args:
         line: (2, 3) ends of the crossing's middle line [m].
         width: width of the crossing [m].
-        marked: whether vehicles give way to waiting walkers.
+        marked: whether vehicles give way to waiting pedestrians.
     """
     course = LineString(line[:, :2])
     return Crossing(line, course.buffer(width / 2, cap_style="flat"), marked)
@@ -122,14 +122,14 @@ class Walkway:
 
     Attributes:
         points: (N, 3) points along the middle of the strip, evenly spaced [m].
-        half_width: greatest distance of a walker from the middle [m].
+        half_width: greatest distance of a pedestrian from the middle [m].
         start, end: numbers of the places at the ends of the strip.
         crossing: number of the crossing on which the walkway lies; -1 for none.
         free: (N, 2) for each point, the two ends of the part of the width that
             is free of objects [m]: distances from the middle of the strip,
             positive to the right. None if the whole width is free.
-        narrow: (N,) for each point, whether walkers fit only if they face along
-            the walkway; None if they always fit.
+        narrow: (N,) for each point, whether pedestrians fit only if they face
+            along the walkway; None if they always fit.
     """
 
     points: np.ndarray
@@ -142,9 +142,10 @@ class Walkway:
 
     @property
     def limits(self) -> np.ndarray:
-        """(N, 2) least and greatest distance of walkers from the middle [m].
+        """Limits of pedestrians' distance from the middle, (N, 2) [m].
 
-        Distances are positive to the right of the middle of the strip.
+        Each row contains the least and the greatest distance. Distances are
+        positive to the right of the middle of the strip.
         """
         if self.free is not None:
             return self.free
@@ -169,8 +170,9 @@ def kept_clear(
         things: outlines of the objects as seen from above [m].
 
     Returns:
-        The walkways with the free part of their width, cut where nobody can
-        pass. Crossings without a walkway at each end are left out.
+        The walkways, each with the free part of its width (`Walkway.free`), and
+        cut where nobody can pass. Crossings without a walkway at each end are
+        left out.
     """
     tree = shapely.STRtree(things)
     found = []
@@ -187,7 +189,7 @@ def kept_clear(
             each.flat[tree.query(seen, "dwithin", reach)[0]] = 1
         narrow = around.mean(axis=1) > _NARROW_SHARE
         barred[~narrow] = around[~narrow]
-        # What blocks the whole width also stands in the way of walkers who
+        # What blocks the whole width also stands in the way of pedestrians who
         # begin there.
         for line in (barred, barred[::-1]):
             for row in line[:_BEFORE][::-1]:
@@ -195,7 +197,8 @@ def kept_clear(
                     line[_BEFORE] |= row
         barred = barred[_BEFORE:-_BEFORE]
         narrow = maximum_filter1d(narrow, 3)[_BEFORE:-_BEFORE]
-        # A walker is longer than wide, and needs some distance to move aside.
+        # A pedestrian is longer than wide, and needs some distance to move
+        # aside.
         barred = maximum_filter1d(barred, 3, axis=0)
         for step in (1, -1):
             line = barred[::step]
@@ -260,7 +263,7 @@ class LaneGraph:
     Attributes:
         pieces: parts of lanes and paths through junctions. Their numbers are
             indices into this tuple.
-        crossings: places where walkers cross the lanes.
+        crossings: places where pedestrians cross the lanes.
     """
 
     pieces: tuple[Piece, ...]
@@ -277,7 +280,7 @@ def with_unmarked_crossings(
     walkways: Sequence[Walkway],
     things: Sequence[BaseGeometry] = (),
 ) -> tuple[LaneGraph, list[Walkway]]:
-    """Adds crossings without marks, where walkers may cross narrow streets.
+    """Adds crossings without marks, for pedestrians on narrow streets.
 
     A crossing is added as near as possible to the middle of a lane, if there is
     a walkway on both sides of the street and no object in between. Each walkway
@@ -304,7 +307,7 @@ def with_unmarked_crossings(
     node = 1 + max((max(way.start, way.end) for way in walkways), default=0)
 
     def beside(p: np.ndarray, reach: np.ndarray) -> tuple[int, int] | None:
-        """Returns where walkers who start at p step onto a walkway.
+        """Returns where pedestrians who start at p step onto a walkway.
 
         Args:
             p: (2,) the start in W [m].
@@ -328,7 +331,7 @@ def with_unmarked_crossings(
         return (k, row) if is_inside and k not in cuts else None
 
     def course(p: np.ndarray, q: np.ndarray, z: float) -> np.ndarray | None:
-        """Returns the path (4, 3) of walkers across lanes, from p to q.
+        """Returns the path (4, 3) of pedestrians across lanes, from p to q.
 
         Where it crosses lanes, it lies at the height `z` [m]. The result is
         None if the path would cross too many lanes, or come too close to an
@@ -338,7 +341,7 @@ def with_unmarked_crossings(
         ahead = (q - p)[:2] / line.length
         over = lane_tree.query(line, "intersects")
         near = lane_tree.query(line, "dwithin", _FROM_WAYS)
-        # Walkers wait at both ends.
+        # Pedestrians wait at both ends.
         longer = LineString([p[:2] - ahead, q[:2] + ahead])
         if (
             len(over) > _MOST_LANES
@@ -416,8 +419,8 @@ def with_unmarked_crossings(
 def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
     """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
 
-    Neighbouring points are at most `spacing` apart [m]. A corner that coincides
-    with the corner before is dropped.
+    Neighbouring points are at most `spacing` apart [m]. A corner is dropped if
+    it coincides with the previous corner.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     points = points[np.append(True, steps > 1e-6)]

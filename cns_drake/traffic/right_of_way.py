@@ -43,7 +43,7 @@ _EGO_IS_NEAR = 80.0
 _GOES_FIRST = 1e6
 # Greatest expected wait on a way for vehicles [s].
 _WAIT_FOR_VEHICLES = 2.0
-# Greatest expected wait on a way for walkers [s].
+# Greatest expected wait on a way for pedestrians [s].
 _WAIT_FOR_WALKERS = 6.0
 # After this time at a stop line, no later driver may enter a conflicting way
 # [s].
@@ -74,19 +74,19 @@ _REQUEST_BRAKING = 1.4
 _REQUEST_AT_SIGNAL = 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
-# If the green of walkers is too short for them, they may begin to cross within
-# its first part of this length [s].
+# If the green of pedestrians is too short for them, they may begin to cross
+# within its first part of this length [s].
 _LATE = 2.0
-# Time in which a group of walkers starts [s].
+# Time in which a group of pedestrians starts [s].
 WALK_GROUP = 3.0
-# Assumed speed of walkers [m/s].
+# Assumed speed of pedestrians [m/s].
 _WALKING_SPEED = 1.0
 # A group may take this much longer over a crossing [s].
 _WALKING_RESERVE = 3.0
-# Time that vehicles have after a group of walkers has left a crossing [s].
+# Time that vehicles have after a group of pedestrians has left a crossing [s].
 _REST = 30.0
-# Where there are no marks, walkers begin to cross if no vehicle comes within
-# this time [s].
+# Where there are no marks, pedestrians begin to cross if no vehicle comes
+# within this time [s].
 _WALKERS_GAP = 6.0
 
 
@@ -94,7 +94,7 @@ _WALKERS_GAP = 6.0
 def grant_ways(traffic: Traffic, k: int) -> None:
     """Permits vehicles to enter junctions, in the order of their arrival.
 
-    Walkers are permitted to enter crossings by the same rule.
+    Pedestrians are permitted to enter crossings by the same rule.
 
     Args:
         traffic: vehicles and crossings, changed in place.
@@ -227,7 +227,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
 def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
     """Returns whether the i-th vehicle would hardly have to wait on its way.
 
-    It would not if walkers and vehicles on other ways will have passed the
+    It would not if pedestrians and vehicles on other ways will have passed the
     conflicting places when it gets there.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
@@ -289,7 +289,7 @@ def _duration(distance: float, v: float, a: float, pace: float) -> float:
 
 @compiled
 def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
-    """Opens a crossing for walkers once earlier vehicles have passed.
+    """Opens a crossing for pedestrians once earlier vehicles have passed.
 
     `last` is the highest `order` so far; the result is the new one.
     """
@@ -377,7 +377,7 @@ def _take(
 
 @compiled
 def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
-    """Marks the ways that walkers on the c-th crossing exclude."""
+    """Marks the ways that pedestrians on the c-th crossing exclude."""
     begin = traffic.streets.begin
     num_pieces = taken.shape[1]
     for way in range(num_pieces):

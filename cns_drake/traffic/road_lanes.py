@@ -227,8 +227,8 @@ def _station(road: Road, end: End) -> float:
 def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
     """Returns the walkways of a road network.
 
-    They lead along the sidewalks, around the corners of junctions, and over the
-    crossings of `graph`.
+    Walkways lead along the sidewalks, around the corners of junctions, and over
+    the crossings of `graph`.
     """
     nodes: dict[tuple[str, End, int], int] = {}
     for road in network.roads.values():

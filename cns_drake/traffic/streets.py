@@ -51,7 +51,7 @@ class Signals(NamedTuple):
     Attributes:
         cycle: duration of a cycle [s].
         green_from, green_for: (P + C,) time in the cycle at which green begins,
-            and its duration [s], for vehicles on pieces and for walkers on
+            and its duration [s], for vehicles on pieces and for pedestrians on
             crossings. Without a signal, green lasts the whole cycle.
     """
 
@@ -80,7 +80,7 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
     cycle = max(_LEAST_CYCLE, (phase.max() + 1) * (_ALL_RED + _LEAST_PHASE))
     green_from, green_for = np.zeros(len(begin)), np.full(len(begin), cycle)
     place = begin[: len(pieces), len(pieces) :]
-    # Walkers must not have green together with vehicles that start.
+    # Pedestrians must not have green together with vehicles that start.
     cost = flow[:, None] * np.where(place < _AT_LINE, 1e3, np.isfinite(place))
     # The junction whose signal each way and crossing has; -1 for none.
     owner = np.full(len(begin), -1)
@@ -103,8 +103,8 @@ def make_signals(graph: LaneGraph, begin: np.ndarray) -> Signals:
         for ways, start, lasts in zip(own, starts, green, strict=True):
             green_from[ways], green_for[ways] = start, lasts
         for column in np.flatnonzero(owner[len(pieces) :] == j):
-            # Walkers have green in the phase in which the least flow crosses
-            # their way.
+            # Pedestrians have green in the phase in which the least flow
+            # crosses their way.
             crossed = [cost[ways, column].sum() for ways in own]
             k = int(np.argmin(crossed))
             row = len(pieces) + column

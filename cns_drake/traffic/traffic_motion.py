@@ -332,7 +332,7 @@ def make_traffic(
     """Adds traffic to a SceneGraph; returns the system that moves it.
 
     Traffic consists of vehicles and pedestrians. The system is not yet part of
-    a diagram; `cns_drake.add_traffic` also adds it to one.
+    a diagram; `cns_drake.add_traffic` also adds the system to a diagram.
 
     Args:
         scene_graph: SceneGraph to which the geometry is added, under a source
@@ -342,7 +342,7 @@ def make_traffic(
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: time over which the output `body_spatial_velocities` is averaged
-            [s]: the duration of a turn of a LiDAR with motion distortion.
+            [s]: the revolution time of a LiDAR with motion distortion.
         name: name of the geometry source.
     """
     if structures is None:
@@ -385,7 +385,7 @@ def add_traffic(
         structures: table with an instance id for each body; by default
             `traffic_structures` of the plan.
         turn: time over which the output `body_spatial_velocities` is averaged
-            [s]: the duration of a turn of a LiDAR with motion distortion.
+            [s]: the revolution time of a LiDAR with motion distortion.
         name: name of the system and of the geometry source.
 
     Returns:
@@ -428,8 +428,8 @@ def connect_traffic(
         builder: builder of a diagram with both systems.
         traffic: system that moves the traffic.
         lidar: LiDAR, whose port `frame_poses` may be connected already.
-        goes_on: whether bodies keep moving during a turn of the LiDAR. If so,
-            the LiDAR's `moving_bodies` must be the `moving_frames` of
+        goes_on: whether bodies keep moving during a revolution of the LiDAR. If
+            so, the LiDAR's `moving_bodies` must be the `moving_frames` of
             `traffic`.
     """
     for name in ("moving_instances", "frame_poses", "body_spatial_velocities"):

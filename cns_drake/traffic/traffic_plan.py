@@ -552,8 +552,9 @@ def plan_traffic(
         seed: seed of the random kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
             vehicles, the longest time that the drive may take.
-        ego: function times -> positions and headings of the ego car. If the ego
-            car follows other vehicles, only its first position counts.
+        ego: function that takes times (K,) [s], and returns positions (K, 2)
+            [m] and headings (K,) [rad] of the ego car. If the ego car follows
+            other vehicles, only its first position counts.
         ego_box: size of the ego car.
         drive: path and speeds of the ego car if it follows other vehicles;
             otherwise None.
@@ -716,7 +717,7 @@ class Trial:
     def left_out(self) -> int:
         """Returns how many requested vehicles and pedestrians are left out.
 
-        Those that would overlap with another one are left out.
+        A body is left out if it would overlap with another body.
         """
         vehicles, walkers = self._kept()
         wanted = self._task.vehicles + self._task.walkers

@@ -61,7 +61,7 @@ SMALL_SIZE = (5.6, 2.26)
 
 
 def draw_kinds(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draws a random mix of vehicles.
+    """Samples a random mix of vehicle kinds.
 
     Args:
         count: number of vehicles.

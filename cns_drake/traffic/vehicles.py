@@ -2,8 +2,8 @@
 
 Vehicles follow each other by the Intelligent Driver Model of Treiber, Hennecke,
 Helbing (see `VehicleKind`). They change lanes by MOBIL of Kesting, Treiber,
-Helbing (2007): a driver changes lanes if the gain in acceleration exceeds what
-other drivers lose, and no other vehicle has to brake hard.
+Helbing (2007): a driver changes lanes if the driver gains more acceleration
+than others lose, and no other vehicle has to brake hard.
 """
 
 from collections.abc import Sequence
@@ -47,8 +47,8 @@ SIGHT = 120.0
 # At this gap, drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
-# Small, and large, vehicles may pass a walker whose middle is this far beyond
-# the middle of their way [m].
+# Small, and large, vehicles may pass a pedestrian whose middle is this far
+# beyond the middle of their way [m].
 _PASSED = (2.0, 3.5)
 
 # A driver considers a change of lanes once in this many steps.
@@ -116,21 +116,21 @@ _ENTRY = np.dtype(
         ("speed", float),  # [m/s]
     ]
 )
-# A crossing as a record, with the walkers on it.
+# A crossing as a record, with the pedestrians on it.
 CROSSING = np.dtype(
     [
-        ("waits", float),  # When walkers began to wait; inf: none [s].
+        ("waits", float),  # When pedestrians began to wait; inf: none [s].
         ("opened", float),  # Time at which it was last opened [s].
         ("closed", float),  # Time at which it was last left [s].
         ("start", float, 2),  # Where its line begins [m].
         ("along", float, 2),  # Unit vector along it.
         ("length", float),  # [m]
-        ("users", int),  # Number of walkers with permission.
-        ("order", int),  # As in `VEHICLE`; 0 while no walkers ask.
-        ("is_open", bool),  # Whether walkers are on it.
+        ("users", int),  # Number of pedestrians with permission.
+        ("order", int),  # As in `VEHICLE`; 0 while no pedestrians ask.
+        ("is_open", bool),  # Whether pedestrians are on it.
         ("marked", bool),  # See `Crossing`.
-        # Walkers who go to the end, and to the beginning, of its line have yet
-        # to walk beyond these places [m].
+        # Pedestrians who go to the end, and to the beginning, of its line have
+        # yet to walk beyond these places [m].
         ("to_end", float),
         ("to_start", float),
     ]
@@ -179,7 +179,7 @@ def begin_traffic(
 def make_crossings(graph: LaneGraph) -> np.ndarray:
     """Returns the crossings of a lane graph, (C,) of dtype `CROSSING`.
 
-    No walkers are on them yet.
+    No pedestrians are on them yet.
     """
     crossings = np.zeros(len(graph.crossings), CROSSING)
     crossings["waits"] = np.inf
@@ -452,7 +452,7 @@ def interaction(car: Any, gap: float, approach: float) -> float:
 
 @compiled
 def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
-    """Returns whether walkers on a crossing have yet to cross a vehicle's path.
+    """Returns whether pedestrians have yet to cross the path of a vehicle.
 
     Args:
         traffic: the traffic.
@@ -502,7 +502,7 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns what the i-th vehicle must stop for, and whom it must follow.
 
-    The i-th vehicle stops before any crossing that walkers use, whether the
+    The i-th vehicle stops before any crossing that pedestrians use, whether the
     crossing lies in a junction or not. It also stops where its path through a
     junction meets the path of a vehicle that was permitted to enter earlier and
     has not yet passed this place. If both vehicles come from the same lane, or
@@ -769,8 +769,8 @@ def advance(traffic: Traffic, accelerations: np.ndarray) -> None:
 def choose_way(traffic: Traffic, i: int) -> None:
     """Chooses at random where the i-th vehicle goes at the next junction.
 
-    Two directions are drawn, and the one that leads to the emptier lane is
-    chosen, so that no street stays empty while vehicles queue in other streets.
+    Two directions are sampled, and the direction that leads to the emptier lane
+    is chosen. Thus no street stays empty while vehicles queue in other streets.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]

@@ -1,7 +1,7 @@
-"""Moves walkers along walkways by the social force model.
+"""Moves pedestrians along walkways by the social force model.
 
-Walkers approach their desired speed, and keep away from each other and from the
-edges of their walkway: Helbing, Molnar, "Social force model for pedestrian
+Pedestrians approach their desired speed, and keep away from each other and from
+the edges of their walkway: Helbing, Molnar, "Social force model for pedestrian
 dynamics", Phys. Rev. E 51 (1995).
 """
 
@@ -24,9 +24,9 @@ _MEAN_SPEED = 1.34
 _SPEED_SPREAD = 0.26
 # Relaxation time [s].
 _RELAXATION = 0.5
-# Repulsion by another walker whose box is touched [m/s^2].
+# Repulsion by another pedestrian whose box is touched [m/s^2].
 _REPULSION = 7.0
-# In this distance, the repulsion by a walker falls by the factor e [m].
+# In this distance, the repulsion by a pedestrian falls by the factor e [m].
 _REPULSION_RANGE = 0.3
 # Repulsion by an edge that is touched [m/s^2].
 _EDGE_REPULSION = 10.0
@@ -34,53 +34,53 @@ _EDGE_REPULSION = 10.0
 _EDGE_RANGE = 0.2
 # Greatest speed as a multiple of the wanted speed.
 _HURRY = 1.3
-# Least distance between two walkers' middles [m].
+# Least distance between two pedestrians' middles [m].
 _APART = 0.95
-# Radius within which walkers are neighbours [m].
+# Radius within which pedestrians are neighbours [m].
 _NEAR = 4.0
-# Length of a walker's box, which contains swinging limbs [m].
+# Length of a pedestrian's box, which contains swinging limbs [m].
 WALKER_LENGTH = 0.84
 # Width of the box [m].
 WALKER_WIDTH = 0.6
 # Least space between boxes [m].
 _BOX_GAP = 0.15
-# A walker steps aside for another one ahead with at most this acceleration
+# A pedestrian steps aside for another one ahead with at most this acceleration
 # [m/s^2].
 _STEP_ASIDE = 4.0
-# A walker does not step aside for one that is at least this far to the side
+# A pedestrian does not step aside for one that is at least this far to the side
 # [m].
 _PASSING_DISTANCE = 0.85
-# Part of the repulsion by walkers that turns to the right.
+# Part of the repulsion by pedestrians that turns to the right.
 _TO_THE_RIGHT = 0.3
-# A walker aims at a point of the walkway this many points ahead.
+# A pedestrian aims at a point of the walkway this many points ahead.
 _AHEAD = int(2.0 / SPACING)
-# A walker turns to its direction of motion at this rate [rad/s].
+# A pedestrian turns to its direction of motion at this rate [rad/s].
 _TURN_RATE = 2.5
-# A walker that is at most this fast stands [m/s].
+# A pedestrian that is at most this fast stands [m/s].
 _STANDING_SPEED = 0.2
-# Distance of a waiting walker from the crossing [m].
+# Distance of a waiting pedestrian from the crossing [m].
 _AT_NODE = 1.0
 # Greatest acceleration, in any direction [m/s^2].
 _STRONGEST = 2.5
-# A walker that was blocked for this time turns back [s].
+# A pedestrian that was blocked for this time turns back [s].
 _PATIENCE = 4.0
-# A waiting walker turns back within this distance of one that does so [m].
+# A waiting pedestrian turns back within this distance of one that does so [m].
 _BLOCKING_DISTANCE = 1.5
-# For each walker that goes straight on, this many cross at a marked crossing,
-# if both are possible.
+# For each pedestrian that goes straight on, this many cross at a marked
+# crossing, if both are possible.
 _CROSSING_SHARE = 0.25
 # The same for a crossing without marks.
 _UNMARKED_SHARE = 0.05
-# After this time, a walker no longer waits for a gap [s].
+# After this time, a pedestrian no longer waits for a gap [s].
 _GIVES_UP = 10.0
-# Length of sidewalk per walker [m].
+# Length of sidewalk per pedestrian [m].
 _WALKER_SPACE = 3.0
-# Share of walkers with a companion behind them, so that about a third walk in
-# groups.
+# Share of pedestrians with a companion behind them, so that about a third walk
+# in groups.
 _COMPANIONS = 0.2
-# Distance of the companion behind the walker, in points of the walkway.
+# Distance of the companion behind the pedestrian, in points of the walkway.
 _BEHIND = 3
-# Number of random places that are tried for a walker.
+# Number of random places that are tried for a pedestrian.
 _TRIES = 200
 
 _WALKER = np.dtype(
@@ -90,12 +90,12 @@ _WALKER = np.dtype(
         ("yaw", float),  # Heading [rad].
         ("phase", float),  # Place in the gait [rad].
         ("path", int),  # Number of the walkway, in walking direction.
-        ("at", int),  # Row of the point that the walker has reached.
+        ("at", int),  # Row of the point that the pedestrian has reached.
         ("speed", float),  # Wanted [m/s].
         ("aside", float),  # Offset to the right, as a share of half the width.
         ("next_path", int),  # -1 if not drawn yet.
-        ("stuck", float),  # Time for which the walker has been blocked [s].
-        ("group", int),  # Number of the walker whom it follows.
+        ("stuck", float),  # Time for which the pedestrian has been blocked [s].
+        ("group", int),  # Number of the pedestrian whom it follows.
         ("draws", int),  # Number of random numbers drawn.
     ]
 )
@@ -120,7 +120,7 @@ class Paths(NamedTuple):
         tangents: (M, 2) unit vectors from each point to the next. The vector of
             a path's last point is that of the point before.
         limits: (M, 2) least and greatest offset to the right [m].
-        narrow: (M,) bool, where walkers must face along their path to fit.
+        narrow: (M,) bool, where pedestrians must face along their path to fit.
     """
 
     paths: np.ndarray
@@ -131,13 +131,13 @@ class Paths(NamedTuple):
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
-    """Returns how many walkers have room on the sidewalks."""
+    """Returns how many pedestrians have room on the sidewalks."""
     length = sum(length_of(way.points) for way in walkways if way.crossing < 0)
     return int(length // _WALKER_SPACE)
 
 
 def gait_rate(speed: np.ndarray) -> np.ndarray:
-    """Returns the rate at which the phase of walkers' gait changes [rad/s].
+    """Returns the rate at which the phase of pedestrians' gait changes [rad/s].
 
     `speed` contains the walking speeds [m/s]. A stride consists of two steps;
     its length is 0.4 m plus the distance walked in 0.7 s.
@@ -146,11 +146,11 @@ def gait_rate(speed: np.ndarray) -> np.ndarray:
 
 
 class Crowd:
-    """All walkers during the planning of their motion.
+    """All pedestrians during the planning of their motion.
 
     Attributes:
-        walkers: (N,) records of the walkers; fewer than requested if there is
-            not enough room.
+        walkers: (N,) records of the pedestrians; fewer than requested if there
+            is not enough room.
     """
 
     def __init__(
@@ -160,10 +160,10 @@ class Crowd:
         crossings: np.ndarray,
         rng: np.random.Generator,
     ):
-        """Places walkers on walkways, except on crossings.
+        """Places pedestrians on walkways, except on crossings.
 
         Args:
-            count: requested number of walkers.
+            count: requested number of pedestrians.
             walkways: the walkways.
             crossings: (C,) records of dtype `CROSSING`.
             rng: random generator for their places.
@@ -179,7 +179,7 @@ class Crowd:
         self.walkers = _place_walkers(count, walkways, rng)
 
     def step(self, t: float, seed: int) -> None:
-        """Moves all walkers by one time step.
+        """Moves all pedestrians by one time step.
 
         Args:
             t: time at which the step begins [s].
@@ -204,7 +204,7 @@ class Crowd:
         speed = np.sqrt(x * x + y * y)
         walkers["phase"] += gait_rate(speed) * STEP
         paths = self._paths.paths[walkers["path"]]
-        # Others may push a walker back.
+        # Others may push a pedestrian back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
         gets_on = x * along[:, 0] + y * along[:, 1] > _STANDING_SPEED
         is_stuck = ~gets_on & ~is_waiting
@@ -221,7 +221,7 @@ class Crowd:
         walkers["next_path"][back] = -1
 
     def _note_crossers(self) -> None:
-        """Records which parts of crossings walkers have yet to pass."""
+        """Records which parts of crossings pedestrians have yet to pass."""
         crossings, walkers = self._crossings, self.walkers
         crossings["to_end"], crossings["to_start"] = np.inf, -np.inf
         on = self._paths.paths["crossing"][walkers["path"]]
@@ -240,7 +240,7 @@ class Crowd:
         crossings["to_start"][begins] = np.inf
 
     def _follow_paths(self) -> np.ndarray:
-        """Updates the points that walkers reach; returns who is near an end."""
+        """Updates the points reached; returns (N,) bool, who is near an end."""
         walkers, (_, points, tangents, *_) = self.walkers, self._paths
         paths = self._paths.paths[walkers["path"]]
 
@@ -260,7 +260,7 @@ class Crowd:
         return is_near & (walkers["at"] >= paths["num_points"] - 3)
 
     def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
-        """Lets the i-th walker begin its next path, unless it has to wait.
+        """Lets the i-th pedestrian begin its next path, unless it has to wait.
 
         If it asks for a crossing, this is recorded in `waited` (C,).
 
@@ -273,7 +273,7 @@ class Crowd:
         after = int(walkers["next_path"][i])
         crossings = self._crossings
         c = paths["crossing"][after]
-        # A walker that turns back on a crossing already has permission.
+        # A pedestrian that turns back on a crossing already has permission.
         if c >= 0 and c != paths["crossing"][walkers["path"][i]]:
             if crossings["users"][c] == 0:
                 crossings["waits"][c] = min(crossings["waits"][c], t)
@@ -300,7 +300,7 @@ class Crowd:
         if len(choices) == 1:
             return path ^ 1
         self.walkers["draws"][i] += 1
-        # Few walkers cross, and none goes back.
+        # Few pedestrians cross, and none goes back.
         marked = self._crossings["marked"]
         likings = []
         for other in choices:
@@ -316,13 +316,13 @@ class Crowd:
         return path ^ 1 if other // 2 == path // 2 else other
 
     def poses(self, walkers: np.ndarray) -> np.ndarray:
-        """Returns the poses (..., 5) of walkers.
+        """Returns the poses (..., 5) of pedestrians.
 
         A pose consists of x, y, z on the ground [m], yaw and phase of the gait
         [rad].
 
         Args:
-            walkers: (...) records of walkers, which can be those of several
+            walkers: (...) records of pedestrians, which can be those of several
                 times.
         """
         paths, points, *_ = self._paths
@@ -368,13 +368,13 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
 def _place_walkers(
     count: int, walkways: Sequence[Walkway], rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns the records of walkers at their first places; see `Crowd`."""
+    """Returns the records of pedestrians at their first places; see `Crowd`."""
     free = [k for k, way in enumerate(walkways) if way.crossing < 0]
     sizes = np.array([len(walkways[k].points) for k in free], float)
     rows: list[tuple[int, int, np.ndarray, float, int]] = []
 
     def place(way: int, forward: bool, at: int, group: int) -> bool:
-        """Places a walker; returns False instead if another one is near."""
+        """Places a pedestrian; returns False instead if another one is near."""
         points = walkways[way].points
         line = points if forward else points[::-1]
         x, y = (line[at + 1] - line[at])[:2]
@@ -418,9 +418,9 @@ def _place_walkers(
 def _forces(
     paths: Paths, walkers: np.ndarray, is_waiting: np.ndarray
 ) -> np.ndarray:
-    """Returns the forces (N, 2) on all walkers, as accelerations [m/s^2].
+    """Returns the forces (N, 2) on all pedestrians, as accelerations [m/s^2].
 
-    `is_waiting` (N,) says which walkers wait for a crossing.
+    `is_waiting` (N,) says which pedestrians wait for a crossing.
     """
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
@@ -463,7 +463,7 @@ def _forces(
             push = _REPULSION * np.exp(
                 -max(distance - _APART, 0.0) / _REPULSION_RANGE
             )
-            # Slightly to the right; otherwise two walkers who meet head-on
+            # Slightly to the right; otherwise two pedestrians who meet head-on
             # would stop.
             push_x = push * (x - _TO_THE_RIGHT * y) / distance
             push_y = push * (y + _TO_THE_RIGHT * x) / distance
@@ -472,7 +472,7 @@ def _forces(
             force[j, 0] -= push_x
             force[j, 1] -= push_y
             for k, sign in ((i, -1.0), (j, 1.0)):
-                # The other walker's place in the walker's own frame.
+                # The other pedestrian's place in the pedestrian's own frame.
                 c, s = np.cos(walkers[k].yaw), np.sin(walkers[k].yaw)
                 ahead = sign * x * c + sign * y * s
                 aside = sign * y * c - sign * x * s
@@ -490,11 +490,11 @@ def _forces(
 
 @compiled
 def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
-    """Moves each walker as far as its path is free, by forces (N, 2) [m/s^2].
+    """Moves pedestrians, as far as paths are free, by forces (N, 2) [m/s^2].
 
-    A walker takes a step if it can then stop on its path, away from the places
-    where all others can stop. Otherwise it brakes; the place where it stops has
-    been free since the step before.
+    A pedestrian takes a step if it can then stop on its path, away from the
+    places where all others can stop. Otherwise it brakes; the place where it
+    stops has been free since the previous step.
     """
     for i in range(len(walkers)):
         one = walkers[i]
@@ -550,7 +550,7 @@ def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
 
 @compiled
 def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
-    """Returns x and y at which a walker stops if it brakes now.
+    """Returns x and y at which a pedestrian stops if it brakes now.
 
     (x, y) is its place, and (vx, vy) its velocity.
     """
@@ -560,7 +560,7 @@ def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
 
 @compiled
 def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
-    """Returns the row of the point on a walker's path nearest to a place."""
+    """Returns the row of the point of a path that is nearest to a place."""
     path, points = paths.paths[walker.path], paths.points
     best = np.inf
     nearest = path.first
@@ -575,7 +575,7 @@ def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
 
 @compiled
 def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
-    """Returns the distance from a place to a walker's path [m]."""
+    """Returns the distance from a place to a pedestrian's path [m]."""
     path, points = paths.paths[walker.path], paths.points
     row = _nearest(paths, walker, x, y)
     nearest = row - path.first
@@ -600,10 +600,10 @@ def _is_free(
     stop: tuple[float, float],
     yaw: float,
 ) -> bool:
-    """Returns whether the i-th walker's box would be free, now and later.
+    """Returns whether the i-th pedestrian's box would be free, now and later.
 
-    The box would be at `place` with a heading and, if the walker braked, then
-    at `stop`.
+    The box would be at `place` with a heading and, if the pedestrian braked,
+    then at `stop`.
     """
     half = (WALKER_LENGTH / 2 + _BOX_GAP / 2, WALKER_WIDTH / 2 + _BOX_GAP / 2)
     for j in range(len(walkers)):

@@ -513,8 +513,9 @@ def change_world(
     Args:
         world: the world, not yet part of a diagram; its SceneGraph is changed.
         config: the section `transient` of the scenario.
-        drive, kept_free: the path of the vehicle, and the area that must stay
-            free of new objects, seen from above [m].
+        drive: the path of the vehicle, seen from above [m].
+        kept_free: the area that must stay free of new objects, seen from above
+            [m].
 
     Raises:
         InputError: a mesh cannot be read, or there are more structures than

@@ -1,4 +1,4 @@
-"""Makes the buildings and plants of a world lower, as before they grew."""
+"""Lowers buildings and plants of a world, as if they had not yet grown."""
 
 from pathlib import Path
 

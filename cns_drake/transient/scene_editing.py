@@ -233,16 +233,17 @@ class SceneEditing:
         X_WS: RigidTransform,
         cause: str,
     ) -> None:
-        """Changes a structure in the way in which a model of it changed.
+        """Changes a structure by the difference between two models.
 
         Parts that both models contain stay as they are. A changed part keeps
         its colour and its material.
 
         Args:
             thing: the structure.
-            before: a model with the parts of the structure, in the same order.
-            after: the changed model. A part with the name of one in `before`
-                takes its place; all others are new.
+            before: model of the structure as it is, with the same parts in the
+                same order.
+            after: the changed model. A part replaces the part of the same name
+                in `before`; a part with a new name is added.
             X_WS: pose of the frame S of both models in W.
             cause: field of the scenario's section `transient` that asks for the
                 change.

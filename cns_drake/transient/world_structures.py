@@ -76,9 +76,10 @@ class LoadedPart:
 
 @dataclass(frozen=True)
 class LoadedStructure:
-    """A structure as a LiDAR sees it in a loaded world, as geometries in W.
+    """A structure of a loaded world, as geometries that a LiDAR can see.
 
-    (A `cns_drake.city.geometry.Structure` is one that is to be written.)
+    `cns_drake.city.geometry.Structure` is a structure that is yet to be
+    written.
 
     Attributes:
         name: name of the structure.
