@@ -28,6 +28,7 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.protocol import PROTOCOL_NAMES, PROTOCOLS
 from evaluation.results.summaries import (
+    LEAST_UNITS,
     Ranked,
     check_same_queries,
     drive_number,
@@ -618,8 +619,10 @@ def _differences(
 def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
     """Compares the rankings of two tables, each of its own conditions.
 
-    The interval is by bootstrap: over blocks of the routes if the answers to
-    all queries are known, otherwise over conditions.
+    The interval is by bootstrap, which draws the maps of a table that has four
+    or more: a ranking is to hold on other maps, too. Of fewer maps it draws
+    blocks of the routes if the answers to all queries are known, and otherwise
+    the units of `ranking`.
 
     Raises:
         InputError: fewer than two methods have results in all conditions of
@@ -662,8 +665,10 @@ def _values(
     order = [[one.method for one in ranked].index(name) for name in methods]
     means = np.array([one.value for one in ranked])[order]
     places = list(itertools.product(table.conditions, methods))
-    if metric not in _RESAMPLED or any(
-        (method, one) not in table.answers for one, method in places
+    if (
+        len({row.map for row in table.rows.values()}) >= LEAST_UNITS
+        or metric not in _RESAMPLED
+        or any((method, one) not in table.answers for one, method in places)
     ):
         return means, samples[:, order]
     asked = [

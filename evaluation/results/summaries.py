@@ -475,8 +475,9 @@ def ranking(
     the means are t intervals with maps as independent units if there are
     several, and conditions otherwise. They stay within the metric's range, and
     are unknown for two or three units, which say next to nothing. The samples
-    are those of a bootstrap that draws these units, the same for all
-    methods. For a single condition, the intervals are those in the rows.
+    are those of a bootstrap that draws these units, the same for all methods
+    and for all tables of the same maps; tables of other maps are drawn
+    independently. For a single condition, the intervals are those in the rows.
 
     Args:
         rows: rows of one metric.
@@ -500,7 +501,8 @@ def ranking(
     of_map = [some[names[0]].map for some in common]
     units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
     _, numbered = np.unique(units, return_inverse=True)
-    weights = resampled_weights(len(common), blocks=numbered)
+    seed = zlib.crc32(" ".join(sorted(set(of_map))).encode())
+    weights = resampled_weights(len(common), seed, numbered)
     with np.errstate(invalid="ignore"):
         samples = weights @ values / weights.sum(axis=1, keepdims=True)
     means = values.mean(axis=0)

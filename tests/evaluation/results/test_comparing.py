@@ -331,6 +331,73 @@ def test_tau_of_mean_areas(tmp_path, queries):
     assert one.tau == pytest.approx(expected / np.sqrt(5 / 6))
 
 
+def images_ranked(folder, real):
+    """Writes a half of the published ranking; returns R@1 (4 maps, methods)."""
+    with open("docs/notes/image_ranking.csv", newline="") as file:
+        lines = [
+            line
+            for line in csv.DictReader(file)
+            if line["images"].startswith("KITTI") == real
+        ]
+    rows = [
+        Row(
+            **key(line["method"], line["images"]),
+            metric="r1",
+            value=int(line["right"]) / int(line["queries"]),
+        )
+        for line in lines
+    ]
+    Results.of(rows).write_csv(folder)
+    methods = sorted({row.method for row in rows})
+    maps = dict.fromkeys(row.map for row in rows)
+    value = {(row.map, row.method): row.value for row in rows}
+    return np.array([[value[one, m] for m in methods] for one in maps])
+
+
+def test_maps_are_drawn_for_the_published_ranking(tmp_path):
+    """All 256 x 256 samples of four sequences and of four cities."""
+    paths = [tmp_path / "real.csv", tmp_path / "simulated.csv"]
+    signs = []
+    for path, real in zip(paths, (True, False), strict=True):
+        r1 = images_ranked(path, real)
+        draws = np.array(list(itertools.product(range(4), repeat=4)))
+        means = np.vstack([r1.mean(axis=0), r1[draws].mean(axis=1)])
+        one, other = np.triu_indices(r1.shape[1], 1)
+        apart = np.round(means[:, one] - means[:, other], 9)
+        signs.append(np.sign(apart))
+    untied = [(one != 0).sum(axis=1) for one in signs]
+    taus = (signs[0] @ signs[1].T) / np.sqrt(np.outer(*untied))
+    assert taus[0, 0] == 1.0
+    (found,) = compare(paths, "r1", rankings=True).agreements
+    assert found.tau == pytest.approx(1.0)
+    assert found.interval.high == pytest.approx(1.0)
+    # As published, and between exact quantiles around 2.5 %.
+    assert found.interval.low == pytest.approx(0.55, abs=0.005)
+    low, high = np.quantile(taus[1:, 1:], [0.015, 0.035])
+    assert low - 1e-9 <= found.interval.low <= high + 1e-9
+
+
+def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
+    """Each sample of a table then has the order of the same sample of a copy.
+
+    Answers to queries change nothing: maps are drawn, not blocks of routes.
+    """
+    towns = {
+        town: {"x": 0.5 + step, "y": 0.5, "z": 0.5 - step}
+        for town, step in zip("abcd", (0.4, -0.2, 0.1, -0.3), strict=True)
+    }
+    paths = [
+        write_table(tmp_path / "asked", towns, 10, queries=True),
+        write_table(tmp_path / "copy", towns),
+    ]
+    (same,) = compare(paths, rankings=True).agreements
+    assert same.interval.low == pytest.approx(1.0)
+    elsewhere = {f"{town} elsewhere": values for town, values in towns.items()}
+    paths[1] = write_table(tmp_path / "elsewhere", elsewhere)
+    (other,) = compare(paths, rankings=True).agreements
+    assert other.interval.low == pytest.approx(-1.0)
+
+
 def test_opposite_rankings(tmp_path):
     up = {"a": {"x": 0.1, "y": 0.4, "z": 0.9}}
     down = {"a": {"x": 0.9, "y": 0.6, "z": 0.1}}
