@@ -565,7 +565,7 @@ RECIPES = {
         "import numpy as np\n\nfrom cns_drake import SpinningPattern",
         file="beams.py",
         command=".venv/bin/python beams.py",
-        prints=("8 rings, 5760 beams a turn",),
+        prints=("8 rings, 5760 beams per revolution",),
     ),
     "noise of an IMU": Recipe("accelerometer_noise_density", file="imu.yaml"),
     "scenario of a world": Recipe(
