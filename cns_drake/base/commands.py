@@ -36,9 +36,9 @@ Methods = Annotated[
     typer.Option(
         "--method",
         metavar="NAME|FILE.py",
-        help="Method to run, and no others: the name of a shipped one, "
-        "standard for all standard ones, or a Python file that registers your "
-        "own. May be repeated. By default the standard methods.",
+        help="Method to run, instead of all standard methods: the name of a "
+        "shipped method, standard for all standard methods, or a Python file "
+        "that registers your own method. May be repeated.",
     ),
 ]
 MethodSettings = Annotated[
@@ -46,26 +46,25 @@ MethodSettings = Annotated[
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
-        help="Change a setting of a method, such as btc.candidates=20. "
+        help="Setting of a method to change, such as btc.candidates=20. "
         "Separate the numbers of a list by commas. If only one method runs, "
-        "you may leave out its name. May be repeated.",
+        "you may leave out the name of the method. May be repeated.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Whether to measure the time and memory that each method needs, "
-        "too. These numbers differ from run to run.",
+        help="Whether to also measure the time and memory that each method "
+        "needs. These numbers differ from run to run.",
     ),
 ]
 Tables = Annotated[
     bool,
     typer.Option(
         "--tables",
-        help="Write wide tables, too (.csv, .md and .tex): survival, tcr, "
-        "place_recognition, poses and others. These tables show the same "
-        "results.",
+        help="Also write the results as wide tables (.csv, .md and .tex): "
+        "survival, tcr, place_recognition, poses and others.",
     ),
 ]
 

@@ -114,16 +114,17 @@ def export(
     the older one first, and labels exactly what changed between them: every
     point of the older map is kept, gone or unobserved in the newer drive, and
     every point of the newer map is kept, new or newly seen. Each DRIVE is a
-    recording of cns-drake, a shipped drive or a scenario file. To score the
-    labels of your own change detector against them, run cns-eval map-update.
-    map-sessions makes the same maps without labels, from recordings whose world
-    is unknown, such as real drives. Before cns-eval map-update can score
-    labels, add the ground truth: A/truth.npy and B/truth.npy.
+    recording of cns-drake, a shipped drive or a scenario file. cns-eval
+    map-update scores the labels of your own change detector against these
+    labels. With map-sessions, the command makes the same maps without labels,
+    from recordings whose world is unknown, such as real drives. Before cns-eval
+    map-update can score labels of such maps, add the ground truth: A/truth.npy
+    and B/truth.npy.
 
     With film, DRIVE is a shipped drive or a scenario file, and the command
-    films the same stretch of it in each stage of its city. First, one shot per
-    stage shows the stretch from behind the car, with the points that the LiDAR
-    measures. Then one shot per stage shows it from above.
+    films the same stretch of the drive in each stage of the city: first in one
+    shot per stage from behind the car, with the points that the LiDAR measures,
+    then in one shot per stage from above.
 
     Args:
         drives: Drives to export. By default, pointnetvlad and overlap export
@@ -156,11 +157,10 @@ def export(
         max_range: Leave out points of training data that are farther than this
             along x, y or z in the LiDAR's frame [m]. By default 50, or 100 for
             overlap-table.
-        seconds: Length of the film [s]. All shots together have
-            this length.
+        seconds: Length of the whole film, with all of its shots [s].
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
-            default, it begins where the road ahead is straightest.
+            default, the stretch begins where the road ahead is straightest.
         traffic: Number of moving vehicles in the film. The same number of
             pedestrians is added. By default as the scenario says; if the
             scenario has no traffic, 60 vehicles and 60 pedestrians are added,

@@ -80,8 +80,8 @@ RatesFile = Annotated[
     typer.Option(
         metavar="FILE.yaml",
         help="File with rates of your own. Each line has the form event: rate, "
-        "with the probability per year, from 0 to 1. Events that it does not "
-        "name keep their rates.",
+        "with the probability per year, from 0 to 1. Events that the file does "
+        "not name keep their rates.",
     ),
 ]
 
@@ -196,9 +196,10 @@ def import_city(
             (first), only the last stage (last), or no stage (never).
         lod: Level of detail (LoD) in which to read the buildings of CityJSON,
             such as 1.2; by default the highest that each building has.
-        seed: Seed of all random choices: which buildings are missing or lower
-            in the first stage (--grow), what is added to buildings and streets,
-            and, for an OpenDRIVE file, which has no buildings, the whole city.
+        seed: Seed of all random choices: the buildings that are missing or
+            lower in the first stage (--grow), and the details that are added to
+            buildings and streets. For an OpenDRIVE file, which has no
+            buildings, the whole city depends on the seed.
         along: CSV file with the path of a drive of your own: columns x and y in
             the frame of the map [m]. This drive replaces the two drives that
             the command otherwise makes.
@@ -206,11 +207,11 @@ def import_city(
             [m], to save memory. By default, no structure is left out.
         drive_on: Side of the street on which cars drive; by default as the file
             says, or right if the file does not say.
-        grow: Add a first stage in which a random sample of the buildings, of
-            this share, is missing or lower. A number from 0.01 to 0.9; by
-            default 0.3. With --years or --plain, no such stage is added, and
-            --grow is an error. In the town along an OpenDRIVE file, the
-            buildings in the east are missing, by default a share of 0.35.
+        grow: Share of the buildings that are missing or lower in an additional
+            first stage, from 0.01 to 0.9. These buildings are chosen at random;
+            the default is 0.3. For an OpenDRIVE file, the buildings in the east
+            are missing, and the default is 0.35. With --years or --plain, no
+            such stage is added, and --grow is an error.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Buildings along the roads of an OpenDRIVE
             file are added nevertheless.
@@ -340,7 +341,8 @@ def city(
 
     Args:
         folder: Folder with roads.yaml, city.yaml and stages.yaml. The stages
-            are written to it, and its table of drives is updated.
+            are written to this folder, and the table of drives in it is
+            updated.
         new: First write the files that are missing in a folder with
             roads.yaml: a plan with a district for each block, two stages, and a
             drive for each stage. Existing files are kept.

@@ -68,9 +68,9 @@ Vary = Annotated[
     typer.Option(
         metavar="NAME|FILE.yaml",
         help="Experiment whose drives are taken in addition to the named "
-        "drives: the name of a shipped one, or a file. Their scenario files "
-        "are written to <output>/scenarios, and cities that are made for them "
-        "to <output>/cities.",
+        "drives: the name of a shipped experiment, or a file. The scenario "
+        "files of these drives are written to <output>/scenarios, and cities "
+        "that are made for these drives to <output>/cities.",
     ),
 ]
 Maps = Annotated[

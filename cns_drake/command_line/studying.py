@@ -93,9 +93,9 @@ def study(
 ) -> None:
     """Measure how a change affects each method.
 
-    An experiment is a file. It describes two drives, of which one makes the
-    database and the other the queries, what differs between them, and which
-    tasks and methods to measure. The drives are simulated but not recorded. The
+    An experiment is a file that describes two drives, what differs between
+    them, and which tasks and methods to measure. One drive makes the database,
+    the other the queries. The drives are simulated but not recorded. The
     command writes results.csv (one number per row), queries.csv (one query per
     row) and a page, index.html. To resume after an interruption, run the same
     command again.
@@ -108,16 +108,16 @@ def study(
         output: Folder for the results; created if it does not exist.
         quick: Measure less and finish sooner. The section `quick` of the
             experiment says what is left out.
-        task: Task to measure: place, pose, localise, map, change or cost. By
-            default the tasks of the experiment. May be repeated.
-        method: Method to run, and no others: the name of a shipped one,
-            standard for all standard ones, or a Python file with your own. May
-            be repeated. By default the methods of the experiment.
-        override: Change a setting of a method, such as btc.candidates=20.
-            Separate the numbers of a list by commas; a list in brackets makes
-            the setting a factor. Or replace a field of the experiment, such as
-            seeds=[1,2]. For a field inside another field, join both names by a
-            dot, such as database.years=[0,5]. May be repeated.
+        task: Task to measure: place, pose, localise, map, change, cost or seen.
+            By default the tasks of the experiment. May be repeated.
+        method: Method to run, instead of the methods of the experiment: the
+            name of a shipped method, standard for all standard methods, or a
+            Python file with your own method. May be repeated.
+        override: Setting of a method to change, such as btc.candidates=20, or
+            field of the experiment to replace, such as seeds=[1,2]. For a field
+            inside another field, join both names by a dot, such as
+            database.years=[0,5]. Separate the numbers of a setting by commas; a
+            list in brackets makes the setting a factor. May be repeated.
         allow_code: Run the Python files that the experiment names. A file that
             you name yourself, by --method or --set, runs without this option.
         list_all: List the shipped experiments, and do nothing else.

@@ -245,7 +245,8 @@ class TrafficConfig(Section):
 class TransientConfig(Section):
     """Changes to a city that no stage contains, such as snow.
 
-    Most are temporary; `height_limit` shows the city before it grew.
+    Most of these changes are temporary; `height_limit` shows the city before it
+    grew.
 
     `roadsides` is applied first, so all other switches also change the objects
     that `roadsides` adds. Apart from that, the switches are independent: the
@@ -254,8 +255,8 @@ class TransientConfig(Section):
     Attributes:
         seed: seed of all random numbers.
         parked_cars: share of the parked cars that are changed. Of the changed
-            cars, three in ten have left, two in ten stand elsewhere in their
-            bay, and another car has replaced the rest.
+            cars, 30 % have left, 20 % stand elsewhere in their bay, and all
+            others are replaced by another car.
         leaves: share of the leaves and needles that remain on plants; 0 is
             winter. Wood stays. A shrub without wood keeps a tenth of its
             leaves, as twigs.
@@ -271,8 +272,8 @@ class TransientConfig(Section):
             ones up to 2 m away.
         roadsides: share of the free places beside kerbs, within 30 m of the
             drive, that get hedges, garden walls, bushes, young trees, garages
-            or parked cars. Only the cars depend on the seed; all else is the
-            same in every drive.
+            or parked cars. Only the cars depend on the seed; all other added
+            objects are the same in every drive.
         height_limit: greatest height of buildings and plants above their lowest
             point [m]. Buildings that are at least 2.5 m (a storey) higher are
             cut off at this height, and get a flat roof; higher plants are
@@ -320,8 +321,8 @@ class Scenario(Section):
             `waypoints`.
         waypoints: CSV file of points for the car to pass. A drive through a
             `world` needs it, because an SDF world has no roads.
-        u_turns: whether the car turns round where the waypoints lead straight
-            back.
+        u_turns: whether the car makes a U-turn where the waypoints lead
+            straight back.
         aside: lateral offset of the car from the centreline of its lane,
             positive to the right [m]. The offset applies between junctions, as
             far as the road has room.

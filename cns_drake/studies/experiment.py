@@ -189,7 +189,7 @@ class Experiment(Section):
     """A question about two drives: what varies, and what is measured.
 
     Attributes:
-        name: name of the experiment, which stands in all its tables.
+        name: name of the experiment in all tables.
         about: the question in words.
         maps: maps to use: names of shipped ones, folders of maps, folders of
             recordings, or maps to make. By default the shipped maps.
@@ -214,7 +214,7 @@ class Experiment(Section):
             levels of a case, the weakest first. Each case is measured by itself
             and compared with the case `none`, in which nothing differs.
         levels: numbers of the levels of the cases to measure; by default all. A
-            case with fewer levels is measured at its last one.
+            case with fewer levels is measured at its last level.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.
@@ -226,8 +226,8 @@ class Experiment(Section):
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
-            or fields of a protocol of your own. Its field `base` then names the
-            protocol from which the other fields come.
+            or fields of a protocol of your own. The field `base` then names the
+            protocol from which all other fields come.
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
         frozen: table with the fingerprint of the drives of each level. Use it

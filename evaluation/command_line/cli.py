@@ -202,8 +202,8 @@ def pr(
 ) -> None:
     """Measure place recognition between two drives.
 
-    For scans along QUERY, the command measures how well a method finds the same
-    place among the places of DATABASE. QUERY and DATABASE are recorded drives
+    The command measures how well a method finds the place of each scan along
+    QUERY among the places of DATABASE. QUERY and DATABASE are recorded drives
     (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in
     different world frames are aligned first.
 
@@ -220,8 +220,8 @@ def pr(
             shows, at any distance.
         overlaps: CSV file to write, with the overlap of each query with each
             place. Needs --truth overlap:PART.
-        exact_overlaps: File with exact overlaps, as cns-drake export
-            --format overlap-table writes it. Without it, overlaps are estimated
+        exact_overlaps: File with exact overlaps, as cns-drake export --format
+            overlap-table writes it. Without this file, overlaps are estimated
             from the scans. Needs --truth overlap:PART.
         turn_queries: Whether to give each query a random yaw, as if the car had
             another heading. By default as --protocol says.
@@ -429,14 +429,15 @@ def compare(
 ) -> None:
     """Rank the methods in tables of results.
 
-    RESULTS are files like results.csv, or folders that contain one. The command
-    ranks the methods in these tables and in the shipped tables by their means
-    over the conditions that all tables share, with 95 % t intervals over maps
-    (over conditions if there is only one map), if there are four or more. For
-    AUC, if a queries.csv lies
-    next to each table, the command also prints the AUC difference of any two
-    methods, with a p-value that is corrected by Holm's method for the number of
-    differences. Kendall's tau says how similarly two tables rank the methods.
+    RESULTS are files like results.csv, or folders that contain such a file. The
+    command ranks the methods in these tables and in the shipped tables by their
+    means over the conditions that all tables share. If there are four or more
+    maps, each mean has a 95 % t interval over maps; with only one map, it has
+    an interval over four or more conditions. If a queries.csv lies next to each
+    table, the command also prints the difference in AUC between any two
+    methods. The p-value of a difference is corrected by Holm's method for the
+    number of differences. With --rankings, Kendall's tau says how similarly two
+    tables rank the methods.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.

@@ -44,7 +44,7 @@ def map_update(
             gone. The file is a .npy file, or a .ply file with a property
             `prediction`. Needs --labels-b.
         labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
-            The formats are those of --labels-a, which is needed as well.
+            The file has one of the formats of --labels-a. Needs --labels-a.
         output: Folder for results.csv and queries.csv, in the same form as
             those of a study, and for the detector's labels of both maps, A.npy
             and B.npy.

@@ -30,16 +30,16 @@ def real(
     Args:
         folder: Folder with the excerpts of public data sets.
         output: Folder for the results; created if it does not exist.
-        method: Place-recognition method or registration method to run, and no
-            others: the name of a shipped one, standard for all standard methods
-            of place recognition, or a Python file that registers your own
-            method or defines your own function `localise`. May be repeated. By
-            default all shipped ones.
-        simulated: Folder with simulated recordings. Recordings with the same
-            model of LiDAR as a data set are used in two ways: their scans are
-            added to the data set's database as further places, and a classifier
-            is trained to tell them from the real scans, which shows how
-            realistic the simulated scans are.
+        method: Method of place recognition or of registration to run, instead
+            of all shipped methods: the name of a shipped method, standard for
+            all standard methods of place recognition, or a Python file that
+            registers your own method or defines your own function `localise`.
+            May be repeated.
+        simulated: Folder with simulated recordings. If a recording has the same
+            model of LiDAR as a data set, its scans become further places of the
+            data set's database. A classifier then also tries to tell these
+            scans from the real ones, which shows how realistic the simulation
+            is.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.real.measuring import measure_real

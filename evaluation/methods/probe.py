@@ -51,7 +51,7 @@ class ProbeConfig(MethodConfig):
         voxel_size: side of the voxels to which each cloud is first downsampled
             [m]. The first point of each voxel stays.
         rings: number of equal cells of range, up to `max_range`.
-        sectors: number of equal cells of azimuth in a turn.
+        sectors: number of equal cells of azimuth, over 360 deg.
         max_range: largest range of a point that is used [m].
         sigma_t: standard deviation of the displacement that is expected between
             a query and its place [m].

@@ -39,7 +39,7 @@ class SolidConfig(MethodConfig):
         max_range: largest range of a point that is used [m]; [P] 80, for a
             LiDAR with a field of view like that of `cns`.
         ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
-        azimuths: number of equal cells of azimuth in a turn; [P], [C] 60.
+        azimuths: number of equal cells of azimuth, over 360 deg; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
             [P], [C] the number of beams of the LiDAR. By default the number of
             beams of the drive's LiDAR, or 32 if its model is unknown [S].

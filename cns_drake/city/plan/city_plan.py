@@ -67,7 +67,7 @@ class BuildingPlan(_Model):
         size: `[width along the front, depth]` of a rectangular footprint [m].
             Give `size` or `outline`.
         outline: corners of the footprint [m], relative to `at` and before the
-            building is turned by `yaw_deg`.
+            building is rotated by `yaw_deg`.
         yaw_deg: heading of the building [deg]. At 0 its front faces the
             direction -y.
         height: height of the parapet, ridge or spire [m].
@@ -198,7 +198,7 @@ class LinePlan(_Model):
             it, each straight part of the line becomes one object, such as a
             fence or a hedge, which is as long as this part. Long or steep parts
             become several objects, end to end.
-        yaw_deg: angle by which each object is turned from its usual heading
+        yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
         kind: first part of the objects' names in the tables; by default the
             object's name or a common word, such as `tree` for `lime_tree`.

@@ -52,7 +52,8 @@ class LidarSection(Mount):
             documentation.
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        columns: number of columns (azimuths) per turn; by default the preset's.
+        columns: number of columns (azimuths) per revolution; by default the
+            preset's.
         min_range: smallest range that is measured [m]; by default the preset's.
         max_range: largest range that is measured [m]; by default the preset's.
         resolution: step to which recorded coordinates are rounded [m]; the
@@ -73,7 +74,7 @@ class LidarSection(Mount):
             errors and intensities of the unit's data sheet.
         echoes: which echoes of a beam are reported, with calibrated returns.
             `dual` reports the strongest and the last one. Fog has an echo only
-            in beams without any other.
+            in beams without any other echo.
         unit_seed: seed of the individual unit, with calibrated returns, which
             decides the errors in the ranges, angles and gains of the unit's
             lasers. Use the same seed in all drives with the same unit.
