@@ -1,4 +1,4 @@
-"""The pose of a sensor on its carrier, the carrier's motion, and names."""
+"""Poses of sensors on their carriers, the carriers' motion, and names."""
 
 from collections.abc import Collection
 import math
@@ -66,7 +66,8 @@ def check_new_sensor(
         builder: builder of the diagram.
         name: the name.
         own: a reserved name that this kind of sensor can have.
-        parts: endings of the names of its systems, after an underscore.
+        parts: endings of the names of the sensor's systems; an underscore
+            stands between the sensor's name and the ending.
 
     Raises:
         ValueError: the name cannot be a part of a ROS 2 topic, is reserved, or
@@ -84,7 +85,7 @@ def check_free(builder: DiagramBuilder, *names: str) -> None:
     A diagram with two systems of one name ends the process when it is built.
 
     Raises:
-        ValueError: it has one.
+        ValueError: the diagram has a system of one of these names.
     """
     for name in names:
         if builder.HasSubsystemNamed(name):

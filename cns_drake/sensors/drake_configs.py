@@ -54,7 +54,7 @@ _RATE = 20
 
 @dataclass
 class LidarConfig:
-    """A LiDAR, as YAML describes it to Drake.
+    """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
 
     Most fields are the same as those of a LiDAR in a scenario. Unlike in a
     scenario, coordinates are not rounded by default, and the default rate is
@@ -123,7 +123,7 @@ class LidarConfig:
 
 @dataclass
 class ImuConfig:
-    """An IMU, as YAML describes it to Drake.
+    """The configuration of an IMU, for YAML and `ApplyImuConfig`.
 
     Attributes:
         name: name of the systems; the channel is `DRAKE_IMU_<name>`.
@@ -164,7 +164,7 @@ class ImuConfig:
 
 @dataclass
 class OdometryConfig:
-    """Exact odometry of a frame, as YAML describes it to Drake.
+    """The configuration of exact odometry, for YAML and `ApplyOdometryConfig`.
 
     Attributes:
         name: name of the system; the channel is `DRAKE_ODOMETRY_<name>`.
@@ -199,7 +199,7 @@ def ApplyLidarConfig(
     """Adds a LiDAR to a diagram and publishes its scans on LCM.
 
     The messages are `lcmt_point_cloud` on the channel
-    `DRAKE_POINT_CLOUD_<name>`, one per turn, with points expressed in the
+    `DRAKE_POINT_CLOUD_<name>`, one per revolution, with points expressed in the
     world. Meldis shows them. The field `rgb` contains the intensities as greys,
     as in the port `point_cloud_W` of a `Lidar`.
 

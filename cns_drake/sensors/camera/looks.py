@@ -231,11 +231,10 @@ def texture(name: str) -> tuple[bytes, float]:
         name: a key of `LOOKS`.
 
     Returns:
-        The PNG, gamma-encoded, and the factor, which is the brightness of a
-        white pixel: the brightness of any pixel is its linear value, from 0 to
-        1, times the factor. The factor makes the mean brightness 1. For a
-        texture that covers a whole geometry (`is_face`), the factor is 1, and
-        the mean brightness can have any value.
+        The PNG, gamma-encoded; and the factor. The brightness of a pixel is its
+        linear value, from 0 to 1, times the factor, so that the mean brightness
+        is 1. For a texture that covers a whole geometry (`is_face`), the factor
+        is 1, and the mean brightness can have any value.
     """
     from PIL import Image
 

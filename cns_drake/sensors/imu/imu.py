@@ -211,7 +211,7 @@ class NoisyImu(LeafSystem):
 
     All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
     rad/s]. Sample k is at time k / rate. Between two samples, the error of the
-    earlier one is added.
+    earlier sample is added.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):

@@ -81,7 +81,7 @@ class ImuErrors:
     """The errors of an IMU, which can be computed for any sample at any time.
 
     The error of a sample depends only on its number, and not on which samples
-    were computed before. For this, the random walk of the bias is drawn by
+    were computed before. For this, the random walk of the bias is sampled by
     halving intervals (Levy's construction of Brownian motion).
     """
 

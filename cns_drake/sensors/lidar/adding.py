@@ -90,17 +90,17 @@ def add_lidar(
         motion: source of the bodies' velocities for motion distortion; by
             default the plant.
         range_noise: standard deviation of the Gaussian errors of ranges [m]; 0
-            for calibrated returns, which have their own.
+            for calibrated returns, which have range errors of their own.
         dropout: probability that a return is lost; 0 for calibrated returns.
         seed: seed of noise, dropout and returns that are `calibrated`. Random
             numbers depend on the seed, the name and the number of the frame. A
-            model of noise or returns with a `sensor_name` uses that instead of
-            the name.
+            model of noise or returns with a `sensor_name` uses the
+            `sensor_name` instead of the name.
         measurement: model of the noise, instead of `range_noise`, `dropout` and
             `seed`.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
             `CalibratedReturns`.
-        role: role of the geometry that it sees.
+        role: role of the geometry that the LiDAR sees.
         structures: table of the structures' labels and instance ids; by default
             structures have no class.
         anchored_frames: frames that never move; by default the frames of the
@@ -108,7 +108,7 @@ def add_lidar(
         moving_bodies: frame -> index of its body in the LiDAR's port
             `body_spatial_velocities`, if you connect this port yourself; with
             `motion_distortion`, all bodies of the plant.
-        num_threads: number of threads that share its rays.
+        num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
 
@@ -296,12 +296,12 @@ def add_described_lidar(
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
         unseen: see `add_lidar`, as for all further arguments.
-        motion_distortion: whether the bodies of its plant keep moving during a
-            revolution; a drive connects a `Sweep` instead.
+        motion_distortion: whether the bodies of the LiDAR's plant keep moving
+            during a revolution. A recorded drive connects a `Sweep` instead.
         structures: table of the structures.
         anchored_frames: frames that never move.
         moving_bodies: frames that move during a revolution.
-        num_threads: number of threads that share its rays.
+        num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
     """

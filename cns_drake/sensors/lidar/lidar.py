@@ -121,11 +121,12 @@ class Lidar(LeafSystem):
     P in the SceneGraph (a deskewed scan).
 
     If the port `sweep` is connected, the poses of P come from a `Sweep` and not
-    from the SceneGraph: one pose for the whole turn or, with motion distortion,
-    one for each column at its firing time. With motion distortion, a point is
-    expressed in S at its firing time t, as a real unit reports it: X_WS(start
-    of the revolution + t) transforms it to the world. During the revolution,
-    all other moving geometry stays where it is at the time of the output.
+    from the SceneGraph: one pose for the whole revolution or, with motion
+    distortion, one for each column at its firing time. With motion distortion,
+    a point is expressed in S at its firing time t, as a real unit reports it:
+    X_WS(start of the revolution + t) transforms it to the world. During the
+    revolution, all other moving geometry stays where it is at the time of the
+    output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
     bodies of a plant move during the revolution, with the velocities that they
@@ -354,7 +355,7 @@ class Lidar(LeafSystem):
     def EvalScene(self, context: Context) -> RayCastingScene:
         """Returns the scene of all geometry that the LiDAR sees in a Context.
 
-        Rays can be cast on it.
+        Rays can be cast on this scene.
 
         Raises:
             RuntimeError: the Context is not the one of this LiDAR.
@@ -410,8 +411,9 @@ class Lidar(LeafSystem):
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
         The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
-        to 1e-4 m for rays that start within 1 km of the LiDAR. Triangles are
-        met in double precision, half spaces and curved shapes in single.
+        to 1e-4 m for rays that start within 1 km of the LiDAR. Hits on
+        triangles are computed in double precision, hits on half spaces and on
+        curved shapes in single precision.
 
         Args:
             context: context of the LiDAR.
@@ -598,7 +600,7 @@ class Lidar(LeafSystem):
         return hits.geometry.take(turn.table.place.take(returns.beams)), returns
 
     def _turn_at(self, time: float) -> tuple[int, _Turn]:
-        """Returns number and beams of the turn at a time [s]."""
+        """Returns number and beams of the revolution at a time [s]."""
         frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first

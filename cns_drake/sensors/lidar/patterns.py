@@ -104,7 +104,7 @@ class Beams:
     def cast_columns(self) -> np.ndarray | None:
         """(N,) column of each beam, in the order of `packet_order`.
 
-        None if these columns are 0, 1, ..., C - 1, again and again.
+        None if these columns repeat the sequence 0, 1, ..., C - 1.
         """
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
@@ -289,7 +289,7 @@ class SpinningPattern(BeamPattern):
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
         period: duration of one revolution [s].
-        azimuths_rad: first and last azimuth [rad]; None for the whole turn.
+        azimuths_rad: first and last azimuth [rad]; None for all azimuths.
 
     Raises:
         ValueError: a value is impossible, or elevations ascend.

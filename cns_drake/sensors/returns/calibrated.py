@@ -32,11 +32,11 @@ CLEAR = Weather()
 class CalibratedReturns:
     """A model of returns that follows the data sheet of a LiDAR.
 
-    It adds the unit's noise, losses, angular errors and calibrated intensities.
-    Random numbers depend only on the seed, the name of the sensor, the frame
-    and the beam. Errors of the individual unit depend on `unit_seed`, the name
-    of the sensor and the laser, so they are the same in all drives with the
-    same unit.
+    The model adds the unit's noise, losses, angular errors and calibrated
+    intensities. Random numbers depend only on the seed, the name of the sensor,
+    the frame and the beam. Errors of the individual unit depend on `unit_seed`,
+    the name of the sensor and the laser, so they are the same in all drives
+    with the same unit.
 
     Attributes:
         sheet: data sheet of the unit.
@@ -149,7 +149,7 @@ class CalibratedReturns:
         times: np.ndarray,
         frame: int,
     ) -> Reported:
-        """Returns the reported points of a turn.
+        """Returns the reported points of a revolution.
 
         Rays are numbered in the order in which they are cast. Ray i is cast
         from pose i mod K at time i mod T.
@@ -157,13 +157,13 @@ class CalibratedReturns:
         Args:
             scene: geometry on which rays are cast.
             materials: reflection properties of each geometry.
-            pattern: the beams of a turn.
+            pattern: the beams of a revolution.
             turn: the beams with the errors of the individual unit, from
                 `CalibratedReturns.turn`.
             p_WSset: (K, 3) positions of S in the world [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
-            times: (T,) firing times as fractions of the turn.
-            frame: number of the turn.
+            times: (T,) firing times as fractions of the revolution.
+            frame: number of the revolution.
         """
         key = frame_key(self.seed, self.sensor_name, frame)
         reach = self.reach(pattern.max_range)
@@ -237,10 +237,10 @@ class CalibratedReturns:
         return report_echoes(light, receiver, key, turn.range_error, turn.gain)
 
     def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a turn, with the errors of this LiDAR's lasers.
+        """Returns the beams of a revolution, with this LiDAR's errors.
 
-        The errors are those of direction, range and gain. They are the same in
-        all turns.
+        Each laser has errors of direction, range and gain, which are the same
+        in all revolutions.
 
         Args:
             beams: the nominal beams, from `BeamPattern.beams`.
@@ -308,7 +308,7 @@ def _turned(
 
 
 class CalibratedTurn:
-    """The N beams of a turn, with the errors of their lasers.
+    """The N beams of a revolution, with the errors of their lasers.
 
     The arrays `reported`, `p_SLset`, `range_error` and `gain` are in the order
     in which the beams fire. All other attributes refer to the order in which

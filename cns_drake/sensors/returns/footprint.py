@@ -35,7 +35,7 @@ class Sides(NamedTuple):
     Each ray represents the part of a beam that is towards the neighbour.
 
     Attributes:
-        row: (P,) index of the beam among the beams of the turn.
+        row: (P,) index of the beam among the beams of the revolution.
         neighbour: (P,) index of the neighbouring beam beyond the edge.
         share: (P,) fraction of its beam's light that the ray represents.
         d_Wset: (P, 3) unit directions in the world.
@@ -167,12 +167,12 @@ def _share(
 
 @compiled
 def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
-    """Corrects the hits of additional rays; returns the light of the axes.
+    """Corrects the hits of additional rays; returns the axes' shares of light.
 
     At an edge, the axis of a beam hits one surface, and the axis of a
     neighbouring beam hits another. The beam then has an additional ray (see
     `find_sides`), which is cast only to just beyond the nearer of these two
-    surfaces. Its hit is corrected in two cases:
+    surfaces. The hit of the additional ray is corrected in two cases:
 
     - If the ray hits the same surface as the axis of its own beam, the hit is
       removed.

@@ -76,10 +76,10 @@ class BeamHits(NamedTuple):
 
 
 class Shots(NamedTuple):
-    """The N beams of a turn, in the order in which their rays are cast.
+    """The N beams of a revolution, in the order in which rays are cast.
 
-    The LiDAR may fire them in another order. Beam i is the one with the firing
-    number i.
+    The LiDAR may fire the beams in another order. Beam i is the beam with the
+    firing number i.
 
     Attributes:
         key: key of the frame's random numbers; see
@@ -87,8 +87,8 @@ class Shots(NamedTuple):
         beam: (N,) firing number of each beam.
         p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
             at position i mod K.
-        times: (T,) float32 firing times as fractions of the turn; beam i fires
-            at time i mod T.
+        times: (T,) float32 firing times as fractions of the revolution; beam i
+            fires at time i mod T.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
@@ -225,8 +225,8 @@ def texture(
 
     Args:
         light: the light that smooth, uniform surfaces would return.
-        row: (B,) for each of the B beams, in the order of `light`, its row in
-            `d_Wset`.
+        row: (B,) row in `d_Wset` of each of the B beams, which are in the order
+            of `light`.
         p_WSset: (K, 3) positions of the sensor in the world [m]. The beam in
             row i of `d_Wset` starts at position i mod K.
         d_Wset: (B, 3) unit directions of the beams in the world.

@@ -28,7 +28,7 @@ class Materials(NamedTuple):
             `BEADS` (for the beads of road markings, which reflect light back to
             its source even if it grazes the road; EN 1436 measures them at
             1.24 deg).
-        reflectivity: (G,) float32 reflectivity. That of a retro-reflector is
+        reflectivity: (G,) float32 reflectivity. For a retro-reflector, it is
             relative to a Lambertian target of reflectivity 1 that faces the
             beam.
         leaf_area_density: (G,) float32 [1/m].

@@ -62,7 +62,7 @@ class Ways(NamedTuple):
         beam: (N,) number of each ray's beam.
         p_Wset: (N, 3) current origins in the world [m].
         d_Wset: (N, 3) unit directions in the world.
-        time: (N,) float32 firing time as a fraction of the turn.
+        time: (N,) float32 firing time as a fraction of the revolution.
         length: (N,) length of the path so far [m].
         energy: (N,) fraction of the beam's light that gets to the origin and
             back.

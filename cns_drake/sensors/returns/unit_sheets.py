@@ -29,7 +29,8 @@ class Response:
             sheet says.
         full: intensity of an energy of 1, if `slope` is not 0.
         far: range up to which the unit compensates intensity for distance [m],
-            if `slope` is not 0; otherwise it does so at every range.
+            if `slope` is not 0. With a slope of 0, the unit compensates at
+            every range.
         floor: intensities below this are reported as 0, whatever the gain.
         least: echoes of less energy are not reported even at close range, where
             the unit turns its power down.
@@ -69,7 +70,7 @@ class Response:
 
 @dataclass(frozen=True)
 class Head:
-    """Where the lasers of a unit are, and how it reports azimuths.
+    """Positions of the lasers of a unit, and how the unit reports azimuths.
 
     Attributes:
         blocks: for each block of lasers, from the top: its lowest elevation
