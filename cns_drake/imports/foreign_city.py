@@ -86,7 +86,7 @@ class Imported:
     def draw_name(self) -> str:
         """Name on which the random draws for the structure depend.
 
-        A variant of a structure has the same one as the original.
+        A variant of a structure has the draw name of the original.
         """
         return self.original or self.structure.name
 
@@ -128,7 +128,7 @@ class Street:
             there.
         forward: whether cars drive in the direction of `line`.
         backward: whether cars drive against this direction.
-        aside: distance from the middle to the outermost lane [m].
+        aside: lateral offset of the outermost lane from the middle [m].
         width: width of the carriageway [m]; 0 if unknown.
         name: name of the street in the file.
         tags: tags of the street in the file.

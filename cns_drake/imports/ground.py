@@ -88,7 +88,8 @@ class Ground:
     def to_mesh(self) -> Mesh:
         """Returns the ground as a mesh, lowered by 0.1 m.
 
-        It is lower so that pavements at the same height can be seen.
+        The mesh is lower, so that pavements at the height of the ground can be
+        seen.
         """
         x, y = np.meshgrid(self.xs, self.ys)
         vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)

@@ -50,8 +50,8 @@ def import_city(
         options: the options of the import.
         finish: called with the folder and the sizes of its stages (see
             `write_world`), to add files. By then the folder contains all other
-            files and has its final name, but is still in a temporary place. If
-            `finish` fails, nothing is left.
+            files and has its final name, but still lies in a temporary folder.
+            If `finish` fails, nothing is left.
 
     Returns:
         Counts of what was imported.

@@ -73,9 +73,9 @@ class ImportOptions:
         undated: which stages contain the buildings whose year is unknown: all
             stages (`first`), only the last stage (`last`), or none (`never`).
         lod: level of detail to read; None for the highest of each object.
-        seed: seed of everything that is drawn at random: the changes of `grow`,
-            the details of `dressed`, and the buildings of a town that is built
-            along a file's roads.
+        seed: seed of everything that is sampled at random: the changes of
+            `grow`, the details of `dressed`, and the buildings of a town that
+            is built along a file's roads.
         along: CSV file with the waypoints of a drive, which replaces the two
             proposed drives; None for the proposed ones.
         within: greatest distance of structures from the drives [m]; None for no
@@ -83,7 +83,7 @@ class ImportOptions:
         drive_on: side of the street on which traffic keeps; None for the side
             in the file, or right if the file names none.
         grow: share of the buildings that are missing or lower in an additional
-            first stage, drawn at random; None for no such stage.
+            first stage, sampled at random; None for no such stage.
         dressed: whether to add details, such as windows and parked cars, that
             are not in the file.
     """

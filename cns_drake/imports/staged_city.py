@@ -349,9 +349,10 @@ def grow(
     """Returns a city with an additional first stage, and its differences.
 
     In the first stage, buildings that no longer exist today stand in place of
-    the structures that replaced them. Some of the other buildings, drawn at
-    random, are missing or lower. A draw depends only on the seed and the
-    building's name, so that changes elsewhere in the file do not affect it.
+    the structures that replaced them. Some of the other buildings, sampled at
+    random, are missing or lower. Whether and how a building differs depends
+    only on the seed and the building's name, and not on changes elsewhere in
+    the file.
 
     Args:
         city: the city, with one stage.

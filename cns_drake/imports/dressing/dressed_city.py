@@ -268,9 +268,9 @@ class DressedBuildings:
 
     Attributes:
         buildings: original building -> building with details.
-        at_random: kind of detail -> number of details drawn at random.
-        by_file: kind of appearance, such as a colour -> number of buildings
-            that have it from the file.
+        at_random: kind of detail -> number of random details.
+        by_file: kind of appearance, such as a colour -> number of buildings for
+            which the file determines it.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -300,8 +300,9 @@ def dress_buildings(
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages; None if all do. A wall that
-            buildings among them hide from the drives gets no details.
+        always: structures that exist in all stages; None if all do. A wall gets
+            no details if buildings that exist in all stages occlude it from the
+            drives.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
@@ -453,9 +454,9 @@ class Dressing:
 
     Attributes:
         city: the city with its details.
-        origins: name of a changed or added structure -> `dressed` for one with
-            added details, or `lot` for one that was drawn at random. All other
-            structures are as in the file.
+        origins: name of a changed or added structure -> `dressed` for a
+            structure of the file with added details, or `lot` for a random
+            structure. All other structures are as in the file.
         facts: counts of details from the file and of random ones.
         bottom: structures of the guessed ground; empty if the file has a
             terrain.

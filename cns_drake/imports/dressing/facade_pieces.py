@@ -121,7 +121,7 @@ class FacadePlan:
 
     @property
     def on_street(self) -> list[Opening]:
-        """Openings at ground level; none if the wall starts above it."""
+        """Openings at ground level; none if the wall starts above ground."""
         on_ground = self.stands_on_ground
         return [o for o in self.openings if o.row == 0 and on_ground]
 
@@ -138,7 +138,7 @@ class FacadePlan:
         """Returns a point in front of each opening and of the wall's top.
 
         These are (N + 1, 3) points in W, for N openings [m]; the last one
-        belongs to the top. An opening, or the top, is hidden if the point in
+        belongs to the top. An opening, or the top, is occluded if the point in
         front of it cannot be seen.
         """
         panel = self.panel
@@ -166,13 +166,14 @@ class FacadePlan:
         return max((low if is_near else self.ground) + _THRESHOLD, 0.0)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without its hidden openings.
+        """Returns the plan without its occluded openings.
 
-        The field `top_is_free` of the result is false if the top is hidden.
+        The field `top_is_free` of the result is false if the top is occluded.
 
         Args:
             is_hidden: (N + 1,) bool, which of the points that `probes` returns
-                are hidden: those of the N openings, and last that of the top.
+                are occluded: N points of openings, and last the point of the
+                top.
         """
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(

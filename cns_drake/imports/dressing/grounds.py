@@ -133,8 +133,8 @@ def missing_sidewalks(
 ) -> Iterator[Imported]:
     """Yields sidewalks for streets whose tags do not mention sidewalks.
 
-    Only the larger streets within 80 m of a drive get them. The ground must be
-    level.
+    Only the larger streets within 80 m of a drive get sidewalks. The ground
+    must be level.
 
     Args:
         structures: structures of the city, which the sidewalks must not

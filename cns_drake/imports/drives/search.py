@@ -444,8 +444,8 @@ class Lane:
         line: (N, 2) middle of the street, in driving direction [m].
         begin: node at which the lane begins.
         end: node at which the lane ends.
-        aside: distance of the lane to the right of `line` [m]; to the left
-            where traffic keeps left.
+        aside: lateral offset of the lane from `line` [m], towards the side on
+            which traffic keeps.
         way: number of the piece of street; the lane in the opposite direction
             has the same number.
     """

@@ -62,8 +62,8 @@ _END = 0.2
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
     """Returns areas that turn steps in a carriageway's edge into tapers [m].
 
-    `carriageway` is the area of the carriageway in W. The results lie outside
-    of it.
+    `carriageway` is the area of the carriageway in W. The tapers lie outside of
+    the carriageway.
     """
     found: list[Polygon] = []
     for polygon in polygons_of(carriageway):

@@ -129,7 +129,7 @@ class BandGraph(search.WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointRoute]:
     """Returns two drives along lanes; a part of their paths is the same.
 
-    The result is one drive or an empty list if no more drives are found.
+    The list contains only one drive, or none, if no more drives are found.
     `bands` contains the lanes of the whole network, including bridges.
     """
     return search.find_drives(BandGraph(bands))

@@ -256,7 +256,7 @@ def stations(
     """Returns the places along a road that its shape needs.
 
     Between two places the road is nearly straight. A joint of two pieces of the
-    road is there twice, once for each side.
+    road is contained twice, once for each piece.
 
     Args:
         road: the road.
@@ -381,9 +381,9 @@ class RoadHeights:
     """The height of imported carriageways, and of the ground near them.
 
     At a place on a single road, the height is exact. Where roads with different
-    heights overlap in a junction, it changes gradually from one to the other
-    (Shepard's interpolation between planes with the grade and roll of the
-    roads).
+    heights overlap in a junction, the height changes gradually from one road to
+    the other (Shepard's interpolation between planes with the grade and roll of
+    the roads).
     """
 
     def __init__(self, bands: Sequence[LaneBand]):

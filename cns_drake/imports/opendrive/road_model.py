@@ -270,7 +270,8 @@ class MarkLine:
     """One line of a road mark, with its dimensions from the file.
 
     Attributes:
-        aside: distance from the border of the lane, positive to the left [m].
+        aside: lateral offset from the border of the lane, positive to the left
+            [m].
         start: distance from the start of the mark to the first dash [m].
         dash: length of a dash [m].
         gap: length of the gap after a dash [m]; 0 for a continuous line.
@@ -377,7 +378,7 @@ class Thing(NamedTuple):
         swept: (2, 5) s, t, height of the foot above the road, width and height
             [m] at both ends of an object without gaps along the road, such as a
             wall; None for other objects.
-        is_dynamic: whether its state can change, as that of a traffic light.
+        is_dynamic: whether the state can change, as for a traffic light.
         faces_back: whether it is for traffic against the direction of the road.
     """
 

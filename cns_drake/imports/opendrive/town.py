@@ -405,10 +405,11 @@ def build_town(
     Args:
         source: the file.
         options: `seed` of all random draws; `dressed`: whether to paint the
-            road marks of the file; `grow`: the share of the buildings that the
-            first stage lacks, those in the east; `within`: the greatest
+            road marks of the file; `grow`: the share of the buildings, those in
+            the east, that the first stage lacks; `within`: the greatest
             distance of structures from the drives [m].
-        own: drives that replace those that are proposed; None for these.
+        own: drives that replace the proposed drives; None to use the proposed
+            drives.
 
     Raises:
         InputError: the file cannot be used, or no drive was found for `within`.

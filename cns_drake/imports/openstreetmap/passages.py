@@ -71,7 +71,7 @@ class Passage(NamedTuple):
 def is_tunnel(tags: Tags) -> bool:
     """Returns whether a way is below the ground or in a mountain.
 
-    Passages through buildings are not.
+    Passages through buildings are no tunnels.
     """
     is_below = tags.get("layer", "").startswith("-")
     return has_tag(tags, "tunnel") and (
@@ -225,9 +225,9 @@ class WayOpenings:
     ) -> BaseGeometry:
         """Returns the areas of the ways that lead through a barrier, in W.
 
-        A way leads through it at a common node. Both openings and ways that
-        cross the barrier without a common node are counted in `faults`.
-        `course` is the line of the barrier in W [m].
+        A way leads through the barrier at a node that both have. Both openings
+        and ways that cross the barrier without a common node are counted in
+        `faults`. `course` is the line of the barrier in W [m].
         """
         on_it = self._crossings(barrier, shapely.get_coordinates(course))
         edges = {frozenset(pair) for pair in pairwise(barrier.nodes)}
