@@ -1,22 +1,22 @@
 """BEVPlace (Luo et al.: ICCV 2023), with the weights of its authors.
 
 A scan becomes a bird's-eye image that counts voxels, see
-`evaluation.clouds.count_images`. The image is turned by five angles and reduced
-to five scales. A small network describes each of these 25 images at each point
-of a grid. A second network then combines the 25 descriptors of a point into one
-that depends little on the heading. A NetVLAD layer (Arandjelovic et al.: CVPR
-2016) sums all points up in one descriptor of the image, of 8192 numbers. The
-score of two scans is the negative distance of their descriptors. The method
-estimates no pose.
+`evaluation.clouds.count_images`. The image is rotated by five angles and
+reduced to five scales. A small network describes each of these 25 images at
+each point of a grid. A second network then combines the 25 descriptors of a
+point into one that depends little on the heading. A NetVLAD layer (Arandjelovic
+et al.: CVPR 2016) sums all points up in one descriptor of the image, of 8192
+numbers. The score of two scans is the negative distance of their descriptors.
+The method estimates no pose.
 
 The architecture is reimplemented from the paper and the authors' program (MIT
 licence); no weights are shipped. With the same weights, the descriptors of
-images of KITTI differ from those of the program by less than 1e-4, in units of
-their length. Deliberate differences:
+images of KITTI differ from the program's descriptors by less than 1e-4 of their
+length. Deliberate differences:
 
-- The image of a scan is made as `count_image` says.
-- An image without pixels has no descriptor; it is never a candidate, and has
-  none.
+- `evaluation.clouds.count_images.count_image` makes the image of a scan.
+- An image without pixels has no descriptor. A place with such an image is never
+  a candidate, and a query with such an image has no candidates.
 """
 
 from collections.abc import Iterator

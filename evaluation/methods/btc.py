@@ -5,7 +5,8 @@ occupied heights above them are a binary descriptor. Triangles of nearby
 keypoints do not change when the sensor moves: a place is a candidate if its
 cloud and the query's share enough triangles with similar sides and similar
 descriptors at their vertices. A candidate counts if its triangles agree on a
-motion; its score is the fit of both clouds' planes under that motion.
+motion. The score is the share of the query's planes that match planes of the
+candidate under this motion.
 
 A cloud consists of several consecutive scans, in the frame of one of these
 scans. (The method's authors describe all clouds in one world frame. This
@@ -154,7 +155,7 @@ class BtcConfig(MethodConfig):
 
 @dataclass(frozen=True)
 class BtcDescription:
-    """The description of a cloud.
+    """The descriptor of a cloud.
 
     Attributes:
         planes: patches of planes, one for each voxel.
@@ -167,10 +168,10 @@ class BtcDescription:
 
 @dataclass(frozen=True)
 class BtcDatabase:
-    """Descriptions of D places, prepared for the search.
+    """Descriptors of D places, prepared for the search.
 
     Attributes:
-        places: descriptions of the places.
+        places: descriptors of the places.
         table: triangles of all places.
     """
 
@@ -344,14 +345,14 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Returns the motion that best aligns triangles with their partners.
 
-    It is Kabsch's solution, without reflections.
+    The motion is Kabsch's solution, without reflections.
 
     Args:
         query: (..., 3, 3) vertices, one in each row [m].
         place: (..., 3, 3) the partners of these vertices [m].
 
     Returns:
-        (..., 4, 4) pose X_PQ of the query's frame in that of the place.
+        (..., 4, 4) pose X_PQ of the query's frame Q in the place's frame P.
     """
     query_mean = query.mean(axis=-2)
     place_mean = place.mean(axis=-2)
@@ -409,7 +410,7 @@ def plane_overlap(
     Args:
         query: patches of the query, at least one.
         place: patches of the place, at least one.
-        X_PQ: (4, 4) the query's frame in that of the place.
+        X_PQ: (4, 4) pose of the query's frame Q in the place's frame P.
         normal_limit: upper limit of the length of the difference of the two
             unit normals; either sign of a normal will do.
         distance_limit: upper limit of a centre's distance from the plane of the

@@ -87,15 +87,16 @@ def base_plane(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Returns the largest plane that the patches form; outdoors, the ground.
 
-    Similar patches are merged into larger planes, and patches without a similar
-    one are dropped. Then similar planes are merged with each other.
+    Similar patches are merged into larger planes, and patches to which no other
+    patch is similar are dropped. Then similar planes are merged with each
+    other.
 
     Args:
         planes: patches, one for each voxel.
         normal_limit: greatest length of the difference between the unit normals
             of two similar patches. The sign of a normal does not matter.
         distance_limit: greatest distance between the center of a patch and the
-            plane of a similar one [m].
+            plane of a similar patch [m].
 
     Returns:
         Center (3,) and normal (3,) of the plane, pointing up; None if no

@@ -1,9 +1,10 @@
 """Keypoints of a cloud, their triangles, and the search for similar ones.
 
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of a plane,
-the cloud is an image; each of its cells has bits for the heights above the
-plane that have points. Cells with many heights (walls, trunks, posts) are the
-keypoints, unless they are part of a line of such cells.
+the cloud is an image. Each cell of the image has one bit for each layer of
+height above the plane, which is set if the layer contains points. Cells with
+many heights (walls, trunks, posts) are the keypoints, unless they are part of a
+line of such cells.
 """
 
 from __future__ import annotations

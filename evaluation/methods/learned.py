@@ -1,9 +1,10 @@
 """A learned descriptor: a small network on polar images, trained in simulation.
 
 Convolutions that are circular in azimuth turn the polar image of a scan into a
-map of features, 8 rings x 48 sectors x 16. Two scans are compared by the
-correlation of their maps at the best turn, which is also the heading. The
-network has never seen a recorded scan: `cns-drake train` makes its weights.
+map of features, 8 rings x 48 sectors x 16 channels. Two scans are compared by
+the greatest correlation of their maps over all rotations. The rotation with
+this correlation is the relative heading. The network has never seen a recorded
+scan: `cns-drake train` makes its weights.
 
 Related methods: OverlapNet (Chen et al., RSS 2020) and DiSCO (Xu et al., RA-L
 2021) also correlate over headings.
@@ -68,7 +69,7 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
     """Returns the polar image of a scan.
 
     The image shows the scan from above. Its rows are rings around the sensor,
-    and its columns are sectors. A turn of the sensor by a whole number of
+    and its columns are sectors. A rotation of the sensor by a whole number of
     sectors only shifts the columns.
 
     Args:
@@ -120,7 +121,7 @@ class LearnedConfig(MethodConfig):
             shipped weights of the variant.
         variant: which shipped weights to use. With `radius`, the network was
             trained on streets of the shipped cities, and every place within 7.5
-            m of a query counted as right. With `graded`, it was trained on
+            m of a query was a match. With `graded`, the network was trained on
             other streets, and the places of a query were ranked by their exact
             overlap.
     """
@@ -238,7 +239,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         """Returns the query's heading relative to a place, as a pose (4, 4).
 
         The heading is a multiple of 3.75 deg; the translation is zero. The
-        result is None if one of the two scans has no points within reach.
+        result is None if one of the two scans has no points within range.
         """
         if not (query.features.any() and database.filled[place]):
             return None

@@ -1,9 +1,9 @@
 """MapClosures (Gupta et al., ICRA 2024), from its own package.
 
-A local map becomes an image of density from above. ORB keypoints of two images
-that agree on a motion in the plane are inliers; their number is the score. The
-package `map-closures` does all of this. It is an optional extra, because it
-needs an older NumPy.
+A local map becomes a bird's-eye image of density. ORB keypoints of two images
+that agree on a motion in the plane are inliers; the number of inliers is the
+score. The package `map-closures` does all of this. The package is an optional
+extra, because it needs an older NumPy.
 
 A query is compared with all places of the database.
 """
@@ -76,7 +76,7 @@ class MapClosuresDatabase:
 
 @register("map-closures")
 class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
-    """MapClosures, by its own package.
+    """MapClosures, computed by the package of its authors.
 
     Descriptors are downsampled local maps (N, 3). A local map of 200 scans
     covers about 50 m of path in front and behind, at 10 m/s and 20 scans per

@@ -75,16 +75,17 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         scans_per_place: number of consecutive scans that are merged into the
             described cloud. The cloud is in the frame of the scan that stands
             for the place.
-        point_fields: additional fields of points that it needs, such as
+        point_fields: additional fields of points that the method needs, such as
             intensity, ring, t or label.
         batch_size: number of clouds for one call of `describe_batch`.
         skips_places: whether scores may be NaN (no candidate) even if every
             place is compared (`exhaustive`). If false, such a NaN is an error.
         sees_images: whether the method can compare bird's-eye images, of which
             each pixel is a column of points (see
-            `evaluation.clouds.count_images`). It may then use where points are
-            seen from above and how many are above each other, but not what
-            only a scan has, such as planes or angles of beams.
+            `evaluation.clouds.count_images`). Such a method may use the
+            horizontal positions of points, and how many points lie above each
+            other, but not what only a scan has, such as planes or angles of
+            beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
         divides: whether a database can be searched part by part, because it is
@@ -220,7 +221,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
         The entries may be places, or several for each place. Of all parts, the
         search compares the `num_shortlisted` best ones, see `score_best`. A
-        method that `divides` and has a search must have both functions.
+        method that `divides` and has a search must define both `shortlist` and
+        `score_best`.
 
         Returns:
             (K,) decreasing, K at most `num_shortlisted`.
@@ -235,8 +237,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: see `score`.
             database: part of a database, made by `build_database`.
-            number: how many of the entries of `shortlist` are compared, the
-                first ones.
+            number: number of entries of `shortlist` that are compared, from the
+                first entry on.
         """
         raise NotImplementedError
 
@@ -313,7 +315,7 @@ def check_number(
 def yaw_pose(
     yaw: float, x: float = 0.0, y: float = 0.0, z: float = 0.0
 ) -> np.ndarray:
-    """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
+    """Returns a pose (4, 4) from a yaw [rad] and a translation [m]."""
     c, s = math.cos(yaw), math.sin(yaw)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return make_pose(R, np.array([x, y, z]))

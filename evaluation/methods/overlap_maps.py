@@ -1,4 +1,4 @@
-"""Maps of layered overlap: drawn from scans, and compared.
+"""Makes the maps of layered overlap from scans, and compares them.
 
 Once the cells are known, all arithmetic is in integers: sines and cosines are
 in units of 2^-14, positions in half cells. Counts are therefore the same on
@@ -166,7 +166,7 @@ def _poles(is_tall: np.ndarray) -> np.ndarray:
 
 
 def turns(number: int) -> np.ndarray:
-    """Returns the cosines and sines of H angles that divide a turn evenly.
+    """Returns the cosines and sines of H angles that divide 360 deg evenly.
 
     Args:
         number: H.
@@ -189,18 +189,18 @@ def coarse_maps(
     halvings: int,
     maps: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns coarse occupancy maps of a scan, turned to several headings.
+    """Returns coarse occupancy maps of a scan, rotated to several headings.
 
     Args:
         cells: (M,) uint16 occupied cells of all layers, see `layer_cells`.
         starts: (layers + 1,) index in `cells` at which each layer begins; the
             last entry is M.
         turns: (H, 2) int64 cosines and sines of the angles by which the scan is
-            turned about the sensor, in units of 2^-14.
+            rotated about the sensor, in units of 2^-14.
         halvings: how often the number of rows and columns is halved; at least
             2, since a row must fit into 64 bits.
-        maps: (layers,) int64, number of the map, from 0 to S - 1, into which
-            each layer is drawn.
+        maps: (layers,) int64, number of the map, from 0 to S - 1, that contains
+            each layer.
 
     Returns:
         (H, R, S) uint64, the R rows of the S maps at each heading; bit k of a
@@ -244,8 +244,8 @@ def best_overlaps(
     weighted number of bits that are set in the maps of both scans.
 
     Args:
-        queries: (H, R, S) uint64 maps of the query, at H headings in equal
-            steps of a full turn.
+        queries: (H, R, S) uint64 maps of the query, at H headings that divide
+            360 deg evenly.
         places: (D, R + 2 * margin, S) uint64 maps of the places, with `margin`
             empty rows before and after their own.
         weights: (S,) int64 weight of a bit of each map.
@@ -310,23 +310,25 @@ def climb(
 ) -> np.ndarray:
     """Returns the pose at which a query overlaps a place most.
 
-    A cell of the query overlaps the place if it meets a cell of the same layer,
-    or a neighbour of one. The search is hill climbing: it moves to the best of
-    the 26 neighbours of a pose until none is better, then continues with
-    smaller steps.
+    A filled cell of the query overlaps the place if the place has a filled cell
+    there, or next to it, in the same layer. The search is hill climbing: it
+    moves to the best of the 26 neighbours of a pose until none is better, then
+    continues with smaller steps.
 
     Args:
         cells: (M,) uint16 of the query, see `layer_cells`.
-        starts: (layers + 1,) where its layers begin.
+        starts: (layers + 1,) index in `cells` at which each layer begins; the
+            last entry is M.
         place_cells: (N,) uint16 of the place.
-        place_starts: (layers + 1,) starts of the place's layers in
-            `place_cells`.
+        place_starts: (layers + 1,) index in `place_cells` at which each layer
+            begins; the last entry is N.
         weights: (layers,) int64 weight of a common cell in each layer.
-        turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
-        start: (3,) int64: the turn, and the shifts along rows and along columns
-            in half cells, from which the search starts.
-        steps: (K, 2) int64: steps of the turn and of the shifts, from coarse to
-            fine. Those of the shifts are even.
+        turns: (H, 2) int64 cosines and sines of H angles that divide 360 deg
+            evenly.
+        start: (3,) int64 initial pose: index of the angle in `turns`, and the
+            shifts along rows and along columns in half cells.
+        steps: (K, 2) int64 steps of the angle's index and of the shifts, from
+            coarse to fine. The steps of the shifts are even.
 
     Returns:
         (3 + layers,) int64: the pose, and how many of the query's cells overlap

@@ -2,9 +2,9 @@
 
 A scan becomes two polar images: one of the greatest heights and one of
 occupancy. The sensor's displacement between query and place is modelled by a
-normal distribution. In polar coordinates it blurs the occupancy along the
-rings, less so at larger range, and across them. The blurred occupancy is the
-probability that a cell has a point.
+normal distribution. In polar coordinates, this distribution blurs the occupancy
+across the rings, and along the rings, there less so at larger range. The
+blurred occupancy is the probability that a cell has a point.
 
 The heights give the rotation between two scans, and a first similarity: their
 cosine at this rotation. The probabilities are moved towards 1/2 where they are

@@ -1,11 +1,11 @@
 """RING++ (Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023).
 
-A scan becomes a map from above with six channels that describe the shape of the
-cloud. Its Radon transform turns a rotation into a shift of its rows; the
-magnitude of each row's spectrum does not change if the scan is moved. Two scans
-are similar if these spectra correlate well at some shift of the rows. This
-shift is also the difference in heading. Once the heading is known, the
-correlation of the maps from above gives the translation.
+A scan becomes a bird's-eye map with six channels that describe the shape of the
+cloud. In the Radon transform of this map, a rotation of the scan is a shift of
+rows; the magnitude of each row's spectrum does not change if the scan is moved.
+Two scans are similar if these spectra correlate well at some shift of the rows.
+This shift is also the difference in heading. Once the heading is known, the
+correlation of the bird's-eye maps gives the translation.
 """
 
 from __future__ import annotations
@@ -411,13 +411,13 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
 def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns six numbers that describe the shape of a cloud at each point.
 
-    They are a selection of the hand-made features of LPD-Net (Liu et al., ICCV
-    2019). Let l1 >= l2 >= l3 be the eigenvalues of the covariance of a point's
-    neighbours, s their sum, and m1 >= m2 the eigenvalues of its horizontal
-    part. The features are change of curvature l3 / s; omnivariance (l1 l2
-    l3)^(1/3) / s; entropy of the eigenvalues, -sum (li / s) ln (li / s);
-    horizontal roundness m2 / m1 (there called linearity); range and variance of
-    z.
+    The numbers are a selection of the hand-made features of LPD-Net (Liu et
+    al., ICCV 2019). Let l1 >= l2 >= l3 be the eigenvalues of the covariance of
+    a point's neighbours, s their sum, and m1 >= m2 the eigenvalues of its
+    horizontal part. The features are change of curvature l3 / s; omnivariance
+    (l1 l2 l3)^(1/3) / s; entropy of the eigenvalues, -sum (li / s) ln (li / s);
+    horizontal roundness m2 / m1 (which LPD-Net calls linearity); range and
+    variance of z.
 
     If the neighbours lie in a plane or on a line, the limits of the formulas
     are used (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).

@@ -6,9 +6,9 @@ are means of this image. The retrieval key, which does not change with heading
 (or lane offset), finds candidates in a KD-tree. The aligning key gives the
 shift of the columns at which two images are compared.
 
-The polar context looks different from the next lane. The augmented variant
-therefore stores each place of the database three times: as seen, and as if seen
-from 2 m to either side.
+The polar context of a place changes if the place is seen from the next lane.
+The augmented variant therefore stores each place of the database three times:
+as seen, and as if seen from 2 m to the left and to the right.
 
 The defaults are those of the authors' T-RO program. On the same downsampled
 scans, scores agree with those of this program to 1e-15 for all variants except
@@ -249,8 +249,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
 
         Polar contexts give the heading; the lateral offset is zero, or that of
         the augmented copy that fits best. Cartesian contexts give the lateral
-        offset; the heading is zero, or half a turn if the augmented copy fits
-        best. The result is None if no column is filled in both contexts.
+        offset; the heading is zero, or 180 deg if the augmented copy fits best.
+        The result is None if no column is filled in both contexts.
         """
         chosen = np.flatnonzero(database.places == place)
         similarities, shifts = self._compare(query, database, chosen)

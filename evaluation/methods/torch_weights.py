@@ -1,10 +1,10 @@
 """Weights that PyTorch has saved, read without PyTorch.
 
 A file of `torch.save` is an archive with a pickle and the numbers of each
-tensor. An unpickler can run any code, and a small pickle can make it fill the
-memory. This reader runs the instructions of a pickle itself: each makes at most
-one small object, nothing is called, and numbers are read only for the tensors
-that are wanted.
+tensor. An unpickler can run any code, and can fill the memory when it reads a
+small pickle. This reader runs the instructions of a pickle itself: each makes
+at most one small object, nothing is called, and numbers are read only for the
+tensors that are wanted.
 """
 
 from collections.abc import Iterator, Mapping

@@ -164,7 +164,7 @@ class ExtractedFeatures:
 
     Attributes:
         placed: names of the drive, its world frame and its map.
-        described: key of a method -> its descriptions of the places and
+        described: key of a method -> its descriptors of the places and
             queries; empty if the drive has neither.
         scans: scans of places and queries; None if they are not kept. If there
             is a map, this is a `KeptScans` with the recorded scans. Otherwise
@@ -184,8 +184,8 @@ class ExtractedFeatures:
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
     """Returns the key in `ExtractedFeatures.described` for a second protocol.
 
-    A method's descriptions by the study's own protocol have the key of the
-    method. Use this function for its descriptions by any other protocol.
+    A method's descriptors by the study's own protocol have the key of the
+    method. Use this function for its descriptors by any other protocol.
 
     Args:
         method: key of the method.
@@ -319,7 +319,7 @@ def _described(
 class FeatureExtraction(Step):
     """A job step that reads a drive once and writes the files that are missing.
 
-    The files contain the drive's map and descriptions of its places and
+    The files contain the drive's map and descriptors of its places and
     queries.
 
     Attributes:
@@ -331,8 +331,8 @@ class FeatureExtraction(Step):
         with_scans: whether to keep the scans of places and queries.
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
-        further: methods with descriptions by a second protocol, if any.
-        spends: whether descriptions are removed once results were made from
+        further: methods with descriptors by a second protocol, if any.
+        spends: whether descriptors are removed once results were made from
             them. If new results need them, they are made again.
     """
 
@@ -395,7 +395,7 @@ class FeatureExtraction(Step):
 
     @property
     def _asked(self) -> dict[str, Further]:
-        """Name of each description -> method, roles and protocol."""
+        """Name of each descriptor -> method, roles and protocol."""
         asked = {
             one.key: (one, self.roles, self.protocol) for one in self.methods
         }

@@ -51,7 +51,7 @@ class Searched(NamedTuple):
     rows: np.ndarray
 
 
-# The source of a drive, or the parts of its scans and of its descriptions by
+# The source of a drive, or the parts of its scans and of its descriptors by
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
@@ -78,12 +78,12 @@ def shown_overlaps(
         reporter: unused.
         scans: files with the scans of database and query: a `KeptScans`, or a
             list of them.
-        described: files with a method's descriptions of both, for the poses.
+        described: files with a method's descriptors of both, for the poses.
         choice: the method.
         protocol: protocol by which the queries are shown.
         radii: radii of a match [m].
         beside: files with the scans of further drives in the same world, and
-            with a method's descriptions of their places.
+            with a method's descriptors of their places.
         leaves_out_itself, keep: see `Pair`.
 
     Returns:
@@ -163,16 +163,16 @@ def measure_method(
 
     Args:
         reporter: reports notes.
-        database, query: files with the method's descriptions of the places and
+        database, query: files with the method's descriptors of the places and
             of the queries.
         distractors: for each drive through another city, the file with the
-            method's descriptions of its places.
+            method's descriptors of its places.
         num_distractors: see `measure_places`.
         choice: the method.
         overlaps: file with the result of `shown_overlaps`; None to leave
             overlaps unknown.
         protocol, radii: see `measure_places`.
-        beside: files with the method's descriptions of the places of further
+        beside: files with the method's descriptors of the places of further
             drives in the same world.
         leaves_out_itself, keep: see `Pair`.
     """
@@ -224,10 +224,10 @@ def measure_places(
         reporter: reports progress.
         database: the drive of the places: either the source from which its
             scans are read, or the files that already contain its scans and each
-            method's descriptions of them.
+            method's descriptors of them.
         query: the drive of the queries, in the same world, like `database`.
         distractors: for each drive through another city, and for each method,
-            the file with the method's descriptions of its places.
+            the file with the method's descriptors of its places.
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.
@@ -405,12 +405,12 @@ def crowded(
     there are fewer.
 
     Args:
-        database: a drive, with a method's descriptions of its places, or the
+        database: a drive, with a method's descriptors of its places, or the
             file with it.
         distractors: for each drive through another city, the file with the
-            same method's descriptions of its places.
+            same method's descriptors of its places.
         num_others: number of places to append.
-        beside: files with the same method's descriptions of further drives in
+        beside: files with the same method's descriptors of further drives in
             the same world, from older to newer. All of their places come before
             those of other cities.
         keep: which places in this world are kept, see `kept_places`.
@@ -456,5 +456,5 @@ def crowded(
 
 
 def _described_in(source: DriveDescriptors | Part) -> DriveDescriptors:
-    """Returns a drive with a method's descriptions, which a file may hold."""
+    """Returns a drive with a method's descriptors, which a file may hold."""
     return source.read()[1] if isinstance(source, Part) else source

@@ -32,7 +32,7 @@ def measure_method_costs(
         summary: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
         methods: the methods.
-        described: files with the descriptions of a database, and of the
+        described: files with the descriptors of a database, and of the
             queries, one for each method.
         protocol: protocol of the comparison.
     """

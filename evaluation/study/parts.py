@@ -521,7 +521,7 @@ class FeatureFiles:
     """The files (`Part`) with all that a study needs of a recording.
 
     These are the drive's poses and map, its scans at places and queries, and,
-    in one file for each method, the descriptions of these scans.
+    in one file for each method, the descriptors of these scans.
 
     Attributes:
         folder: folder of the files.
@@ -549,19 +549,19 @@ class FeatureFiles:
         return Part(self.folder / "scans.data")
 
     def described(self, key: str) -> Part:
-        """Returns the file with a method's descriptions of the drive.
+        """Returns the file with a method's descriptors of the drive.
 
         The file contains a `DriveNames` and a `DriveDescriptors`.
 
         Args:
-            key: `MethodChoice.key` of the method. For descriptions by a second
+            key: `MethodChoice.key` of the method. For descriptors by a second
                 protocol, what `described_key` of
                 `evaluation.study.feature_extraction` returns.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
     def spend(self) -> None:
-        """Removes all descriptions, once results were made from them.
+        """Removes all descriptors, once results were made from them.
 
         They take three quarters of the space; see `Part.spend`.
 

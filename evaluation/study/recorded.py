@@ -200,7 +200,7 @@ class ExtractionJobs(Jobs):
 
     Attributes:
         with_map: whether a map is made.
-        further: drive -> descriptions by a second protocol.
+        further: drive -> descriptors by a second protocol.
     """
 
     with_map: bool = True

@@ -34,7 +34,7 @@ class Repeat:
     shares_places: bool
 
     def described(self, role: Role) -> str:
-        """Returns the key of the method's descriptions of places or queries."""
+        """Returns the key of the method's descriptors of places or queries."""
         if role == "places" and self.shares_places:
             return self.method.key
         return described_key(self.method.key, self.protocol)
@@ -61,7 +61,7 @@ class Repeat:
 
 @dataclass
 class _RepeatJobs(Jobs):
-    """Jobs that read descriptions, which jobs of the first runs make.
+    """Jobs that read descriptors, which jobs of the first runs make.
 
     The overlaps of queries with their matches stay unknown.
     """

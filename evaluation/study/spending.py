@@ -1,6 +1,6 @@
-"""Removes descriptions that no result needs any more, and makes them again.
+"""Removes descriptors that no result needs any more, and makes them again.
 
-Descriptions take three quarters of the space of a study. They are needed only
+Descriptors take three quarters of the space of a study. They are needed only
 until results were made from them.
 """
 
@@ -15,7 +15,7 @@ from evaluation.study.parts import MakePart, Part
 
 
 def spend(jobs: Iterable[Job]) -> None:
-    """Removes descriptions where `FeatureExtraction.spends` says so.
+    """Removes descriptors where `FeatureExtraction.spends` says so.
 
     All jobs must be done.
 
@@ -28,7 +28,7 @@ def spend(jobs: Iterable[Job]) -> None:
 
 
 def restore(jobs: Collection[Job]) -> None:
-    """Has removed descriptions made again that results to come need.
+    """Has removed descriptors made again that results to come need.
 
     Args:
         jobs: all jobs of a study, each behind those that it needs.

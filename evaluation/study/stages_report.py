@@ -180,7 +180,7 @@ class StagesReport:
     ) -> Path:
         """Writes the report, once all jobs are done.
 
-        The inputs of the report are kept, except descriptions of places, which
+        The inputs of the report are kept, except descriptors of places, which
         take most of the space. They are made again if new results need them.
 
         The report consists of these files:
@@ -335,7 +335,7 @@ class _CityReport:
         return self._measured.get((pair[0].name, pair[1].name, stage))
 
     def _further(self) -> dict[str, tuple[Further, ...]]:
-        """Returns drive -> its descriptions that second runs need."""
+        """Returns drive -> its descriptors that second runs need."""
         roles: dict[str, dict[Repeat, set[Role]]]
         roles = defaultdict(lambda: defaultdict(set))
         for (database, query), repeats in self._repeats.items():

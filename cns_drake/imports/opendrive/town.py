@@ -625,8 +625,8 @@ def _kinds(
         "objects": sum("object" in one.tags for one in things),
         "bridges": sum(one.semantic_class == "road" for one in decks),
         "roads with marks": len(marks),
-        "buildings, drawn at random": drawn["building"],
-        "plants, drawn at random": drawn["vegetation"],
+        "buildings, sampled at random": drawn["building"],
+        "plants, sampled at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
 
@@ -672,7 +672,7 @@ def write_town(
             "stages": {name: plan.story for name, plan in stages.items()},
         },
         town.faults,
-        "# Where the roads of this map come from; all else is drawn at random."
+        "# Where the roads of this map come from; all else is random."
         "\n# A place of the map plus the origin is one of the source [m].\n",
     )
     map_files.write_drives(

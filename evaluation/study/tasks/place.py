@@ -227,15 +227,15 @@ def measure_costs(
 
     Args:
         reporter: reports progress.
-        database, query: files with the descriptions of places and of queries,
+        database, query: files with the descriptors of places and of queries,
             one file for each method.
         distractors: for each drive through another city, files with the
-            descriptions of its places, one file for each method.
+            descriptors of its places, one file for each method.
         num_distractors: number of places of the drives through other cities
             that are added to the database.
         methods: methods to measure.
         beside: for each further drive in the same world, files with the
-            descriptions of its places, one file for each method.
+            descriptors of its places, one file for each method.
         keep, cell: which places in this world are kept, see
             `evaluation.recognition.keeping.kept_places`.
     """

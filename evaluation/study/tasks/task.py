@@ -198,8 +198,8 @@ class Pair:
 class Jobs:
     """The jobs of a study, and the data from which they are made.
 
-    If several pairs of drives need the descriptions of the same drive, one job
-    writes these descriptions to files.
+    If several pairs of drives need the descriptors of the same drive, one job
+    writes these descriptors to files.
 
     Attributes:
         files: paths of the study's files.
@@ -228,14 +228,14 @@ class Jobs:
     notes: dict[str, None] = field(default_factory=dict)
     radii: dict[str, set[float]] = field(default_factory=dict)
     processes: int = 1
-    # Description -> keys of the pairs that need it.
+    # Descriptor -> keys of the pairs that need it.
     _uses: dict[str, set[str]] = field(default_factory=dict)
 
     def expect(self, pair: Pair) -> None:
         """Registers a pair of drives.
 
         Register all pairs before you call `described`, which must know how many
-        pairs need the descriptions of a drive.
+        pairs need the descriptors of a drive.
         """
         self.radii.setdefault(pair.key, set()).add(pair.protocol.radius)
         for drive, role in pair.roles:
@@ -251,12 +251,12 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns where a job gets the descriptions of a drive's scans from.
+        """Returns where a job gets the descriptors of a drive's scans from.
 
-        If several pairs need the descriptions, this function adds a job that
+        If several pairs need the descriptors, this function adds a job that
         writes them, and returns the files: first the file with the scans, then
         one for each method. If only one pair needs them, the function returns
-        the source of the drive, and the job of this pair makes the descriptions
+        the source of the drive, and the job of this pair makes the descriptors
         itself.
 
         Args:
@@ -340,7 +340,7 @@ class Jobs:
     def distractor_places(
         self, pair: Pair, needs: list[str]
     ) -> tuple[tuple[Part, ...], ...]:
-        """Returns descriptions of drives through other cities, for a pair.
+        """Returns descriptors of drives through other cities, for a pair.
 
         Places of these drives are distractors: they enlarge the database.
 
@@ -351,7 +351,7 @@ class Jobs:
 
         Returns:
             For each drive through another city, one file per method with the
-            descriptions of its places.
+            descriptors of its places.
         """
         if not pair.distractors:
             return ()
