@@ -157,8 +157,8 @@ def describe_drive(
             to describe, and a protocol.
 
     Returns:
-        One descriptor for each method, followed by one for each entry of
-        `further`.
+        One `DriveDescriptors` for each method, followed by one for each entry
+        of `further`.
 
     Raises:
         InputError: if the drive cannot be read, it lacks a field that a method
@@ -203,8 +203,8 @@ class _Seen:
     def sensor(self, protocol: RetrievalProtocol) -> QuerySensor | None:
         """Returns how a protocol changes the sensor of a query at this frame.
 
-        The sensor can be turned, tilted and partly hidden. The result is None
-        if it stays as recorded.
+        The sensor can be rotated, tilted and partly occluded. The result is
+        None if it stays as recorded.
         """
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)
@@ -219,8 +219,8 @@ class _Seen:
         (N,). A second call with equal arguments returns the same array.
 
         Args:
-            sensor: sensor that replaces the recorded one in a query, turned or
-                with a hidden sector; None for the sensor as recorded.
+            sensor: sensor that replaces the recorded sensor in a query, rotated
+                or with an occluded sector; None for the sensor as recorded.
             kind: number of consecutive scans to merge, how many of these come
                 before the frame, and names of the additional fields.
             max_range: greatest absolute x, y and z of a point [m].

@@ -45,19 +45,19 @@ class PairEvidence:
     Attributes:
         overlaps: (Q,) share of the query's scan that the right place's scan
             shows; NaN without a match.
-        hidden_shares: (Q,) share of the query's scan that is hidden from the
+        hidden_shares: (Q,) share of the query's scan that is occluded for the
             right place's sensor; NaN without a match.
         changed: (Q,) share of upright points that show a change, among all
             upright points of the query and its right place. A point shows a
-            change if it is not hidden from the sensor of the other scan, but
-            that scan has no point on the same structure. NaN without a match,
-            or if a recording does not name its structures.
+            change if it is not occluded for the sensor of the other scan, but
+            the other scan has no point on the same structure. NaN without a
+            match, or if a recording does not name its structures.
         changed_classes: for each query, the class of structures with most of
             the points counted in `changed`; "" if there are none.
         right_fits: (Q,) share of upright points that coincide when the scans of
             the query and its right place are aligned: the share of the query's
-            points or of the place's, whichever is less. NaN if `fits` is NaN
-            for every method.
+            points or the share of the place's points, whichever is less. NaN if
+            `fits` is NaN for every method.
         fits: method -> (Q,) the same share for the query and its wrong
             top-ranked place; NaN if the top-ranked place is right, or at most
             twice the protocol's radius away.

@@ -22,7 +22,7 @@ def checked_keep(value: Any, where: str) -> str | int:
         where: file and field, for errors.
 
     Raises:
-        InputError: it is anything else.
+        InputError: the value is anything else.
     """
     is_number = type(value) is int and 1 <= value <= _MOST
     if not (is_number or value in (KEEP_ALL, KEEP_LATEST)):
@@ -47,9 +47,9 @@ def kept_places(
             which they were driven.
         drives: (D,) number of the drive of each place; drives with greater
             numbers are later.
-        keep: `all` places; in each cell, all places of the `latest` drive
-            through it; or the number of places that are kept in each cell, the
-            latest ones.
+        keep: `all` keeps every place. `latest` keeps, in each cell, the places
+            of the latest drive through the cell. A number N keeps the latest N
+            places in each cell.
         cell: side of a cell [m].
     """
     if keep == KEEP_ALL or len(p_WPs) == 0:

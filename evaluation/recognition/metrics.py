@@ -315,7 +315,7 @@ def own_samples(
 
     Args:
         outcomes: outcomes of the queries.
-        seed: seed of the draws.
+        seed: seed of the random sampling.
     """
     weights = resampled_weights(len(outcomes), seed, outcomes.blocks)
     return resampled_metrics(outcomes, weights)
@@ -365,7 +365,7 @@ def bootstrap_intervals(
 
     Args:
         outcomes: outcomes of the queries.
-        seed: seed of the draws.
+        seed: seed of the random sampling.
     """
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN

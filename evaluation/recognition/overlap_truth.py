@@ -1,9 +1,10 @@
-"""Truth by overlap: the share of a query's scan that a place's scan shows.
+"""Ground truth by overlap: how much of a query's scan a place's scan shows.
 
 Poses are exact. A point of the query's scan counts as shown if it lies on a
 surface of the place's scan, see `evaluation.recognition.seen_surfaces`. The
 overlap is the share of the query's points that are shown. Points that were
-hidden from the place's sensor, or absent when it passed, are not shown.
+occluded for the place's sensor, or absent when the sensor passed, are not
+shown.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.

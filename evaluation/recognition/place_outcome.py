@@ -54,9 +54,9 @@ _HALF = 0.5
 class PlaceOutcome:
     """The answers of a method to the queries of a drive, and which are right.
 
-    All numbers, tables and pages of place recognition are made from it. It
-    holds the top-ranked places of each query instead of the scores of all
-    places.
+    All numbers, tables and pages of place recognition are made from objects of
+    this class. An object holds the top-ranked places of each query instead of
+    the scores of all places.
 
     Attributes:
         method: name of the method, with its settings if it has any.
@@ -518,8 +518,8 @@ def kept_share(
 ) -> np.ndarray:
     """Returns `changed` / `unchanged`, NaN where `unchanged` is 0 or NaN.
 
-    For a result with a change and the same result without it, the quotient is
-    the share of the result that the change leaves.
+    If `changed` is a result under a change, and `unchanged` the same result
+    without the change, the quotient is the retained share.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.divide(changed, unchanged)

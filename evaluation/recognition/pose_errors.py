@@ -25,8 +25,8 @@ class PoseErrors:
     Attributes:
         translation: (Q,) distance to the ground-truth position [m]; NaN without
             a candidate or a pose.
-        rotation_deg: (Q,) angle to the true orientation [deg]; NaN without a
-            candidate or a pose.
+        rotation_deg: (Q,) angle to the ground-truth orientation [deg]; NaN
+            without a candidate or a pose.
     """
 
     translation: np.ndarray
@@ -52,8 +52,8 @@ class PoseMetrics:
         rotation_median_deg, rotation_90_deg: the same for the rotation error
             [deg].
         success: share of the queries with a match whose estimated pose is
-            within 2 m and 5 deg of the truth. Queries of every score count. NaN
-            if the method estimates no poses or no query has a match.
+            within 2 m and 5 deg of the ground truth. Queries of every score
+            count. NaN if the method estimates no poses or no query has a match.
     """
 
     num_accepted: int

@@ -43,8 +43,8 @@ class RetrievalProtocol:
             dimensions [m].
         query_spacing: distance driven between two queries [m].
         place_spacing: distance driven between two places of the database [m].
-        max_range: largest x, y or z of a point in the sensor's frame [m];
-            farther points are left out.
+        max_range: greatest absolute x, y and z of a point in the sensor's frame
+            [m]; farther points are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; by default, each method uses its own number.
         place: which of the merged scans determines the pose of the place:

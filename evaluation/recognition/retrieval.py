@@ -1,4 +1,4 @@
-"""Place recognition between two drives: scores and truth.
+"""Place recognition between two drives: scores and ground truth.
 
 The distance of a query from a place is the distance between the positions of
 the sensor in three dimensions.
@@ -225,7 +225,7 @@ def matches_within_radius(
 ) -> np.ndarray:
     """Returns which places are true matches of each query, (Q, D) bool.
 
-    They are the places that the protocol allows, within its radius.
+    These are the places within the protocol's radius that the protocol allows.
     """
     p_WQs, p_WPs = query.queries.p_WSs, database.places.p_WSs
     is_near = [

@@ -116,7 +116,7 @@ class SeenSurfaces:
         return self.shares_of(points).shown
 
     def shares_of(self, points: np.ndarray) -> Shares:
-        """Returns which shares of points this scan shows and hides.
+        """Returns which shares of points this scan shows and occludes.
 
         Args:
             points: (N, 3) points in the frame of the scan's sensor [m].

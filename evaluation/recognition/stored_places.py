@@ -89,8 +89,8 @@ class StoredDrives:
 class StoredDescriptors(Sequence[Any]):
     """The descriptors of D places of stored drives, as a sequence.
 
-    Read it in order: a place of another group takes the place of the group in
-    memory.
+    Read the sequence in order: reading a place of another group replaces the
+    group in memory.
     """
 
     def __init__(

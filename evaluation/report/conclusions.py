@@ -1,9 +1,9 @@
-"""Conclusions from the table of results: the ranking, and what survives.
+"""Conclusions from the table of results: ranking, and retained results.
 
-What survives is the share of its result that a method keeps under structural
-change. Each pair of drives can have a control: the same two routes,
-both driven in one stage of the city. What a method loses from the control to
-the pair is therefore due to the change alone, and not to the routes.
+A method's retained result is its result under structural change, divided by its
+result without change. Each pair of drives can have a control: the same two
+routes, both driven in one stage of the city. A loss from the control to the
+pair is therefore due only to the change, and not to the routes.
 """
 
 from collections import Counter
@@ -36,8 +36,9 @@ def ranked_methods(
 
     The means are over the pairs of drives with results of all methods, without
     the controls, in which the city does not change. If there is no such pair,
-    no method is returned, and the sentence says so. It also says which methods
-    the tests of `differences` tell apart from the first one.
+    no method is returned, and the sentence says so. The sentence also says
+    which methods differ significantly from the first method, by the tests of
+    `differences`.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
     ranked, _ = ranking(rows)
@@ -204,8 +205,9 @@ def interval_text(kept: Row) -> str:
 def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
     """Returns the table `survival.csv`.
 
-    For each method, it contains results without and with change of the city,
-    and the quotient of the two: the share that the method keeps.
+    For each method, the table contains results without and with change of the
+    city, and the retained share: the result with change divided by the result
+    without change.
     """
     numbers: dict[str | tuple[str, str], tuple[str, ...]] = {
         "auc_unchanged": ("before", "auc"),
@@ -238,8 +240,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
 def survival_table(survivals: Sequence[Survival]) -> tables.Table:
     """Returns a table, for print, of how much of its AUC each method retains.
 
-    The share that a method keeps is its AUC with change, divided by its AUC
-    without change.
+    The retained AUC is the AUC with change, divided by the AUC without change.
     """
     return tables.Table.of(
         survivals,
@@ -279,7 +280,7 @@ def _shown(
 
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
-    """Returns sentences on what methods retain, and on which survive."""
+    """Returns sentences on how much methods retain, and on which survive."""
     groups = tables.by_pair(survivals)
     known = [one for one in survivals if one.before]
     without = len(groups) - len(tables.by_pair(known))

@@ -135,7 +135,7 @@ class Report:
 
     @functools.cached_property
     def survivals(self) -> list[conclusions.Survival]:
-        """How much of its AUC each method keeps under change, on each pair."""
+        """Results of each method with and without change, on each pair."""
         stages = {
             name: stage
             for one, _ in self.pairs

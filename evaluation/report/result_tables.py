@@ -484,7 +484,7 @@ class _Faults(NamedTuple):
 
 
 def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
-    """Returns a table, for print, why top-ranked places are wrong."""
+    """Returns a table, for print, on why top-ranked places are wrong."""
 
     def share(one: _Faults, kind: str) -> str | None:
         part = one.kinds[kind] / max(one.wrong, 1)

@@ -36,7 +36,8 @@ class MethodChoice:
 
     Attributes:
         name: name of the method.
-        file: Python file that registers it; None for a method of this package.
+        file: Python file that registers the method; None for a method of this
+            package.
         settings: name and value of each parameter that differs from its
             default.
     """
@@ -87,7 +88,7 @@ class MethodChoice:
         """Returns everything on which the method's results depend, for JSON.
 
         Raises:
-            InputError: if its file cannot be used.
+            InputError: if the method's file cannot be used.
         """
         config = self.make().config
         values: dict = {
@@ -129,7 +130,7 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
         form: how a setting must look, for the error message.
 
     Raises:
-        InputError: if it has no name or no equals sign.
+        InputError: if the text has no name or no equals sign.
     """
     name, equals, value = text.partition("=")
     if not (name and equals):

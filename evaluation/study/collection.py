@@ -45,8 +45,8 @@ class RecordingInfo:
         name: name of the recording.
         path: file or folder of the recording.
         map_name: name of the map.
-        stage: name of the stage; a map's stages, in natural order, are in the
-            order of time.
+        stage: name of the stage. The names of a map's stages, sorted in natural
+            order, are in the order of time.
         way: fields of the scenario that determine the path of the drive; None
             if unknown.
         needs: names of the jobs that make the recording; empty if it exists.
@@ -74,13 +74,13 @@ class RecordingInfo:
 
     @property
     def named(self) -> NamedDrive:
-        """The drive as tasks measure it."""
+        """The drive, in the form in which tasks take drives."""
         return NamedDrive(self.name, self.source, self.needs)
 
     def drives_like(self, other: RecordingInfo) -> bool:
         """Returns whether another drive follows the same route.
 
-        It is false if the route of a drive is unknown.
+        The result is false if the route of one drive is unknown.
         """
         return self.way is not None and self.way == other.way
 
@@ -123,8 +123,8 @@ class MapDrives:
     ) -> list[Recordings]:
         """Returns the pairs (database, query) for place recognition.
 
-        Each earlier stage is paired with the last stage as the query. Two
-        drives are compared both ways.
+        Each earlier stage is paired with the last stage as the query. If the
+        map has only two stages, each of them is the query once.
 
         Args:
             with_itself: whether to add a pair of each stage with itself, for

@@ -44,7 +44,7 @@ class Engine:
     together with other jobs, call `write_tables` when they are done.
 
     Attributes:
-        experiment: name of the experiment, which stands in the tables.
+        experiment: name of the experiment, a column of the tables.
         tasks: name -> task.
         methods: key of a method -> the method, and the columns of its
             settings.

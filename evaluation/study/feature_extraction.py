@@ -184,8 +184,8 @@ class ExtractedFeatures:
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
     """Returns the key in `ExtractedFeatures.described` for a second protocol.
 
-    A method's descriptors by the study's own protocol have the key of the
-    method. Use this function for its descriptors by any other protocol.
+    Descriptors by the study's own protocol have the key of the method. Use this
+    function for descriptors by any other protocol.
 
     Args:
         method: key of the method.
@@ -333,7 +333,7 @@ class FeatureExtraction(Step):
             queries are read.
         further: methods with descriptors by a second protocol, if any.
         spends: whether descriptors are removed once results were made from
-            them. If new results need them, they are made again.
+            them. Descriptors that new results need are computed again.
     """
 
     source: DriveSource
@@ -358,7 +358,7 @@ class FeatureExtraction(Step):
     def missing(self) -> list[Part]:
         """Returns the files of an earlier run that are missing or stale.
 
-        That is none if there is no recording yet, or no earlier run.
+        The result is empty if there is no recording yet, or no earlier run.
         """
         with contextlib.suppress(InputError):
             if self.files.folder.is_dir():
@@ -389,7 +389,7 @@ class FeatureExtraction(Step):
         }
         for key, described in found.described.items():
             values[self.files.described(key)] = found.placed, described
-        doing("writing maps and descriptions")
+        doing("writing maps and descriptors")
         for part, made_of in missing.items():
             part.write(made_of, values[part])
 

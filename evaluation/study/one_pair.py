@@ -36,7 +36,7 @@ class OpenSource:
         opened: the drive, or the path of a point cloud.
         columns: number of values per point in `.bin` files; by default guessed
             from the values.
-        drive_map: its map, if it was made already.
+        drive_map: map of the drive, if the map was made already.
     """
 
     opened: Drive | Path

@@ -315,8 +315,8 @@ class Part:
     def spend(self) -> None:
         """Removes the value, and keeps the record of its inputs.
 
-        Results that were made from the value stay valid. To have the value made
-        again, call `restore`.
+        Results that were made from the value stay valid. Call `restore` if the
+        value must be computed again.
 
         Raises:
             InputError: if there is no such file, or it is damaged.
@@ -327,7 +327,7 @@ class Part:
         self._write({**header, "bytes": 0, _SPENT: True}, b"")
 
     def restore(self) -> None:
-        """Removes the file if its value was removed, so that it is made again.
+        """Removes the file if its value was removed; a job then makes it anew.
 
         Raises:
             InputError: if the file cannot be removed.

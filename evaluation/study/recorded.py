@@ -1,6 +1,6 @@
 """Pairs of recordings, which a study compares as they were recorded.
 
-A recording is read once, for all that a study needs of it.
+Each recording is read only once for a study.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -125,8 +125,8 @@ def chosen_sessions(
         where: file and field of the names, for errors.
 
     Raises:
-        InputError: a recording is unknown, there twice, in another frame of
-            reference, or not older than the query.
+        InputError: a recording is unknown, is named twice, is in another world,
+            is the query, or is later than the query.
     """
     known = {one.name: one for one in (*city.stages.values(), *city.others)}
     for name in repeated(names):
@@ -195,8 +195,8 @@ class ExtractionJobs(Jobs):
     """Jobs of a study that read each drive once.
 
     One job extracts the features of a drive: it maps the drive, describes its
-    places and its queries by all methods, and keeps their scans. If pairs
-    describe drives by several protocols, this is so for the first one only.
+    places and its queries by all methods, and keeps their scans. If pairs use
+    several protocols, this job serves only the first protocol.
 
     Attributes:
         with_map: whether a map is made.

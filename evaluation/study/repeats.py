@@ -92,8 +92,8 @@ def repeats_of(
 ) -> list[Repeat]:
     """Returns the second runs of methods on a pair of drives.
 
-    A method has one if the reference has numbers of it on the pair, measured by
-    another protocol.
+    A method has a second run if the reference has its numbers on the pair,
+    measured by another protocol.
 
     Args:
         stages: names of the map, and of the stages of database and query.

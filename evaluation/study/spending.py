@@ -1,6 +1,6 @@
 """Removes descriptors that no result needs any more, and makes them again.
 
-Descriptors take three quarters of the space of a study. They are needed only
+Descriptors take three quarters of the space of a study, and are needed only
 until results were made from them.
 """
 
@@ -28,10 +28,10 @@ def spend(jobs: Iterable[Job]) -> None:
 
 
 def restore(jobs: Collection[Job]) -> None:
-    """Has removed descriptors made again that results to come need.
+    """Lets jobs compute removed descriptors again that new results need.
 
     Args:
-        jobs: all jobs of a study, each behind those that it needs.
+        jobs: all jobs of a study, each after the jobs that it needs.
     """
     if not any(
         isinstance(one.step, FeatureExtraction) and one.step.spends

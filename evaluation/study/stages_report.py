@@ -180,8 +180,8 @@ class StagesReport:
     ) -> Path:
         """Writes the report, once all jobs are done.
 
-        The inputs of the report are kept, except descriptors of places, which
-        take most of the space. They are made again if new results need them.
+        The inputs of the report are kept, except descriptors, which take most
+        of the space. Descriptors are computed again if new results need them.
 
         The report consists of these files:
 

@@ -251,13 +251,13 @@ class Jobs:
         *,
         kept: bool = False,
     ) -> DescribedSource:
-        """Returns where a job gets the descriptors of a drive's scans from.
+        """Returns the source from which a job gets a drive's descriptors.
 
         If several pairs need the descriptors, this function adds a job that
         writes them, and returns the files: first the file with the scans, then
         one for each method. If only one pair needs them, the function returns
-        the source of the drive, and the job of this pair makes the descriptors
-        itself.
+        the source of the drive, and the job of this pair computes the
+        descriptors itself.
 
         Args:
             drive: the drive.
