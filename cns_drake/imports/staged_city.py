@@ -35,7 +35,7 @@ _SHARED = 0.3
 _FARTHEST = 10_000.0
 # Buildings within this distance of each other belong to one block [m].
 _SAME_BLOCK = 4.0
-# Share of the changing buildings that is drawn block by block.
+# Share of the changing buildings that is sampled block by block.
 _BY_BLOCK = 0.5
 # Share of the changing buildings that is lower at first; all others are
 # missing.

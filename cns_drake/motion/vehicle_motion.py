@@ -319,7 +319,7 @@ class VehicleMotion(LeafSystem):
         plant = self._plant
         now, vdot = self._state.Eval(context)
         if name == "body_spatial_accelerations":
-            # The port of a plant would have those of its dynamics.
+            # The port of a plant has the accelerations of the plant's dynamics.
             output.set_value(plant.CalcSpatialAccelerationsFromVdot(now, vdot))
         else:
             output.set_value(plant.GetOutputPort(name).Eval(now))

@@ -39,8 +39,9 @@ COHERENT_RAYS = 1 << 16
 INVALID_ID = 0xFFFFFFFF
 # Setting of a device: room for more user threads than a machine has.
 # `rtcJoinCommitScene` then builds a scene in the calling thread only, without
-# Embree's own threads. Once woken, those keep looking for work, of which
-# hundreds of instances have none; and a forked process would lack them.
+# Embree's own threads. Once woken, Embree's threads keep looking for work,
+# although hundreds of instances have none; and a forked process would lack
+# these threads.
 ALONE = b"user_threads=65536"
 # Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
 _NATIVE_PACKETS = ((8, 33), (16, 34))

@@ -51,7 +51,7 @@ _KINDS_BY_WORD = (
     ("van", "van"),
     ("delivery", "van"),
 )
-# Nothing of its kind is faster [m/s]: bodies that are were moved by SUMO, which
+# No vehicle or person is faster [m/s]. A faster body was moved by SUMO, which
 # teleports a vehicle that has waited for too long.
 _FASTEST = 80.0
 _FASTEST_OF = {"bicycle": 20.0, "person": 12.0}

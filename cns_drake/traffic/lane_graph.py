@@ -34,13 +34,13 @@ _MOST_LANES = 4
 # Least distance of such a crossing from the ends of lanes, so that the front of
 # a vehicle on it is not yet in another lane [m].
 _FROM_LANE_ENDS = 15.0
-# Its least distance from ways [m].
+# Least distance of such a crossing from ways [m].
 _FROM_WAYS = 5.0
-# Its least distance from the ends of walkways [m].
+# Least distance of such a crossing from the ends of walkways [m].
 _FROM_WALKWAY_ENDS = 4.0
-# Its width [m].
+# Width of such a crossing [m].
 _CROSSING_WIDTH = 2.4
-# Half the width of the pedestrians' path on it [m].
+# Half the width of the pedestrians' path on such a crossing [m].
 _CROSSING_HALF_PATH = 0.5
 # Half the width of a lane [m].
 _HALF_LANE = 1.75

@@ -67,10 +67,10 @@ _STANDING_GAP = 2.5
 _LAST_BRAKES = 4.0
 # Drivers request their way within this distance of the line [m].
 _REQUEST_DISTANCE = 10.0
-# They also request it within this multiple of their braking distance.
+# Drivers also request it within this multiple of their braking distance.
 _REQUEST_BRAKING = 1.4
-# At a signal they request it this much earlier, since nobody brakes before a
-# green signal [s].
+# At a signal, drivers request their way this much earlier, since nobody brakes
+# before a green signal [s].
 _REQUEST_AT_SIGNAL = 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0

@@ -223,7 +223,7 @@ _HALF_LANE = 1.45
 # When the ego car enters a lane, the lane must be empty. Drivers assume that
 # they drive at this share of the speed limit.
 _SLOW_PART = 0.6
-# They assume that they wait for this time at the lane's end [s].
+# Drivers assume that they wait for this time at the lane's end [s].
 WAIT = 20.0
 
 # Time step of the plan [s].

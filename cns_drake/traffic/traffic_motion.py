@@ -258,7 +258,7 @@ class TrafficMotion(LeafSystem):
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
         now: BodyStates = self._states.Eval(context)
         later = bodies_at(self._plan, context.get_time() + self._turn)
-        # A body appears and disappears only between two turns.
+        # A body appears and disappears only between two revolutions.
         later = later._replace(present=now.present)
         X_0, X_1 = map(self._limbs.poses, (now, later))
         R_0, R_1 = X_0[:, :3, :3].copy(), X_1[:, :3, :3].copy()

@@ -294,13 +294,13 @@ _FINE = 0.7
 # A bank of snow along a kerb: distance from the kerb of its edge on the road
 # [m].
 _BANK_ON_ROAD = 0.3
-# Distance from the kerb of its crest, beyond the kerb [m].
+# Distance from the kerb of the bank's crest, beyond the kerb [m].
 _BANK_CREST = 0.3
-# Distance from the kerb of its edge beyond the kerb [m].
+# Distance from the kerb of the bank's edge beyond the kerb [m].
 _BANK_BEYOND = 1.1
-# Its greatest height as a multiple of the depth of snow.
+# Greatest height of the bank as a multiple of the depth of snow.
 _BANK_RATIO = 2.5
-# Its greatest height above the snow [m].
+# Greatest height of the bank above the snow [m].
 _BANK_ABOVE_SNOW = 0.9
 _SPACING = 1.5
 # Wavelengths of the bank's height along the street [m].

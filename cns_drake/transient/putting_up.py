@@ -31,7 +31,7 @@ from cns_drake.transient.world_structures import LoadedStructure
 _FARTHEST = 30.0
 # Distance of a scaffold's inner uprights from the front [m].
 _ROW_INNER = 0.25
-# Distance of its outer uprights from the front [m].
+# Distance of a scaffold's outer uprights from the front [m].
 _ROW_OUTER = 1.15
 # Height of a lift of a scaffold [m].
 _LIFT = 2.0
@@ -319,7 +319,7 @@ _LENGTHS = (6.0, 14.0)
 _TRIES = 6
 # Sites extend from this distance from the kerb [m].
 _SITE_INNER = 0.4
-# They extend to one of these distances from the kerb [m].
+# Sites extend to one of these distances from the kerb [m].
 _SITE_OUTER = (4.6, 2.7)
 # Width of new kerb stones, which narrow the carriageway [m].
 _KERB_WIDTH = 0.3

@@ -222,7 +222,7 @@ class RetrievalProtocol:
         values = asdict(self)
         del values["gate"]
         if not self._changes_queries:
-            values["seed"] = 0  # Nothing is drawn.
+            values["seed"] = 0  # Nothing is random.
         return {
             name: float(value) if type(value) is int else value
             for name, value in values.items()
@@ -333,9 +333,9 @@ RECORDED_PROTOCOL = RetrievalProtocol()
 # scans gives the pose. It serves only to compare with the paper's tables.
 PAPER_PROTOCOL = RetrievalProtocol(place="first")
 
-# The protocol of all studies. Turned queries deprive methods of help from crops
-# along the sensor's axes, voxel grids and streets at right angles. The random
-# numbers must not change any more.
+# The protocol of all studies. A random yaw of queries deprives methods of help
+# from crops along the sensor's axes, voxel grids and streets at right angles.
+# The random numbers must not change any more.
 FAIR_PROTOCOL = RetrievalProtocol(turn_queries=True, tilt_queries=1.5, seed=0)
 
 PROTOCOLS = {

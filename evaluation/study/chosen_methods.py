@@ -79,7 +79,7 @@ class MethodChoice:
                 unknown or does not fit.
         """
         # The file runs once: a second run would make another type of its
-        # descriptions.
+        # descriptors.
         if self.file is not None and self.name not in known_methods():
             load_method(self.file)
         return make_method(self.name, dict(self.settings))

@@ -29,7 +29,7 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import KeptScans
 from evaluation.study.parts import Part
 
-# Points at least this high above the ground count as standing [m].
+# Points at least this high above the ground are non-ground points [m].
 _STANDING = 0.5
 # Edge of the cells in which a scan keeps one point for alignment [m].
 _CELL = 0.5

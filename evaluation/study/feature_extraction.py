@@ -144,9 +144,9 @@ class KeptScans:
             frame: number of the frame.
             scan: structured array (M,) in the sensor's frame.
             max_range: greatest absolute x, y and z of a point in the sensor's
-                frame [m], however the sensor is turned and tilted.
+                frame [m], however the sensor is rotated and tilted.
         """
-        # A corner of the cube may lie on an axis of a turned sensor.
+        # A corner of the cube may lie on an axis of a rotated sensor.
         max_range *= math.sqrt(3.0)
         names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
         kept = within_range(xyz(scan), max_range)

@@ -89,7 +89,7 @@ def shown_overlaps(
     Returns:
         Radius -> (Q,) overlaps; NaN without a match.
     """
-    choice.make()  # It registers the type of its descriptions.
+    choice.make()  # It registers the type of its descriptors.
     _, query = described[1].read()
     asked = scans[1].read()
     if not isinstance(asked, list):
@@ -177,7 +177,7 @@ def measure_method(
         leaves_out_itself, keep: see `Pair`.
     """
     # The method comes first, because it registers the type of its
-    # descriptions.
+    # descriptors.
     method = choice.make()
     placed, (placed_query, asked) = database.read()[0], query.read()
     check_same_world(placed, placed_query, across_maps=True)
@@ -374,10 +374,10 @@ def _describe(
     protocol: RetrievalProtocol,
     reporter: Reporter,
 ) -> tuple[list[np.ndarray], Callable[[int], DriveDescriptors]]:
-    """Returns a drive's scans, and a function that returns its descriptions.
+    """Returns a drive's scans, and a function that returns its descriptors.
 
     The function takes the number of a method. Call it only once for each
-    method, because it frees the description.
+    method, because it frees the descriptor.
     """
     if isinstance(drive, tuple):
         scans, *parts = drive

@@ -588,7 +588,7 @@ class StudyFiles:
         return self.output / "figures"
 
     def features(self, recording: str) -> FeatureFiles:
-        """Returns the files with a recording's map and descriptions."""
+        """Returns the files with a recording's map and descriptors."""
         folder = self.output / "parts" / "features"
         return FeatureFiles(folder / file_name(recording))
 

@@ -36,13 +36,13 @@ _SMOOTHING = (0, 1, 2, 3)
 # Speed limit where the file gives none [m/s].
 _LIMIT = 13.9
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Least distance of walkers from the edges of a sidewalk [m].
+# Least distance of pedestrians from the edges of a sidewalk [m].
 _FROM_EDGE = 0.45
-# Greatest distance of walkers from the middle of a sidewalk [m].
+# Greatest distance of pedestrians from the middle of a sidewalk [m].
 _MOST_HALF_WIDTH = 1.05
-# There are no walkers where this distance would be smaller [m].
+# There are no pedestrians where this distance would be smaller [m].
 _LEAST_HALF_WIDTH = 0.3
-# Least length of a sidewalk with walkers [m].
+# Least length of a sidewalk with pedestrians [m].
 _SHORTEST_WALKWAY = 5.0
 
 
@@ -220,7 +220,7 @@ def lanes_for_traffic(
 
 
 def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
-    """Returns a walkway for each sidewalk, at whose ends walkers turn round."""
+    """Returns a walkway for each sidewalk; pedestrians turn at its ends."""
     found: list[Walkway] = []
     for band in bands:
         half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)

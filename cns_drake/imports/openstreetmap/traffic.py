@@ -45,7 +45,7 @@ _STRIP_WITHIN = 1.5
 # [m].
 _NEXT_END_WITHIN = 4.0
 _CROSSING_WIDTH = 2.4
-# Half the width of the walkers' path on a crossing [m].
+# Half the width of the pedestrians' path on a crossing [m].
 _CROSSING_HALF_PATH = 0.8
 
 
@@ -170,7 +170,8 @@ class StreetWalkways:
         for k, strip in enumerate(self._strips):
             for a, b in pairwise(sorted(cuts[k] | {0.0, float(strip.length)})):
                 if b - a < 0.5:
-                    # Walkers between the same two places use the same piece.
+                    # Pedestrians between the same two places use the same
+                    # piece.
                     self._nodes[k, b] = self._node((k, a))
                     continue
                 part = substring(strip, a, b)

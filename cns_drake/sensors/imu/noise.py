@@ -10,7 +10,7 @@ from cns_drake.sensors.noise_draws import noise_generator
 # Purposes of random numbers. They differ from a LiDAR's purposes, since an IMU
 # and a LiDAR in a user's diagram may have the same name.
 _TURN_ON, _WHITE, _WALK_AT_BLOCK, _WALK_STEPS = range(16, 20)
-# Number of samples that are drawn at a time.
+# Number of samples whose random numbers are made at a time.
 _BLOCK = 1024
 # Number of blocks of the random walk: a century at 1,000 samples a second.
 _MOST_BLOCKS = 1 << 32

@@ -259,8 +259,9 @@ class Lidar(LeafSystem):
                 AbstractValue.Make([SpatialVelocity()]),
             )
         inputs = {self.all_input_ports_ticket()}
-        # Kept until the SceneGraph changes. Beams of a scan cannot meet what is
-        # out of their reach, so the scene of scans may leave that where it was.
+        # Kept until the SceneGraph changes. Beams of a scan cannot hit geometry
+        # beyond their range, so the scene of scans may leave such geometry at
+        # an old pose.
         self._near, self._all = (
             self.DeclareCacheEntry(
                 description=f"ray-casting scene, {what}",

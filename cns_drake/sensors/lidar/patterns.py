@@ -49,8 +49,8 @@ _PRISMS_HZ = (7294.0 / 60.0, -4664.0 / 60.0)
 # Revolutions per second about z of a Mid-360's beams: each of four lines ten
 # times in 0.1 s, where the user manual speaks of 40 lines.
 _TURNS_HZ = 100.0
-# Ups and downs per second: not a simple fraction of the turns, so that the
-# pattern repeats only after a long time.
+# Ups and downs per second: not a simple fraction of the revolutions, so that
+# the pattern repeats only after a long time.
 _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 

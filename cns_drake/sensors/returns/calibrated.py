@@ -170,7 +170,8 @@ class CalibratedReturns:
         times = np.asarray(times, np.float32)
         found = []
         for height, rows in turn.blocks:
-            # Whole turns of the columns need none of them picked out.
+            # An array with one entry per column is used whole, because a block
+            # contains whole cycles of the columns.
             p, R, when = (
                 one[rows] if len(one) == len(turn.beam) else one
                 for one in (p_WSset, R_WSset, times)

@@ -30,7 +30,7 @@ _SCORES = (
     "called_structures",
     "right_structures",
 )
-# Name under which the true labels are scored, like a method's labels.
+# Name under which the exact labels are scored, like a method's labels.
 TRUTH = "truth"
 # Name of labels that the user gives.
 GIVEN = "labels"

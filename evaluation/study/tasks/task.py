@@ -40,8 +40,8 @@ _MAP_COST = 60.0
 _OTHER_COST = 20.0
 
 
-# A method, whether its gate was used, and its answers to Q queries: column -> Q
-# values.
+# A method, whether geometric verification was used, and answers to Q queries:
+# column -> Q values.
 Answered: TypeAlias = "tuple[str, bool, Mapping[str, np.ndarray]]"
 
 
@@ -326,7 +326,7 @@ class Jobs:
 
         Returns:
             For each drive, the file with the scans of its places, and one file
-            per method with their descriptions.
+            per method with their descriptors.
         """
         found = []
         for drive in pair.beside:
