@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
+from cns_drake.ageing import kinds
 from cns_drake.ageing.history import TAKEN_DOWN, AgeingCity, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.rates import check_years
@@ -210,7 +211,7 @@ def past(
                 events.append(replace(gone, detail="empty plot"))
         elif thing.semantic_class == "vegetation":
             height = thing.top - thing.bottom
-            if height > _LEAST_TREE and name.startswith("tree"):
+            if height > _LEAST_TREE and thing.kind == kinds.TREE:
                 young = max(height + _GROWTH * year, _LEAST_TREE)
                 whole = world.structure(name)
                 model = stage_structures.younger(whole.model, young)
@@ -340,9 +341,12 @@ class _Writing:
                         one.semantic_class,
                         self._materials[one.name] | one.materials,
                     ),
+                    "kind": one.kind_cell,
                 }
             )
         columns = list(dict.fromkeys([*world.columns, "material"]))
+        if any(row.get("kind") for row in rows):
+            columns = list(dict.fromkeys([*columns, "kind"]))
         cells = ([row.get(name, "") for name in columns] for row in rows)
         write_csv(self._draft / map_folder.STRUCTURES_NAME, columns, cells)
 

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
 import math
-import re
 
 import numpy as np
 import shapely
@@ -17,7 +16,7 @@ from shapely import affinity
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.ageing import plots
+from cns_drake.ageing import kinds, plots
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import MOVED, Tally
@@ -53,11 +52,6 @@ _WITH_BALCONIES = 0.35
 _HIGHEST_RAISED = 40.0
 # Least height of buildings that get balconies [m].
 _LEAST_WITH_BALCONIES = 8.0
-# Listed buildings, which never change.
-_LISTED = re.compile(
-    "church|chapel|museum|town_hall|observation_tower|station|mill"
-)
-_DWELLING = re.compile("flats|block|house|terrace|walk_up|slab|building")
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)
 # Least and greatest height of a tree when it is planted [m].
@@ -218,9 +212,9 @@ class AgeingCity:
         self._lots += self._free_lots()
         self._trees = list(self._trees_of_today())
         self._furniture = {
-            name: kind
+            name: event
             for name, one in world.things.items()
-            if (kind := _furniture_kind(one)) is not None
+            if (event := _renewal(one, world.tags(name))) is not None
         }
         self._places = {name: name for name in self._furniture}
         self._junctions = world.junctions()
@@ -297,8 +291,10 @@ class AgeingCity:
         ]
 
     def _class(self, name: str) -> str:
-        one = self.new.get(name) or self._world.things[name]
-        return one.semantic_class
+        return self._known(name).semantic_class
+
+    def _known(self, name: str) -> Structure | world_structures.LoadedStructure:
+        return self.new.get(name) or self._world.things[name]
 
     def _foot(self, name: str) -> BaseGeometry:
         return self._added.get(name, self._feet.get(name, Polygon()))
@@ -388,18 +384,18 @@ class AgeingCity:
         tree = shapely.STRtree(walls)
         for one in self._world.of_class("vegetation"):
             height = one.top - one.bottom
-            is_tree = one.name.startswith("tree") or height > 4.0
+            is_tree = one.kind == kinds.TREE or height > 4.0
             if height < _LEAST_TREE or not is_tree:
                 continue
             whole = self._world.structure(one.name)
-            kinds = [
-                kind
+            species = [
+                one
                 for part in whole.model.parts
-                for name, kind in SPECIES.items()
+                for name, one in SPECIES.items()
                 if getattr(part.shape, "mesh", "").startswith(name)
             ]
-            low, high = kinds[0].height_range if kinds else (8.0, 11.0)
-            if kinds and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
+            low, high = species[0].height_range if species else (8.0, 11.0)
+            if species and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
                 low, high = 7.0, 9.0
             rng = random_generator(self._seed, "size", one.name)
             middle = one.footprint.centroid
@@ -439,7 +435,7 @@ class AgeingCity:
         self._paint_markings()
 
     def _meet(self, lot: _Lot, name: str) -> None:
-        if _LISTED.search(name):
+        if kinds.is_kept(self._known(name).kind):
             return
         for event, change in (
             ("demolished", self._demolish),
@@ -479,9 +475,9 @@ class AgeingCity:
             self._leave_empty(lot)
 
     def _archetype(self, name: str) -> str:
-        row = self._world.rows.get(name, {})
-        words = [*row.get("tags", "").split(), re.sub(r"_\d.*", "", name)]
-        return words[-2] if len(words) > 2 else words[-1]
+        # Generated buildings have their district and archetype as tags.
+        _, *archetype = self._world.tags(name) or ("",)
+        return archetype[-1] if archetype else self._known(name).kind
 
     def _open_site(
         self,
@@ -646,7 +642,7 @@ class AgeingCity:
         words = ["colour", *(["insulation"] if insulated else [])]
         may_have = (
             not lot.has_balconies
-            and _DWELLING.search(name)
+            and kinds.is_dwelling(self._known(name).kind)
             and lot.height >= _LEAST_WITH_BALCONIES
         )
         added = ""
@@ -804,17 +800,17 @@ _STONE = (0.8, 0.8, 0.78)
 _PAINT = MATERIALS["markings"]
 
 
-def _furniture_kind(one: world_structures.LoadedStructure) -> str | None:
+def _renewal(
+    one: world_structures.LoadedStructure, tags: Sequence[str]
+) -> str | None:
     """Returns the event that replaces a piece of street furniture, or None."""
-    name = one.name.lower()
     if one.semantic_class == "traffic-sign":
         return "signs"
     if one.semantic_class == "pole":
-        is_signal = "traffic_light" in name or "signal" in name
-        return "signals" if is_signal else "lamps"
+        return "signals" if kinds.is_signal(one.kind) else "lamps"
     small = one.footprint.area < 6.0 and one.top - one.bottom < 4.0
-    is_site = "_lot_" in name or "market" in name
-    if one.semantic_class == "other-object" and small and not is_site:
+    # What stands on an empty lot leaves with the lot.
+    if one.semantic_class == "other-object" and small and "lot" not in tags:
         return "benches"
     return None
 

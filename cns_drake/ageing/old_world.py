@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.ageing import kinds
 from cns_drake.base.csv_files import (
     number_within,
     read_records,
@@ -148,8 +149,19 @@ class OldWorld:
         model = structures.Model(
             tuple(parts), meshes, structures.ground_footprint(parts, meshes)
         )
-        tags = tuple(row.get("tags", "").split())
-        return structures.Structure(name, row["class"], model, xyz, yaw, tags)
+        return structures.Structure(
+            name,
+            row["class"],
+            model,
+            xyz,
+            yaw,
+            self.tags(name),
+            self._seen[name].kind,
+        )
+
+    def tags(self, name: str) -> tuple[str, ...]:
+        """Returns the tags of a structure; none without a row in the table."""
+        return tuple(self.rows.get(name, {}).get("tags", "").split())
 
     @cached_property
     def shapes(self) -> dict[str, list[structures.Shape]]:
@@ -224,7 +236,7 @@ class OldWorld:
 
     @staticmethod
     def _is_street(one: world_structures.LoadedStructure) -> bool:
-        is_bay = one.semantic_class == "parking" and "bay" in one.name
+        is_bay = one.kind == kinds.PARKING_BAYS
         return one.semantic_class == "sidewalk" or is_bay
 
     def junctions(self) -> dict[str, BaseGeometry]:
@@ -235,16 +247,9 @@ class OldWorld:
         return dict(sorted(network.junction_areas.items()))
 
 
-_PUBLIC = re.compile(
-    "park(?!ing)|plaza|square|church|museum|wood|promenade|river|water|harbour"
-    "|roundabout|slope|station|sport|play|grave|cemetery|school|pitch|bank"
-    "|green|median|forest|bridge|quay|rail|allotment"
-)
-
-
 def _is_open(one: world_structures.LoadedStructure) -> bool:
-    kinds = ("terrain", "other-ground", "parking")
-    return one.semantic_class in kinds and not _PUBLIC.search(one.name.lower())
+    is_ground = one.semantic_class in ("terrain", "other-ground", "parking")
+    return is_ground and not kinds.is_public(one.kind)
 
 
 def _read_visuals(path: Path) -> dict[str, list[str]]:

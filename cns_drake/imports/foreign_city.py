@@ -6,6 +6,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 import hashlib
 from itertools import pairwise
+import re
 
 import numpy as np
 
@@ -235,6 +236,7 @@ def make_imported(
     until: int | None = None,
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
+    narrower: str = "",
 ) -> Imported:
     """Returns a structure made of triangles in the world.
 
@@ -250,6 +252,8 @@ def make_imported(
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object; 0 if unknown.
+        narrower: kind of the structure, if the file says more than its type,
+            such as `church` for a Building.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -263,8 +267,23 @@ def make_imported(
         {f"{name}_{part}": to_mesh(some) for part, some in filled.items()},
         hull_of(triangles.reshape(-1, 3)[:, :2]),
     )
-    structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
+    structure = Structure(
+        name,
+        semantic_class,
+        model,
+        (0.0, 0.0, 0.0),
+        kind=kind_word(narrower or kind),
+    )
     return Imported(structure, kind, year, triangles, until, tags or {}, lod)
+
+
+def kind_word(text: str) -> str:
+    """Returns a type in a file as a kind, such as `water_body` for WaterBody.
+
+    The kind consists of lower-case letters, digits and underscores.
+    """
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", text).lower()
+    return re.sub(r"[^a-z0-9]+", "_", words).strip("_")
 
 
 def boxes_of(structures: Sequence[Imported]) -> np.ndarray:

@@ -197,4 +197,5 @@ def bottom_of(
         {name: lowered.to_mesh()},
         Point(0.0, 0.0).buffer(1.0),
     )
-    return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]
+    origin = (0.0, 0.0, 0.0)
+    return [Structure(name, "terrain", model, origin, kind="ground")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+import re
 
 import numpy as np
 
@@ -19,6 +20,18 @@ from cns_drake.scene.materials import (
     from_cell,
 )
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
+
+
+def kind_in_name(name: str) -> str:
+    """Returns the kind with which the name of a structure begins.
+
+    Names are made of a kind and a number, such as `row_house_017` for the kind
+    `row_house`. An object that stands on the lot of a building before it is
+    built is named after the building first: `office_003_lot_02_bench`.
+    """
+    own = re.sub(r".*_lot_\d+_", "", name)
+    # OpenStreetMap's numbers have the letter of node, way or relation.
+    return re.sub(r"_[nwr]?-?\d.*", "", own)
 
 
 @dataclass(frozen=True)
@@ -37,6 +50,8 @@ class StructureEntry:
         materials: name of a part -> name of its material. An empty name stands
             for all parts that are not named; without it, they have the usual
             material of the class.
+        kind: what the structure is, such as `row_house` or `bench`; by default,
+            what its name begins with.
     """
 
     instance: int
@@ -45,6 +60,11 @@ class StructureEntry:
     reflectivity: float | None = None
     causes: tuple[str, ...] = ()
     materials: Mapping[str, str] = field(default_factory=dict, hash=False)
+    kind: str = ""
+
+    def __post_init__(self) -> None:
+        kind = self.kind or kind_in_name(self.name)
+        object.__setattr__(self, "kind", kind)
 
     @property
     def label(self) -> int:
@@ -117,8 +137,8 @@ class StructureTable:
 def load_structure_table(path: Path) -> StructureTable:
     """Reads a structure table: CSV with columns `instance`, `name`, `class`.
 
-    The columns `reflectivity` and `material` are optional, and their cells may
-    be empty.
+    The columns `reflectivity`, `material` and `kind` are optional, and their
+    cells may be empty.
 
     Raises:
         InputError: the file lacks a column or a row is not usable.
@@ -152,6 +172,7 @@ def load_structure_table(path: Path) -> StructureTable:
             semantic_class,
             _reflectivity(row.get("reflectivity", ""), where),
             materials=materials,
+            kind=row.get("kind", ""),
         )
     return StructureTable(entries.values())
 

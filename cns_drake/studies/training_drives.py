@@ -343,7 +343,7 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
         rng: random generator.
     """
     buildings = [s for s in city.structures if s.semantic_class == "building"]
-    trees = [s for s in city.structures if s.name.startswith("tree_")]
+    trees = [s for s in city.structures if s.kind == "tree"]
     beside = [s for s in city.structures if s.semantic_class in _BESIDE]
     near = cKDTree([s.xyz[:2] for s in buildings]).query(
         [s.xyz[:2] for s in beside], distance_upper_bound=_BESIDE_WITHIN

@@ -85,11 +85,13 @@ class LoadedStructure:
         name: name of the structure.
         semantic_class: its class, a key of
             `cns_drake.scene.semantics.CLASS_IDS`.
+        kind: what it is, such as `row_house` or `bench`.
         parts: its geometries.
     """
 
     name: str
     semantic_class: str
+    kind: str
     parts: tuple[LoadedPart, ...]
 
     @cached_property
@@ -161,9 +163,10 @@ def read_structures(
         found[geometry.structure].append(part)
     return {
         name: LoadedStructure(
-            name, world.structures[name].semantic_class, tuple(found[name])
+            name, entry.semantic_class, entry.kind, tuple(found[name])
         )
         for name in sorted(found)
+        for entry in (world.structures[name],)
     }
 
 

@@ -387,17 +387,22 @@ def structure_table(
 
     The columns are instance id (from 1), name, class, label (number of the
     class), position in W [m], yaw [rad], tags, and the materials of the parts
-    (see `cns_drake.scene.materials`).
+    (see `cns_drake.scene.materials`). If there are structures whose name does
+    not say their kind, the last column is `kind`.
 
     Args:
         structures: the structures.
         versions: the structures as they are in all stages. A structure can have
             parts in one stage that it lacks in another.
     """
-    names = (
+    structures = list(structures)
+    names = [
         "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags",
         "material",
-    )  # fmt: skip
+    ]  # fmt: skip
+    with_kinds = any(one.kind_cell for one in structures)
+    if with_kinds:
+        names.append("kind")
     materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
     for one in versions:
         materials[one.name] |= one.materials
@@ -411,6 +416,7 @@ def structure_table(
             f"{one.yaw:.5f}",
             " ".join(one.tags),
             as_cell(one.semantic_class, materials[one.name] | one.materials),
+            *([one.kind_cell] if with_kinds else []),
         ]
         for instance, one in enumerate(structures, start=1)
     )

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
 from cns_drake.scene.materials import MATERIALS, OF_CLASSES
+from cns_drake.scene.structure_table import kind_in_name
 
 
 @dataclass(frozen=True)
@@ -144,6 +145,8 @@ class Structure:
         yaw: heading of S in W [rad].
         tags: words that describe the structure, such as the name of its
             district.
+        kind: what the structure is, such as `row_house` or `bench`; by default,
+            what its name begins with.
     """
 
     name: str
@@ -152,6 +155,16 @@ class Structure:
     xyz: tuple[float, float, float]
     yaw: float = 0.0
     tags: tuple[str, ...] = field(default=())
+    kind: str = ""
+
+    def __post_init__(self) -> None:
+        kind = self.kind or kind_in_name(self.name)
+        object.__setattr__(self, "kind", kind)
+
+    @property
+    def kind_cell(self) -> str:
+        """The cell `kind` in a structure table; "" if the name says it."""
+        return "" if self.kind == kind_in_name(self.name) else self.kind
 
     @property
     def materials(self) -> dict[str, str]:

@@ -27,6 +27,7 @@ from cns_drake.city.geometry import (
     placed,
     turned_up,
 )
+from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
 from cns_drake.imports.dressing.grounds import HALF_STREET
@@ -277,7 +278,12 @@ class StreetRoom:
         model = without_curves(builder.build(rng))
         x, y = round(xy[0], 3), round(xy[1], 3)
         structure = Structure(
-            name, builder.semantic_class, model, (x, y, 0.0), round(yaw, 4)
+            name,
+            builder.semantic_class,
+            model,
+            (x, y, 0.0),
+            round(yaw, 4),
+            kind=name_stem(kind),
         )
         feet = structure.p_WFs[:, :2]
         heights, guessed = self._laid.heights(feet), self._ground.height(feet)

@@ -1,6 +1,7 @@
 """Signals and objects beside OpenDRIVE roads, as structures."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 import math
 import zlib
 
@@ -11,7 +12,8 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.xml_elements import Element
-from cns_drake.city.geometry import Model, Structure, placed
+from cns_drake.city.geometry import Structure, placed
+from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.faces import extruded
@@ -214,6 +216,7 @@ def thing_structures(
                 (x, y, z),
                 round(math.remainder(facing, 2.0 * math.pi), 5),
                 ("signal",),
+                name_stem(key),
             )
             if one.footprint_W.intersects(lanes):
                 faults.add("signal over a lane, left out", name)
@@ -226,7 +229,7 @@ def thing_structures(
                 _rng(name), species="lime_tree", height=thing.size[2] or None
             )
             yield Structure(
-                name, "vegetation", model, (x, y, z), 0.0, ("object",)
+                name, "vegetation", model, (x, y, z), 0.0, ("object",), "tree"
             )
         elif thing.swept is not None:
             solid = _swept(road, thing, thing.swept, faults)
@@ -403,11 +406,10 @@ def _structure(
         "Object",
         {"body": triangles},
         {},
+        narrower=thing.kind,
     ).structure
-    model = Model(one.model.parts, one.model.meshes, footprint)
-    return Structure(
-        thing.name, one.semantic_class, model, one.xyz, 0.0, ("object",)
-    )
+    model = replace(one.model, footprint=footprint)
+    return replace(one, model=model, tags=("object",))
 
 
 def _rng(name: str) -> np.random.Generator:

@@ -46,6 +46,7 @@ from cns_drake.imports.openstreetmap.reading import (
 )
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
+    building_kind,
     heights,
     is_inside,
     length,
@@ -494,6 +495,7 @@ def make_buildings(
             # If parts look different, the look of the first one counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
+            narrower=building_kind(whole.tags),
         )
         yield replace(made, is_gone=True) if _is_gone(whole.tags) else made
 

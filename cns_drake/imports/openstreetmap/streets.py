@@ -34,6 +34,7 @@ from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     area_kind,
     driven_ways,
+    green_kind,
     is_marked,
     lanes_beside,
     path_width,
@@ -131,12 +132,15 @@ class Look(NamedTuple):
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         rgb: colour; None for that of the class.
         z: height of the upper side [m].
+        narrower: what the area is, if its tags say more than `kind`, such as
+            `park`.
     """
 
     kind: str
     semantic_class: str
     rgb: Rgb | None
     z: float
+    narrower: str = ""
 
 
 _ROAD = Look("Road", "road", None, 0.0)
@@ -198,7 +202,12 @@ def _made(
     material = "water" if look.kind == "WaterBody" else None
     finish = look.rgb and Finish(look.rgb, material)
     return make_imported(
-        name, look.semantic_class, look.kind, surfaces, {part: finish}
+        name,
+        look.semantic_class,
+        look.kind,
+        surfaces,
+        {part: finish},
+        narrower=look.narrower,
     )
 
 
@@ -438,7 +447,8 @@ def _plain_look(tags: reading.Tags) -> Look | None:
         return None
     kind, semantic_class = found
     colours = {"WaterBody": WATER, "LandUse": LAWN}
-    return Look(kind, semantic_class, colours.get(kind), _LEVEL)
+    narrower = green_kind(tags) if kind == "LandUse" else ""
+    return Look(kind, semantic_class, colours.get(kind), _LEVEL, narrower)
 
 
 def _look(tags: reading.Tags) -> Look | None:

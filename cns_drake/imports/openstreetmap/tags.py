@@ -334,12 +334,33 @@ def area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
         return "Parking", "parking"
     if tags.get("highway") == "pedestrian" or tags.get("place") == "square":
         return "Square", "other-ground"
-    if any(
-        tags.get(key) in values.split()
-        for key, values in TABLES["green"].items()
-    ):
+    if green_kind(tags):
         return "LandUse", "terrain"
     return None
+
+
+def green_kind(tags: Mapping[str, str]) -> str:
+    """Returns the kind of green land, such as `park`; "" if there is none."""
+    return next(
+        (
+            tags[key]
+            for key, values in TABLES["green"].items()
+            if tags.get(key) in values.split()
+        ),
+        "",
+    )
+
+
+def building_kind(tags: Mapping[str, str]) -> str:
+    """Returns the kind of a building, such as `church`.
+
+    It is `building` if the tags state no kind.
+    """
+    for kind, found in TABLES["buildings"].items():
+        if any(tags.get(key) in one.split() for key, one in found.items()):
+            return str(kind)
+    value = tags.get("building", "yes")
+    return "building" if value == "yes" else value
 
 
 class LaneLayout(NamedTuple):

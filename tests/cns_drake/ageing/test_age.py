@@ -263,6 +263,65 @@ def test_what_is_painted_is_known_by_its_material(town, tmp_path):
     assert painted == ["crossing_n1"]
 
 
+def with_kinds(town, folder, kinds):
+    copied(town, folder)
+    rows = [{**row, "kind": ""} for row in _rows(town, "structures.csv")]
+    for row in rows:
+        row["kind"] = kinds.get(row["name"], "")
+    with (folder / "structures.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+    return OldWorld(MapFolder(folder))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        ("", True),
+        ("church", False),
+        ("hill_chapel", False),
+        ("churchill_offices", True),
+        ("station", False),
+        ("station_road_house", True),
+    ],
+)
+def test_buildings_that_stay_are_known_by_their_kind(
+    town, tmp_path, kind, changes
+):
+    name = "brick_block_001"
+    world = with_kinds(town, tmp_path / "town", {name: kind})
+    rates = {**dict.fromkeys(DEFAULT_RATES, 0.0), "renewed": 1.0}
+    city = AgeingCity(world, rates, 1, shapely.Polygon())
+    city.live()
+    renewed = {e.structure for e in city.events if e.event == "renewed"}
+    assert (name in renewed) == changes
+    assert "office_001" in renewed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "is_open"),
+    [
+        ("", True),
+        ("park", False),
+        ("village_green", False),
+        ("water_body", False),
+        ("parkland", True),
+        ("engraved_stones", True),
+    ],
+)
+def test_open_ground_is_known_by_its_kind(town, tmp_path, kind, is_open):
+    name = "ground_north_block_paved"
+    world = with_kinds(town, tmp_path / "town", {name: kind})
+    block = world.area(lambda one: one.name == name)
+    block = block.difference(world.streets).buffer(-0.2)
+    assert block.area > 100.0
+    shared = world.open_ground.intersection(block).area
+    assert shared == pytest.approx(block.area if is_open else 0.0, abs=0.1)
+
+
 @pytest.mark.parametrize(
     ("farthest", "least"), [(0.0, 0.0), (0.1, 0.1), (0.2, 0.2), (5.0, 0.2)]
 )

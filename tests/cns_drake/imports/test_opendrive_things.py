@@ -52,6 +52,9 @@ def test_signals_and_objects_stand_at_their_places(tmp_path):
     assert stop.xyz[:2] == (20.0, -6.0)
     # The sign faces the drivers that approach on the road.
     assert abs(stop.yaw) == pytest.approx(math.pi, abs=1e-4)
+    assert stop.kind == "sign"
+    assert found["signal_1_1"].kind == "traffic_light_post"
+    assert found["object_1_1"].kind == "barrier"
     house = found["object_1_0"]
     assert house.semantic_class == "building"
     assert house.footprint_W.equals(box(45, 16, 55, 24))

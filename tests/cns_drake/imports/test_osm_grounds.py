@@ -55,6 +55,41 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
             assert (one.triangles[:, :, 2] < 0.0).all()
 
 
+@pytest.mark.parametrize(
+    ("building", "land", "expected"),
+    [
+        ({"building": "chapel"}, {"leisure": "park"}, ["church", "park"]),
+        (
+            {"building": "yes", "amenity": "place_of_worship"},
+            {"landuse": "cemetery"},
+            ["church", "cemetery"],
+        ),
+        (
+            {"building": "public", "amenity": "townhall"},
+            {"natural": "water"},
+            ["town_hall", "water_body"],
+        ),
+        (
+            {"building": "yes", "amenity": "cafe"},
+            {"landuse": "grass"},
+            ["building", "grass"],
+        ),
+        (
+            {"building": "Row House"},
+            {"amenity": "parking"},
+            ["row_house", "parking"],
+        ),
+    ],
+)
+def test_kinds_are_those_of_the_tags(tmp_path, building, land, expected):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, **building)
+    osm.box(20, 0, 30, 20, **land)
+    for dressed in (False, True):
+        found = read(osm, tmp_path, dressed).structures
+        assert [one.structure.kind for one in found] == expected
+
+
 def test_a_multipolygon_of_a_path_is_an_area(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")

@@ -1,0 +1,34 @@
+"""What the kinds of structures mean to a city that ages."""
+
+from pathlib import Path
+
+from cns_drake.base.yaml_files import parse_yaml
+
+TREE = "tree"
+PARKING_BAYS = "parking_bays"
+_TABLE = parse_yaml(Path(__file__).with_name("kinds.yaml").read_bytes())
+_LISTS = {use: frozenset(text.split()) for use, text in _TABLE.items()}
+
+
+def is_kept(kind: str) -> bool:
+    """Returns whether buildings of a kind never change, such as churches."""
+    return _is_one_of("kept", kind)
+
+
+def is_dwelling(kind: str) -> bool:
+    """Returns whether buildings of a kind may get balconies."""
+    return _is_one_of("dwellings", kind)
+
+
+def is_signal(kind: str) -> bool:
+    """Returns whether poles of a kind carry traffic lights."""
+    return _is_one_of("signals", kind)
+
+
+def is_public(kind: str) -> bool:
+    """Returns whether nobody builds on ground of a kind, such as a park."""
+    return not _LISTS["public"].isdisjoint(kind.split("_"))
+
+
+def _is_one_of(use: str, kind: str) -> bool:
+    return not _LISTS[use].isdisjoint((kind, kind.rpartition("_")[2]))
