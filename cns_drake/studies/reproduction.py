@@ -8,6 +8,7 @@ from cns_drake.base.drives.drive import driven_way
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.forecast import Space, forecast
 from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.listing import natural_key
 from cns_drake.base.progress import doing
@@ -17,7 +18,6 @@ from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.comparisons import control_drive
-from cns_drake.studies.forecast import forecast
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import (
     is_recorded,
@@ -126,9 +126,8 @@ def reproduce_maps(
     kept = shown * _PAGE_BYTES + frames * (
         _KEPT_BYTES + _RECORDED_BYTES if with_recordings else _KEPT_BYTES
     )
-    told = forecast(
-        planned, cluster, output, kept + frames * _SPENT_BYTES, kept
-    )
+    space = Space(output, kept + frames * _SPENT_BYTES, kept)
+    told = forecast(planned, cluster, space)
     if told is not None:
         on_note(told)
     run_jobs(planned, cluster)

@@ -14,9 +14,8 @@ from typing import Any
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.processes import nothing_left
+from cns_drake.base.jobs.forecast import forecast
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.process import num_cores
 from cns_drake.base.progress import doing
 from evaluation.results.table import (
     QUERIES,
@@ -32,8 +31,8 @@ from evaluation.study.parts import StudyFiles
 from evaluation.study.spending import restore, spend
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
-# A study that takes longer is announced [s].
-_LONG = 3600.0
+# What a study takes is told if it takes longer, as costs of jobs say [s].
+_LONG = 60.0
 
 
 @dataclass
@@ -118,7 +117,11 @@ class Engine:
         make_folder(self.output)
         jobs = list(self.jobs.values())
         restore(jobs)
-        self._announce(cluster)
+        told = forecast(jobs, cluster, least=_LONG)
+        if told is not None:
+            self.on_note(
+                f"{told}; the same command goes on after an interruption"
+            )
         run_jobs(jobs, cluster)
         doing("writing the tables and the page")
         tables = self.tables()
@@ -168,23 +171,6 @@ class Engine:
                     key = self._key(one, name, method, gate)
                     answers.append(Answers(**key, columns=columns))
         return Results.of(rows), QueryRows.of(answers)
-
-    def _announce(self, cluster: Cluster) -> None:
-        """Says how long a long study takes."""
-        workers = cluster.slots or num_cores()
-        longest = _LONG * workers
-        if sum(job.cost for job in self.jobs.values()) <= longest:
-            return
-        left = sum(
-            job.cost for job in self.jobs.values() if not nothing_left(job.step)
-        )
-        if left > longest:
-            hours = left / workers / 3600.0
-            self.on_note(
-                f"{self.experiment}: {len(self.jobs)} jobs, about {hours:.1f} h"
-                f" with {workers} side by side; the same command goes on after"
-                " an interruption"
-            )
 
     def _baselines(self) -> dict[tuple, dict[int, dict[str, Any]]]:
         """Returns the baseline's results by map, drives and protocol.

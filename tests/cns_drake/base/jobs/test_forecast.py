@@ -5,10 +5,10 @@ import shutil
 from helpers import job_functions
 import pytest
 
+from cns_drake.base.jobs import forecast
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.forecast import Space, shortest_time
 from cns_drake.base.jobs.running import Job
-from cns_drake.studies import forecast
-from cns_drake.studies.forecast import shortest_time
 
 
 def job(name, cost, needs=(), is_done=False):
@@ -43,14 +43,16 @@ def test_what_is_told(tmp_path, monkeypatch):
     usage = type(shutil.disk_usage(tmp_path))
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(9e9, 0, 5e9))
     done = job("done", 1000.0, is_done=True)
-    assert forecast.forecast([done], Cluster(2), tmp_path, 4e9, 3e9) is None
+    assert (
+        forecast.forecast([done], Cluster(2), Space(tmp_path, 4e9, 3e9)) is None
+    )
     assert forecast.forecast(
-        [done, *SINGLE], Cluster(2), tmp_path, 4e9, 3e9
+        [done, *SINGLE], Cluster(2), Space(tmp_path, 4e9, 3e9)
     ) == (
         "6 jobs: about 90 s with 2 at a time, as this machine was measured"
         " just now; 2.4 GB of memory; 4.0 GB on the disk (3.0 GB in the end)"
     )
-    text = forecast.forecast(CHAIN, Cluster(64), tmp_path, 6e9, 6e9)
+    text = forecast.forecast(CHAIN, Cluster(64), Space(tmp_path, 6e9, 6e9))
     assert text.startswith("3 jobs: about 3 minutes with 3 at a time")
     assert text.endswith("; 6.0 GB on the disk, which has 5.0 GB")
 
@@ -58,8 +60,19 @@ def test_what_is_told(tmp_path, monkeypatch):
 def test_nothing_is_measured_for_other_machines(tmp_path, monkeypatch):
     monkeypatch.setattr(forecast, "measure_slowness", None)
     cluster = Cluster(scheduler="tcp://10.0.0.1:1")
-    text = forecast.forecast(SINGLE, cluster, tmp_path, 1e9, 1e9)
+    text = forecast.forecast(SINGLE, cluster, Space(tmp_path, 1e9, 1e9))
     assert text.startswith("6 jobs: 1.0 GB on the disk")
+    assert forecast.forecast(SINGLE, cluster) is None
+
+
+@pytest.mark.usefixtures("slow")
+def test_nothing_is_told_of_short_jobs():
+    """Their time counts as it is on the machine of the costs."""
+    assert forecast.forecast(SINGLE, Cluster(2), least=30.1) is None
+    assert forecast.forecast(SINGLE, Cluster(2), least=29.9) == (
+        "6 jobs: about 90 s with 2 at a time, as this machine was measured"
+        " just now; 2.4 GB of memory"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Forecasts how long jobs take on this machine, and the space they need."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 import math
 from pathlib import Path
 import shutil
@@ -19,7 +20,7 @@ from cns_drake.base.progress import doing
 _POINTS = 100_000
 _REFERENCE = 0.29
 _REPEATS = 3
-# Most memory of a job that records or reads a shipped drive [bytes].
+# Most memory of a job [bytes].
 _JOB_MEMORY = 1.2e9
 
 
@@ -65,44 +66,64 @@ def _ends(jobs: Mapping[str, Job]) -> dict[str, float]:
     return ends
 
 
+@dataclass(frozen=True)
+class Space:
+    """Space on a disk that jobs need.
+
+    Attributes:
+        folder: folder of the results, which exists.
+        most: space that the jobs need while they run [bytes].
+        rest: space that their results need in the end [bytes].
+    """
+
+    folder: Path
+    most: float
+    rest: float
+
+    def __str__(self) -> str:
+        text = f"{_gigabytes(self.most)} on the disk"
+        if self.rest < 0.95 * self.most:
+            text += f" ({_gigabytes(self.rest)} in the end)"
+        free = shutil.disk_usage(self.folder).free
+        if free < self.most:
+            text += f", which has {_gigabytes(free)}"
+        return text
+
+
 def forecast(
     jobs: Sequence[Job],
     cluster: Cluster,
-    output: Path,
-    most: float,
-    rest: float,
+    space: Space | None = None,
+    least: float = 0.0,
 ) -> str | None:
     """Returns how long jobs take on this machine, and what space they need.
 
     Args:
         jobs: the jobs, of which some may be done.
         cluster: runs the jobs.
-        output: folder of the results, which exists.
-        most: space on the disk that they need while they run [bytes].
-        rest: space that their results need in the end [bytes].
+        space: space on the disk that the jobs need, if it is known.
+        least: nothing is told of jobs that take a shorter time [s].
 
     Returns:
-        One line of text; None if all jobs are done.
+        One line of text; None if all jobs are done, take less than `least`, or
+        nothing is known about them.
     """
     left = [job for job in jobs if not nothing_left(job.step)]
-    if not left:
+    number = min(cluster.slots or len(left), len(left))
+    seconds = shortest_time(left, number) if left else 0.0
+    if not left or seconds < least:
         return None
     parts = []
     if cluster.slots is not None:
-        number = min(cluster.slots, len(left))
-        seconds = shortest_time(left, number) * measure_slowness()
+        seconds *= measure_slowness()
         parts += [
             f"about {_rounded(seconds)} with {number} at a time, as this"
             " machine was measured just now",
             f"{_gigabytes(number * _JOB_MEMORY)} of memory",
         ]
-    space = f"{_gigabytes(most)} on the disk"
-    if rest < 0.95 * most:
-        space += f" ({_gigabytes(rest)} in the end)"
-    free = shutil.disk_usage(output).free
-    if free < most:
-        space += f", which has {_gigabytes(free)}"
-    return f"{len(left)} jobs: {'; '.join([*parts, space])}"
+    if space is not None:
+        parts.append(str(space))
+    return f"{len(left)} jobs: {'; '.join(parts)}" if parts else None
 
 
 def _rounded(seconds: float) -> str:
