@@ -91,8 +91,8 @@ def _draw_curve(
 def draw_track(rows: np.ndarray, stem: Path) -> None:
     """Draws the results of a tracked drive over its length, and saves them.
 
-    The figure shows errors of the position, and the share of each scan's points
-    that the map lacks.
+    The figure shows the position error, with the limits of right and of lost
+    poses, and the share of each scan's points that the map lacks.
 
     Args:
         rows: records of `evaluation.localisation.tracking.TRACKED`.
@@ -107,12 +107,21 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
         bottom.fill_between(
             some["way"], some["unmapped"], color=PALE, linewidth=0.0
         )
-    for level, style in ((RIGHT_TRANSLATION, "--"), (LOST, ":")):
+    levels = ((RIGHT_TRANSLATION, "--", "within"), (LOST, ":", "lost:"))
+    for level, style, name in levels:
         top.axhline(level, color="0.4", linestyle=style, linewidth=0.8)
-    top.set(yscale="log", ylabel="error of position [m]")
+        top.annotate(
+            f"{name}\n{level:g} m",
+            (1.0, level),
+            (4.0, 0.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            va="center",
+        )
+    top.set(yscale="log", ylabel="position error [m]")
     bottom.set(
-        xlabel="way [m]",
-        ylabel="scan\nwithout map",
+        xlabel="distance driven [m]",
+        ylabel="share of scan\nnot in the map",
         ylim=(0.0, max(0.1, 1.05 * float(np.nanmax(rows["unmapped"])))),
     )
     for axes in (top, bottom):
