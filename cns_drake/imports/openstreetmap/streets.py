@@ -50,7 +50,8 @@ _PARAPET_THICKNESS = 0.25
 _PARAPET_HEIGHT = 1.0
 _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
-_KERB = 0.12
+# Height of sidewalks above the street [m].
+KERB_HEIGHT = 0.12
 _WHITE = Finish((0.86, 0.86, 0.84), "markings")
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
@@ -144,7 +145,7 @@ class Look(NamedTuple):
 
 
 _ROAD = Look("Road", "road", None, 0.0)
-_WALK = Look("Sidewalk", "sidewalk", None, _KERB)
+_WALK = Look("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 

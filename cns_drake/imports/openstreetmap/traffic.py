@@ -1,4 +1,4 @@
-"""Makes lanes and walkways for traffic from OpenStreetMap streets."""
+"""Makes lanes for traffic from OpenStreetMap streets."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -6,12 +6,12 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 import shapely
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import substring
 
 from cns_drake.base.angles import wrapped
 from cns_drake.imports.drives.search import WaypointRoute
@@ -21,202 +21,15 @@ from cns_drake.imports.foreign_city import (
     Street,
     StreetPlaces,
     cut_at_nodes,
-    ends_at_nodes,
 )
 from cns_drake.imports.openstreetmap import tags
+from cns_drake.imports.openstreetmap.walkways import find_walkways
 from cns_drake.imports.options import DriveOn
 from cns_drake.roads.centreline import blend
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
-
-# Distance from the kerb to the middle of a walked strip [m].
-_FROM_KERB = 1.3
-# Half the width of a walked strip [m].
-_HALF_STRIP = 0.3
-# Least distance of a walked strip from the edges of a sidewalk [m].
-_FROM_EDGE = 0.55
-# Least length of a walked strip [m].
-_LEAST_STRIP = 4.0
-# A crossing begins within this distance of a strip [m].
-_STRIP_WITHIN = 1.5
-# People walk from the end of a strip to the end of another within this distance
-# [m].
-_NEXT_END_WITHIN = 4.0
-_CROSSING_WIDTH = 2.4
-# Half the width of the pedestrians' path on a crossing [m].
-_CROSSING_HALF_PATH = 0.8
-
-
-# A place on a strip: the number of the strip, and the distance along it [m].
-_Place = tuple[int, float]
-
-
-class StreetWalkways:
-    """The walkways of a city: sidewalks, paths, and crossings between them.
-
-    Attributes:
-        walkways: all walkways, those over crossings last.
-        crossings: node of a street -> the crossing there.
-    """
-
-    def __init__(
-        self,
-        streets: Sequence[Street],
-        paths: Iterable[np.ndarray],
-        crossed: Iterable[int],
-        sidewalks: BaseGeometry,
-    ):
-        """Finds the walkways.
-
-        `paths` are middle lines (N, 2) of ways for people [m], and `crossed`
-        the nodes of streets at which people cross. `sidewalks` is the area of
-        sidewalks and paths.
-        """
-        walked = sidewalks.buffer(-_FROM_EDGE, quad_segs=2)
-        shapely.prepare(walked)
-        self._walked = walked
-        lines = [*_sidewalk_lines(streets), *map(shapely.LineString, paths)]
-        self._strips = [
-            strip
-            for piece in _pieces(lines, walked)
-            for strip in shapely.get_parts(piece)
-            if strip.geom_type == "LineString" and strip.length >= _LEAST_STRIP
-        ]
-        self._tree = shapely.STRtree(self._strips)
-        self._nodes: dict[_Place, int] = {}
-        self.crossings: dict[int, lane_graph.Crossing] = {}
-        over = []
-        arms = ends_at_nodes(streets)
-        wanted = {node for node in crossed if arms[node] <= 2}
-        for street in streets:
-            for k, node in enumerate(street.nodes):
-                if node not in wanted or node in self.crossings:
-                    continue
-                found = self._crossing(street, k)
-                if found is not None:
-                    self.crossings[node], ends = found
-                    over.append(ends)
-        links = list(self._links())
-        self.walkways = [
-            *self._walkways(),
-            *(self._way(a, b) for a, b in links),
-            *(self._way(a, b, number) for number, (a, b) in enumerate(over)),
-        ]
-
-    def _crossing(
-        self, street: Street, k: int
-    ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
-        """Returns a crossing and its ends on strips; None without strips."""
-        line = street.line
-        along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
-        if not along.any():
-            return None
-        left = np.array([-along[1], along[0]]) / np.hypot(*along)
-        half = street.width / 2.0
-        first, last = (
-            self._on_strip(line[k] + side * (half + _FROM_KERB) * left)
-            for side in (1.0, -1.0)
-        )
-        if first is None or last is None or first[0] == last[0]:
-            return None
-        self._node(first)
-        self._node(last)
-        kerbs = np.array([line[k] + side * half * left for side in (1.0, -1.0)])
-        course = np.column_stack([kerbs, np.zeros(2)])
-        return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
-
-    def _on_strip(self, place: np.ndarray) -> _Place | None:
-        point = shapely.Point(place)
-        near = self._tree.query_nearest(point, max_distance=_STRIP_WITHIN)
-        if not len(near):
-            return None
-        number = int(near[0])
-        return number, float(self._strips[number].project(point))
-
-    def _node(self, place: _Place) -> int:
-        return self._nodes.setdefault(place, len(self._nodes))
-
-    def _links(self) -> Iterator[tuple[_Place, _Place]]:
-        """Yields pairs of strips' ends between which people can walk."""
-        ends = [
-            (k, s)
-            for k, strip in enumerate(self._strips)
-            for s in (0.0, float(strip.length))
-        ]
-        places = [self._strips[k].interpolate(s) for k, s in ends]
-        if not places:
-            return
-        tree = shapely.STRtree(places)
-        rows, columns = tree.query(places, "dwithin", _NEXT_END_WITHIN)
-        for a, b in zip(rows.tolist(), columns.tolist(), strict=True):
-            way = shapely.LineString([places[a], places[b]])
-            if (
-                a < b
-                and ends[a][0] != ends[b][0]
-                and way.length > 0.5
-                and self._walked.covers(way)
-            ):
-                self._node(ends[a])
-                self._node(ends[b])
-                yield ends[a], ends[b]
-
-    def _walkways(self) -> Iterator[lane_graph.Walkway]:
-        """Yields the strips, divided where others begin."""
-        cuts: defaultdict[int, set[float]] = defaultdict(set)
-        for k, s in self._nodes:
-            cuts[k].add(s)
-        for k, strip in enumerate(self._strips):
-            for a, b in pairwise(sorted(cuts[k] | {0.0, float(strip.length)})):
-                if b - a < 0.5:
-                    # Pedestrians between the same two places use the same
-                    # piece.
-                    self._nodes[k, b] = self._node((k, a))
-                    continue
-                part = substring(strip, a, b)
-                yield self._walkway(
-                    shapely.get_coordinates(part), (k, a), (k, b)
-                )
-
-    def _way(
-        self, a: _Place, b: _Place, crossing: int = -1
-    ) -> lane_graph.Walkway:
-        places = [self._strips[k].interpolate(s) for k, s in (a, b)]
-        return self._walkway(shapely.get_coordinates(places), a, b, crossing)
-
-    def _walkway(
-        self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
-    ) -> lane_graph.Walkway:
-        height = np.full(len(line), _KERB)
-        return lane_graph.Walkway(
-            lane_graph.resampled(np.column_stack([line, height])),
-            _HALF_STRIP if crossing < 0 else _CROSSING_HALF_PATH,
-            self._node(a),
-            self._node(b),
-            crossing,
-        )
-
-
-def _pieces(
-    lines: Sequence[BaseGeometry], area: BaseGeometry
-) -> Iterator[BaseGeometry]:
-    """Yields the part of each line that is in an area."""
-    parts = shapely.get_parts(area)
-    tree = shapely.STRtree(parts)
-    for line in lines:
-        # Intersecting with the whole area would test all its edges each time.
-        near = np.sort(tree.query(line, "intersects"))
-        yield line.intersection(shapely.MultiPolygon(list(parts[near])))
-
-
-def _sidewalk_lines(streets: Iterable[Street]) -> Iterator[BaseGeometry]:
-    """Yields the middle lines of sidewalks along streets."""
-    for street, side in product(streets, (1.0, -1.0)):
-        offset = side * (street.width / 2.0 + _FROM_KERB)
-        course = shapely.LineString(street.line)
-        yield from shapely.get_parts(course.offset_curve(offset))
-
 
 # A way through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_DEG = 35.0
@@ -249,7 +62,6 @@ _HALF_WIDTH = 1.3
 _JUNCTION_WITHIN = 25.0
 # It belongs to the junction's ways that pass within this distance [m].
 _WAY_WITHIN = 6.0
-_KERB = 0.12
 # What ends below this height does not stop a vehicle [m].
 _LOWEST_OBSTACLE = 0.3
 # What begins above this height does not stop a vehicle [m].
@@ -309,61 +121,82 @@ class _Lane:
         return self.stretch, 0 if self.is_forward else -1
 
 
-class StreetTraffic:
+class StreetTraffic(NamedTuple):
     """The lanes of streets, and which lane leads into which.
 
     Attributes:
-        stretches: streets, cut where they meet.
-        lanes: lanes of the stretches, then those through junctions.
+        lanes: lanes of streets, then those through junctions.
         links: pairs of lanes, of which the second follows the first.
         beside: lane -> its neighbour on the outer side, with the same
             direction.
+        junctions: nodes at which three or more ends of streets meet.
     """
 
-    def __init__(
-        self,
-        streets: Sequence[Street],
-        crossed: AbstractSet[int],
-        surface: BaseGeometry,
-        side: float,
-    ):
-        """Makes the lanes of streets that meet at common nodes.
+    lanes: Sequence[DirectedLane]
+    links: Sequence[tuple[int, int]]
+    beside: Mapping[int, int]
+    junctions: Sequence[int]
 
-        `crossed` are the nodes at which people cross. Ways through junctions
-        that leave the surface of all streets are left out. The side is 1 if
-        traffic keeps right, and -1 if it keeps left.
-        """
-        self.stretches = list(_stretches(streets, crossed))
-        self._side = side
-        self._crossed = crossed
-        self._arms: defaultdict[int, list[_Arm]] = defaultdict(list)
-        for k, stretch in enumerate(self.stretches):
-            for end, node in zip((0, -1), stretch.nodes, strict=True):
-                self._arms[node].append((k, end))
-        lanes = list(self._stretch_lanes())
-        self.beside = _beside(lanes)
-        self.lanes = [
-            DirectedLane(
-                _level(lane.points),
-                tags.speed_limit(
-                    self.stretches[lane.stretch].street.tags, lane.is_forward
-                ),
-                False,
-            )
-            for lane in lanes
-        ]
-        self.links: list[tuple[int, int]] = []
-        shapely.prepare(surface)
-        for first, last, is_junction, line in self._ways(lanes):
-            if not surface.covers(shapely.LineString(line)):
-                continue
-            self.links += [(first, len(self.lanes)), (len(self.lanes), last)]
-            limit = min(self.lanes[k].limit for k in (first, last))
-            self.lanes.append(DirectedLane(_level(line), limit, is_junction))
 
-    def junctions(self) -> list[int]:
-        """Returns the nodes at which three or more ends of streets meet."""
-        return [node for node, arms in self._arms.items() if len(arms) > 2]
+def make_traffic_lanes(
+    streets: Sequence[Street],
+    crossed: AbstractSet[int],
+    surface: BaseGeometry,
+    side: float,
+) -> StreetTraffic:
+    """Returns the lanes of streets that meet at common nodes.
+
+    Args:
+        streets: the streets.
+        crossed: nodes at which people cross.
+        surface: surface of all streets in W [m]. Ways through junctions that
+            leave it are left out.
+        side: 1 if traffic keeps right, and -1 if it keeps left.
+    """
+    stretches = list(_stretches(streets, crossed))
+    arms: defaultdict[int, list[_Arm]] = defaultdict(list)
+    for k, stretch in enumerate(stretches):
+        for end, node in zip((0, -1), stretch.nodes, strict=True):
+            arms[node].append((k, end))
+    meeting = _MeetingStreets(stretches, arms, crossed, side)
+    drawn = list(meeting.lanes())
+    lanes = [
+        DirectedLane(
+            _level(lane.points),
+            tags.speed_limit(
+                stretches[lane.stretch].street.tags, lane.is_forward
+            ),
+            False,
+        )
+        for lane in drawn
+    ]
+    links: list[tuple[int, int]] = []
+    shapely.prepare(surface)
+    for first, last, is_junction, line in meeting.ways(drawn):
+        if not surface.covers(shapely.LineString(line)):
+            continue
+        links += [(first, len(lanes)), (len(lanes), last)]
+        limit = min(lanes[k].limit for k in (first, last))
+        lanes.append(DirectedLane(_level(line), limit, is_junction))
+    junctions = [node for node, ends in arms.items() if len(ends) > 2]
+    return StreetTraffic(lanes, links, _beside(drawn), junctions)
+
+
+@dataclass(frozen=True)
+class _MeetingStreets:
+    """Streets, cut where they meet.
+
+    Attributes:
+        stretches: the pieces of the streets.
+        arms: node -> the ends of stretches there.
+        crossed: nodes at which people cross.
+        side: 1 if traffic keeps right, and -1 if it keeps left.
+    """
+
+    stretches: Sequence[Stretch]
+    arms: Mapping[int, Sequence[_Arm]]
+    crossed: AbstractSet[int]
+    side: float
 
     def setback(self, arm: _Arm) -> float:
         """Returns how far before an end of a stretch its lanes stop [m].
@@ -378,7 +211,7 @@ class StreetTraffic:
 
     def _wanted_setback(self, arm: _Arm) -> float:
         stretch = self.stretches[arm[0]]
-        arms = self._arms[stretch.nodes[arm[1]]]
+        arms = self.arms[stretch.nodes[arm[1]]]
         is_joint = len(arms) < 3
         reach = _BEFORE_JOINT if is_joint else _BEFORE_CORNER
         half = stretch.street.width / 2.0
@@ -399,7 +232,8 @@ class StreetTraffic:
             reach = max(reach, corner)
         return float(min(reach, _FARTHEST_STOP))
 
-    def _stretch_lanes(self) -> Iterator[_Lane]:
+    def lanes(self) -> Iterator[_Lane]:
+        """Yields the lanes of all stretches."""
         for k, stretch in enumerate(self.stretches):
             along = np.linspace(0.0, stretch.length, len(stretch.line))
             low = self.setback((k, 0))
@@ -422,7 +256,7 @@ class StreetTraffic:
             ):
                 for number in range(count):
                     offset = stretch.layout.offset(is_forward, number)
-                    offset *= self._side * (1.0 if is_forward else -1.0)
+                    offset *= self.side * (1.0 if is_forward else -1.0)
                     points = middle + offset * right
                     ahead = (np.diff(points, axis=0) * tangent[1:]).sum(axis=1)
                     if ahead.min() < _SHARP_SHARE * SPACING:
@@ -440,7 +274,7 @@ class StreetTraffic:
                         points if is_forward else points[::-1],
                     )
 
-    def _ways(
+    def ways(
         self, lanes: Sequence[_Lane]
     ) -> Iterator[tuple[int, int, bool, np.ndarray]]:
         """Yields ways: lane, next lane, whether it is in a junction, line."""
@@ -449,9 +283,9 @@ class StreetTraffic:
         for k, lane in enumerate(lanes):
             leaving[lane.entry_arm].append(k)
             entering[lane.exit_arm].append(k)
-        for node, arms in self._arms.items():
+        for node, arms in self.arms.items():
             # Vehicles enter a crossing as they would enter a junction.
-            is_entered = len(arms) > 2 or node in self._crossed
+            is_entered = len(arms) > 2 or node in self.crossed
             for a, b in product(arms, arms):
                 if a == b:
                     continue
@@ -490,7 +324,7 @@ class StreetTraffic:
             return outer[1] == min(outer[0], there - 1)
         if not is_junction or abs(turn_deg) <= _STRAIGHT_DEG:
             return last.number == min(first.number, there - 1)
-        if turn_deg * self._side > 0:
+        if turn_deg * self.side > 0:
             return first.number == last.number == 0
         return outer == (0, 0)
 
@@ -590,7 +424,7 @@ def lanes_of_streets(
     ]
     if not near:
         return None
-    walks = StreetWalkways(
+    walks = find_walkways(
         near, places.paths, places.crossed, _sidewalks(structures, paths)
     )
     surface = shapely.union_all(
@@ -601,7 +435,7 @@ def lanes_of_streets(
         ]
     )
     side = 1.0 if drive_on == "right" else -1.0
-    traffic = StreetTraffic(near, set(walks.crossings), surface, side)
+    traffic = make_traffic_lanes(near, set(walks.crossings), surface, side)
     free = _free(traffic, structures)
     outer = traffic.beside
     graph = join_lanes(
@@ -683,7 +517,7 @@ def _signals(
         for street in streets
         for k, node in enumerate(street.nodes)
     }
-    junctions = shapely.points([places[n] for n in traffic.junctions()])
+    junctions = shapely.points([places[n] for n in traffic.junctions])
     if not len(junctions):
         return []
     pairs = shapely.STRtree(junctions).query_nearest(
