@@ -30,6 +30,7 @@ class Format(str, Enum):
     OVERLAP_TABLE = "overlap-table"
     MAP_TRUTH = "map-truth"
     MAP_SESSIONS = "map-sessions"
+    BEV_IMAGES = "bev-images"
     FILM = "film"
 
 
@@ -38,8 +39,8 @@ _PAIRS = (Format.POINTNETVLAD, Format.OVERLAP, Format.OVERLAP_TABLE)
 _MAPS = (Format.MAP_TRUTH, Format.MAP_SESSIONS)
 # Option -> the formats that it belongs to.
 _BELONGS: Mapping[str, tuple[Format, ...]] = {
-    "lidar": (*_CONVERTED, Format.MAP_SESSIONS),
-    "columns": (Format.MAP_SESSIONS,),
+    "lidar": (*_CONVERTED, Format.MAP_SESSIONS, Format.BEV_IMAGES),
+    "columns": (Format.MAP_SESSIONS, Format.BEV_IMAGES),
     "absent_in": (Format.KITTI,),
     "sequence": (Format.KITTI,),
     "vary": _PAIRS,
@@ -121,6 +122,10 @@ def export(
     map-update can score labels of such maps, add the ground truth: A/truth.npy
     and B/truth.npy.
 
+    With bev-images, DRIVE is a recording or a real drive, and the command
+    writes a bird's-eye image of each scan, with the poses, as cns-eval real
+    reads them.
+
     With film, DRIVE is a shipped drive or a scenario file, and the command
     films the same stretch of the drive in each stage of the city: first in one
     shot per stage from behind the car, with the points that the LiDAR measures,
@@ -135,10 +140,12 @@ def export(
             overlap (scans and the exact overlap of each pair), overlap-table
             (only a table of the overlaps between a database and a query drive,
             for cns-eval pr --exact-overlaps); map-truth (two maps with labels
-            of what changed), map-sessions (two maps without labels); or film.
+            of what changed), map-sessions (two maps without labels); bev-images
+            (bird's-eye images with poses); or film.
         output: Folder to write; created if it does not exist. With mcap and
             film, the output is a file. The name of a film ends in .webp, or in
-            .mp4, which needs ffmpeg. The folder of two maps must not exist yet.
+            .mp4, which needs ffmpeg. The folder of two maps or of images must
+            not exist yet.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in this other stage get SemanticKITTI's labels of
             moving objects (252 to 259), as if these structures had moved. Only
@@ -205,6 +212,8 @@ def export(
         _write_maps(first, words[1], layout, output, values, json=json)
     elif layout == Format.MCAP:
         _repair(first, output, json=json)
+    elif layout == Format.BEV_IMAGES:
+        _write_images(first, output, values, json=json)
     elif layout == Format.FILM:
         _film(first, output, values, json=json)
     else:
@@ -456,4 +465,17 @@ def _write_sessions(
     with draft_folder(output) as draft:
         for side, drive in zip(SIDES, drives, strict=True):
             write_session(drive, draft / side, spacing)
+    show({"output": str(output)}, str(output), json=json)
+
+
+def _write_images(
+    path: str, output: Path, values: Mapping[str, Any], *, json: bool
+) -> None:
+    """Writes bird's-eye images of a drive."""
+    with uninterrupted():
+        from evaluation.drives import open_drive
+        from evaluation.real.image_sequences import write_images
+
+    drive = open_drive(Path(path), values["lidar"], values["columns"])
+    write_images(drive, output, note)
     show({"output": str(output)}, str(output), json=json)

@@ -16,6 +16,7 @@ def real(
     jobs: commands.Jobs = None,
     scheduler: commands.Scheduler = None,
     simulated: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    queries: Annotated[int | None, typer.Option(min=1, metavar="N")] = None,
 ) -> None:
     """Measure place recognition and registration on real scans.
 
@@ -39,7 +40,12 @@ def real(
             model of LiDAR as a data set, its scans become further places of the
             data set's database. A classifier then also tries to tell these
             scans from the real ones, which shows how realistic the simulation
-            is.
+            is. The classifier also uses a folder kitti_bev with bird's-eye
+            images in it.
+        queries: Number of queries in each sequence of bird's-eye images. They
+            are chosen evenly among the queries with a match; for each of them,
+            one random match is the place. By default, all queries and all
+            places.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.real.measuring import measure_real
@@ -54,5 +60,6 @@ def real(
         parameter or (),
         simulated,
         terminal.note,
+        queries,
     )
     print(output / RESULTS)

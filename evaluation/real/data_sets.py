@@ -314,6 +314,8 @@ def simulated_drives(
     field = lidar_field(unit)
     alike = []
     for path in (one for one in listed(folder) if one.is_dir()):
+        if path.name in _OTHERS:
+            continue
         drive = open_drive(path)
         if field and drive.lidar_field == field:
             source = RecordingSource(path.absolute())

@@ -1,29 +1,36 @@
 """Sequences of bird's-eye images with poses, as BEVPlace's data of 2023.
 
-A sequence is a folder with images `imgs/*.png` and a table `pose.txt`. Each
-image becomes a cloud (see `evaluation.clouds.count_images`), so that methods
-read the sequence like any other drive. The table has the upper 3 x 4 part of
-the LiDAR's pose in each row. Only the position on the ground and the heading
-count, because nothing else shows in an image from above.
+A sequence is a folder with images `imgs/*.png` and a table `pose.txt`, or with
+two such folders, `places` and `queries`. Each image becomes a cloud (see
+`evaluation.clouds.count_images`), so that methods read the sequence like any
+other drive. The table has the upper 3 x 4 part of the LiDAR's pose in each row.
+Only the position on the ground and the heading count, because nothing else
+shows in an image from above. `write_images` makes such a folder of any drive.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-import math
+import io
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
+from PIL import Image
 from scipy.spatial import cKDTree
 
+from cns_drake.base.drives.deskewing import deskew
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import draft_folder, user_errors
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
-from cns_drake.base.points import from_xyz
+from cns_drake.base.points import from_xyz, xyz
 from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import OnNote
 from evaluation.clouds.count_images import (
     check_image,
+    count_image,
     image_points,
     read_image,
 )
@@ -37,6 +44,7 @@ from evaluation.study.tasks.task import NamedDrive
 FOLDER = "kitti_bev"
 # The LiDAR of KITTI; simulated scans of this one are judged beside the images.
 UNIT = "hdl-64e"
+_IMAGES = "imgs"
 _TABLE = "pose.txt"
 # Greatest distance between a query and its match [m].
 RADIUS = 5.0
@@ -49,6 +57,8 @@ _SPLITS = {
     "06": ((0, 600), (800, 1101)),
 }
 _PERIOD_NS = 100_000_000
+# Seed by which one place is drawn for each of a few queries.
+_SEED = 90
 
 
 @dataclass(frozen=True)
@@ -56,7 +66,7 @@ class ImageSource:
     """A function that opens some images of a sequence as a drive.
 
     Attributes:
-        folder: folder of the sequence.
+        folder: folder of the images and their poses.
         name: name of the drive.
         frames: numbers of the images, in the order of their names.
     """
@@ -70,7 +80,7 @@ class ImageSource:
         chosen = list(self.frames)
         return FileDrive(
             name=self.name,
-            world_frame=self.folder.name,
+            world_frame=_sequence(self.folder).name,
             files=[files[k] for k in chosen],
             stamps_ns=_PERIOD_NS * np.array(chosen, np.int64),
             X_WS=X_WS[chosen],
@@ -102,70 +112,186 @@ class ImageSequence(NamedTuple):
     queries: NamedDrive
 
 
-def open_sequences(folder: Path, on_note: OnNote) -> list[ImageSequence]:
+def open_sequences(
+    folder: Path, on_note: OnNote, queries: int | None = None
+) -> list[ImageSequence]:
     """Returns the sequences of images in a folder.
 
     The frames of places and queries are those by which BEVPlace was evaluated.
-    Of another sequence, the first half are places, and the second half queries.
-    As in that evaluation, only queries with a match count; the others are left
-    out.
+    Of another sequence, the first half are places, and the second half queries,
+    unless it has a folder for either. As in that evaluation, only queries with
+    a match count; the others are left out.
 
     Args:
         folder: folder with a folder for each sequence; it need not exist.
         on_note: is called with notes on what is left out.
+        queries: number of queries of a sequence, chosen evenly among those with
+            a match. The places are then one random match of each query. By
+            default, all queries and all places.
 
     Raises:
         InputError: there is a folder but no sequence in it, or a sequence has
             no images, other images than square ones of 8 bits, no poses, or
             another number of them.
     """
+    return [
+        found
+        for one in _folders(folder)
+        for found in _opened(one, on_note, queries)
+    ]
+
+
+def open_images(folder: Path) -> list[NamedDrive]:
+    """Returns all images of each sequence in a folder; of places, if named.
+
+    Args:
+        folder: as for `open_sequences`.
+
+    Raises:
+        InputError: see `open_sequences`.
+    """
+    found = []
+    for one in _folders(folder):
+        shown = _parts(one)[0] or one
+        frames = tuple(range(len(_read(shown)[0])))
+        source = ImageSource(shown, one.name, frames)
+        found.append(NamedDrive(one.name, source))
+    return found
+
+
+def write_images(drive: Drive, folder: Path, on_note: OnNote) -> None:
+    """Writes an image of each scan of a drive, and a table of the poses.
+
+    The motion of the LiDAR during a scan is taken out. A file appears under its
+    final name only when all are complete.
+
+    Args:
+        drive: the drive.
+        folder: folder to write, which must be new or empty.
+        on_note: is called with notes on how the drive is read.
+
+    Raises:
+        InputError: a scan cannot be read, or the folder cannot be written.
+    """
+    moved = drive.distortion_note if isinstance(drive, McapDrive) else None
+    for text in drive.notes:
+        if text == moved:
+            text = (
+                f"{drive.name}: taken while the LiDAR moved; the motion is"
+                " taken out"
+            )
+        on_note(text)
+    with draft_folder(folder) as draft, user_errors(folder):
+        (draft / _IMAGES).mkdir(parents=True)
+        number = len(drive)
+        for frame in track(range(number), "making images", number, "images"):
+            scan = deskew(drive, frame) if moved else drive.scan(frame)
+            image = Image.fromarray(count_image(xyz(scan)))
+            content = io.BytesIO()
+            image.save(content, format="PNG")
+            path = draft / _IMAGES / f"{frame:06d}.png"
+            path.write_bytes(content.getvalue())
+        rows = drive.X_WS[:, :3].reshape(-1, 12).tolist()
+        (draft / _TABLE).write_text(
+            "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
+        )
+
+
+def _folders(folder: Path) -> list[Path]:
+    """Returns the folders of the sequences in a folder that may not exist."""
     if not folder.exists():
         return []
     inside = [one for one in listed(folder) if one.is_dir()]
     if not inside:
         raise InputError(f"{folder}: no folder of a sequence in it")
-    return [found for one in inside for found in _opened(one, on_note)]
+    return inside
 
 
-def _opened(folder: Path, on_note: OnNote) -> Iterator[ImageSequence]:
+def _parts(folder: Path) -> tuple[Path | None, Path | None]:
+    """Returns the folders of places and queries in a sequence, if any."""
+    places, queries = (folder / role for role in get_args(Role))
+    if not (places.is_dir() or queries.is_dir()):
+        return None, None
+    return places, queries
+
+
+def _sequence(images: Path) -> Path:
+    """Returns the folder of the sequence to which images belong."""
+    return images.parent if images.name in get_args(Role) else images
+
+
+def _opened(
+    folder: Path, on_note: OnNote, most: int | None
+) -> Iterator[ImageSequence]:
     """Yields the sequence in a folder, unless no query has a match."""
-    files, X_WS = _read(folder)
-    for file in track(files, f"checking {folder}", len(files), "images"):
-        check_image(file)
-    name = f"kitti_{folder.name}"
-    number = len(files)
-    places, queries = _SPLITS.get(folder.name, ((0, 0), (0, number + 1)))
-    if queries[1] > number:
-        places, queries = (0, number // 2), (number // 2, number)
-        on_note(
-            f"{name}: no frames of the published evaluation: the first"
-            f" {number // 2} of {number} images are places, the others queries"
-        )
-    p_WSs = X_WS[:, :2, 3]
-    distance = np.full(number, math.inf)
-    if places[1]:
-        tree = cKDTree(p_WSs[slice(*places)])
-        distance[slice(*queries)] = tree.query(p_WSs[slice(*queries)])[0]
-    matched = np.flatnonzero(distance <= RADIUS)
-    on_note(
-        f"{name}: {len(matched)} of {queries[1] - queries[0]} queries have a"
-        f" place within {RADIUS:g} m; the others are left out"
+    # The sequences of KITTI odometry are numbers.
+    name = f"kitti_{folder.name}" if folder.name.isdigit() else folder.name
+    folders = [one for one in _parts(folder) if one] or [folder]
+    found = [_read(one) for one in folders]
+    for one, (files, _) in zip(folders, found, strict=True):
+        for file in track(files, f"checking {one}", len(files), "images"):
+            check_image(file)
+    splits = [range(len(files)) for files, _ in found]
+    if len(splits) == 1:
+        splits = _split(folder.name, name, len(splits[0]), on_note)
+    p_WPs, p_WQs = (
+        X_WS[split.start : split.stop, :2, 3]
+        for (_, X_WS), split in zip((found[0], found[-1]), splits, strict=True)
     )
-    if len(matched):
-        frames: dict[Role, tuple[int, ...]] = {
-            "places": tuple(range(*places)),
-            "queries": tuple(matched.tolist()),
-        }
-        drives = (
-            NamedDrive(one := f"{name}_{role}", ImageSource(folder, one, shown))
-            for role, shown in frames.items()
+    matches: Sequence[list[int]] = [[] for _ in p_WQs]
+    if len(p_WPs) and len(p_WQs):
+        tree = cKDTree(p_WPs)
+        matches = tree.query_ball_point(p_WQs, RADIUS, return_sorted=True)
+    queries = [k for k, places in enumerate(matches) if places]
+    on_note(
+        f"{name}: {len(queries)} of {len(p_WQs)} queries have a place within"
+        f" {RADIUS:g} m; the others are left out"
+    )
+    if not queries:
+        return
+    places = list(range(len(p_WPs)))
+    if most is not None:
+        ends = np.linspace(0, len(queries) - 1, min(most, len(queries)))
+        queries = [queries[k] for k in ends.round().astype(int)]
+        rng = np.random.default_rng(_SEED)
+        places = sorted({int(rng.choice(matches[k])) for k in queries})
+        on_note(
+            f"{name}: {len(queries)} of these queries, and {len(places)} of"
+            f" {len(p_WPs)} places"
         )
-        yield ImageSequence(name, *drives)
+    chosen = zip(
+        get_args(Role),
+        (folders[0], folders[-1]),
+        splits,
+        (places, queries),
+        strict=True,
+    )
+    drives = (
+        NamedDrive(
+            one := f"{name}_{role}",
+            ImageSource(shown, one, tuple(split[k] for k in numbers)),
+        )
+        for role, shown, split, numbers in chosen
+    )
+    yield ImageSequence(name, *drives)
+
+
+def _split(folder: str, name: str, number: int, on_note: OnNote) -> list[range]:
+    """Returns the frames of the places and of the queries in a sequence."""
+    splits = [range(*one) for one in _SPLITS.get(folder, ())]
+    if splits and splits[-1].stop <= number:
+        return splits
+    half = number // 2
+    on_note(
+        f"{name}: no frames of the published evaluation: the first {half} of"
+        f" {number} images are places, the others queries"
+    )
+    return [range(half), range(half, number)]
 
 
 def _read(folder: Path) -> tuple[list[Path], np.ndarray]:
     """Returns the N images of a sequence, and their poses (N, 4, 4)."""
-    images = folder / "imgs"
+    images = folder / _IMAGES
     files = listed(images, "*.png")
     if not files:
         raise InputError(f"{images}: no image (*.png) in it")

@@ -34,6 +34,7 @@ from evaluation.real.image_sequences import (
     UNIT,
     ImageSequence,
     ImageSource,
+    open_images,
     open_sequences,
 )
 from evaluation.real.sessions import FOLDER as SESSIONS
@@ -82,6 +83,7 @@ def measure_real(
     settings: Iterable[str] = (),
     simulated: Path | None = None,
     on_note: OnNote = lambda text: None,
+    queries: int | None = None,
 ) -> tuple[Results, QueryRows]:
     """Measures data sets in a folder, and writes both tables.
 
@@ -94,8 +96,11 @@ def measure_real(
             function `localise`.
         settings: `METHOD.NAME=VALUE` each, for methods of place recognition.
         simulated: folder of simulated recordings. Their scans are added as
-            places, and a classifier tries to tell the real scans from them.
+            places, and a classifier tries to tell the real scans from them. The
+            folder can also hold sequences of images, for the classifier.
         on_note: is called with each note for the user.
+        queries: number of queries of each sequence of images, see
+            `open_sequences`.
 
     Raises:
         InputError: a method is not known or its file cannot be used, the folder
@@ -122,7 +127,7 @@ def measure_real(
         on_note,
     )
     found = open_data_sets(folder, on_note)
-    images = open_sequences(folder / FOLDER, on_note)
+    images = open_sequences(folder / FOLDER, on_note, queries)
     units = dict.fromkeys(one.data_set.unit for one in found)
     if images:
         units[UNIT] = None
@@ -130,9 +135,12 @@ def measure_real(
         unit: simulated_drives(simulated, unit, on_note) if simulated else []
         for unit in units
     }
-    _add_images(engine, images, made_of.get(UNIT, []), choices)
+    made_images = open_images(simulated / FOLDER) if simulated else []
+    _add_images(engine, images, made_of.get(UNIT, []) + made_images, choices)
     for unit, made in made_of.items():
         sets = [one for one in found if one.data_set.unit == unit]
+        if made_images and not sets:
+            continue
         _add_unit(engine, sets, made, choices)
         if not made:
             on_note(f"{unit}: no simulated scan of it to judge")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+import shutil
 
 import numpy as np
 from PIL import Image
@@ -116,6 +117,7 @@ def write_images(folder: Path) -> None:
         Image.fromarray(image).save(path)
         rows.append([1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0])
     np.savetxt(sequence / "pose.txt", rows)
+    shutil.copytree(sequence, folder / "real_images/kitti_bev/05")
 
 
 _FIRST = ("metropolis_01", "town_01")
@@ -389,6 +391,19 @@ RECIPES = {
         changes=((" --method ring++", ""),),
         prepare=write_images,
         makes=("images/results.csv",),
+    ),
+    "images ranked": Recipe(
+        ".venv/bin/cns-drake export drives/suburbia_02_hdl_64e --format bev",
+        changes=(
+            ("drives/suburbia_02_hdl_64e", "output/town_01"),
+            ("--lidar lidar ", ""),
+            ("--lidar query ", ""),
+            ("--method ring++", "--method probe"),
+        ),
+        after=("own city", "real images"),
+        prints=("Kendall's tau, real and simulated",),
+        makes=("made/kitti_bev/suburbia/queries/imgs/000000.png",),
+        by_night=True,
     ),
     "sessions of another program": Recipe(
         "days,r1,low,high",
@@ -1033,6 +1048,10 @@ NOT_RUN = {
     "aged, and minutes; the recipe map truth has a small one",
     ".venv/bin/cns-drake simulate docs/examples/like_nuscenes": "records a "
     "shipped drive, for minutes; test_real has recordings",
+    ".venv/bin/cns-drake simulate docs/examples/like_kitti": "likewise; the "
+    "recipe images ranked has another drive",
+    ".venv/bin/cns-eval real real_images --simulated": "needs an extra, and "
+    "simulated drives; test_images judges images",
     ".venv/bin/cns-drake study docs/examples/nclt_twin": "ages a shipped city "
     "and drives through it, for an hour",
     ".venv/bin/cns-drake study docs/examples/nclt_prediction": "likewise, and "

@@ -126,6 +126,7 @@ def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
         ("mcap", 3, "one drive"),
         ("map-truth", 1, "two drives"),
         ("map-sessions", 3, "two drives"),
+        ("bev-images", 2, "one drive"),
     ],
 )
 def test_formats_have_a_number_of_drives(

@@ -1,17 +1,25 @@
 """`cns-eval real` on bird's-eye images with poses."""
 
 from functools import partial
+import shutil
 
-from helpers.eval_program import run
+from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
+from helpers.eval_program import run, run_program
 import numpy as np
 from PIL import Image
 import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
-from evaluation.clouds.count_images import image_points
+from cns_drake.command_line.cli import main
+from evaluation.clouds.count_images import image_points, read_image
 from evaluation.real import image_sequences
-from evaluation.real.image_sequences import ImageSource, open_sequences
+from evaluation.real.data_sets import simulated_drives
+from evaluation.real.image_sequences import (
+    ImageSource,
+    open_images,
+    open_sequences,
+)
 from evaluation.real.measuring import judge_scans
 from evaluation.results.table import QueryRows, Results
 
@@ -109,6 +117,119 @@ def test_frames_of_the_published_evaluation(tmp_path, monkeypatch):
     assert before != found.queries.source.identity()
 
 
+def test_a_few_queries_each_have_one_place(tmp_path):
+    """Every second query has a match; four of them are asked, evenly."""
+    # Places are 1 m apart, so that up to nine are near a query.
+    poses = [(0.0, 1.0 * k, 0.0) for k in range(40)]
+    poses += [(0.0, 1.0 * k, 3.0 + 90.0 * (k % 2)) for k in range(40)]
+    root = fill(tmp_path, "town", poses)
+    notes = []
+    (found,) = open_sequences(root / "kitti_bev", notes.append, 4)
+    assert found.name == "town"
+    assert found.queries.source.frames == (40, 52, 66, 78)
+    near = [
+        {k for k in range(40) if np.hypot(k - query + 40, 3.0) <= 5.0}
+        for query in found.queries.source.frames
+    ]
+    places = found.places.source.frames
+    assert places == tuple(sorted(places))
+    assert [len(one & {*places}) for one in near] == [1, 1, 1, 1]
+    # Not the nearest one of each.
+    assert places != (0, 12, 26, 38)
+    assert notes[1:] == [
+        "town: 20 of 40 queries have a place within 5 m; the others are left"
+        " out",
+        "town: 4 of these queries, and 4 of 40 places",
+    ]
+    (again,) = open_sequences(root / "kitti_bev", notes.append, 4)
+    assert again == found
+    # There are no more than twenty.
+    (every,) = open_sequences(root / "kitti_bev", notes.append, 30)
+    assert every.queries.source.frames == tuple(range(40, 80, 2))
+
+
+def test_places_and_queries_may_have_folders_of_their_own(tmp_path):
+    """Two drives of different lengths, such as two sessions."""
+    drives = tmp_path / "places", tmp_path / "queries"
+    folder = tmp_path / "made" / "kitti_bev" / "town"
+    for drive, poses in zip(drives, (POSES[:5], POSES[5:8]), strict=True):
+        made = fill(drive, "one", poses) / "kitti_bev" / "one"
+        shutil.copytree(made, folder / drive.name)
+    (found,) = open_sequences(folder.parent, lambda note: None)
+    assert found.places.source.frames == (0, 1, 2, 3, 4)
+    assert found.queries.source.frames == (0, 1, 2)
+    opened = [one.source() for one in (found.places, found.queries)]
+    assert [one.world_frame for one in opened] == ["town", "town"]
+    np.testing.assert_allclose(opened[1].X_WS[1, :2, 3], [3.0, -1.0])
+    (shown,) = open_images(folder.parent)
+    assert shown.source().files == opened[0].files
+    # They are no recordings.
+    assert simulated_drives(tmp_path / "made", "hdl-64e", print) == []
+    shutil.rmtree(folder / "queries")
+    with pytest.raises(InputError, match=r"queries.imgs: no image"):
+        open_sequences(folder.parent, lambda note: None)
+
+
+def export(capsys, drive, output, *words):
+    words = "export", drive, "--format", "bev-images", *words
+    return run_program(
+        capsys, "cns-drake", main, *words, "--output", str(output)
+    )
+
+
+def test_a_drive_becomes_images(tmp_path, capsys):
+    """Of columns of three, two and one voxel, and one beyond the reach."""
+    column = [[10.1, 0.1, z] for z in (-1.7, -1.3, 0.3)]
+    column += [[0.1, 8.1, z] for z in (0.1, 0.5)]
+    scan = make_scan(np.array([*column, [-4.1, 0.1, 0.1], [30.0, 0.1, 0.1]]))
+    poses = [yaw_pose(2.0 * k, 1.0, 0.5, 0.3 * k) for k in range(3)]
+    drive = write_recording(tmp_path / "town", [scan] * 3, poses)
+    output = tmp_path / "made" / "kitti_bev" / "town"
+    status, out, err = export(capsys, drive, output)
+    assert (status, out) == (0, f"{output}\n"), err
+    expected = np.zeros((151, 151), np.uint8)
+    expected[75 - 25, 75] = 255
+    expected[75, 75 - 20] = 128
+    for k in range(3):
+        image = read_image(output / "imgs" / f"{k:06d}.png")
+        np.testing.assert_array_equal(image, expected)
+    X_WS = np.loadtxt(output / "pose.txt").reshape(3, 3, 4)
+    expected_poses = np.array(poses)[:, :3]
+    expected_poses[:, 2, 3] += 1.6  # Height of the LiDAR.
+    np.testing.assert_allclose(X_WS, expected_poses, atol=1e-12)
+    status, _, err = export(capsys, drive, output)
+    assert (status, err.count("\n")) == (2, 1), err
+    assert str(output) in err
+    assert sorted(one.name for one in output.parent.iterdir()) == ["town"]
+
+
+def test_images_are_of_scans_without_motion(tmp_path, capsys):
+    """A wall that the vehicle approaches by 1 m during each scan."""
+    number = 100
+    scan = make_scan(np.tile([20.1, 0.1, 0.1], (number, 1)))
+    scan["z"][1::2] = 0.5
+    scan["t"] = np.arange(number) * 1_000_000
+    section = {"preset": "cns", "motion_distortion": True}
+    drive = write_recording(
+        tmp_path / "town",
+        [scan] * 6,
+        [yaw_pose(1.0 * k, 0.0, 0.0, 0.0) for k in range(6)],
+        stamps_ns=[T0_NS + k * 100_000_000 for k in range(6)],
+        attachments={
+            "scenario.json": {"map": "town", "lidars": {"lidar": section}}
+        },
+    )
+    status, _, err = export(capsys, drive, tmp_path / "images")
+    assert (status, err.count("the motion is taken out")) == (0, 1), err
+    assert "used as taken" not in err
+    image = read_image(tmp_path / "images" / "imgs" / "000002.png")
+    # From 20.1 m to 21.1 m.
+    rows = 75 - np.unique(np.trunc((20.1 + np.arange(100) / 100) / 0.4))
+    expected = np.zeros((151, 151), np.uint8)
+    expected[rows.astype(int), 75] = 255
+    np.testing.assert_array_equal(image, expected)
+
+
 def test_a_sequence_without_a_revisit_is_left_out(tmp_path, capsys):
     root = fill(tmp_path, poses=POSES[:4])
     notes = []
@@ -179,6 +300,9 @@ def test_images_are_told_from_images_of_scans(tmp_path, monkeypatch):
         # An image has neither intensities nor rings.
         assert not {"intensity", "roughness"} & set(result["auc"])
         found[share] = result["auc"]["all"]
+    # Images are judged against images, too.
+    same = judge_scans(Reporter(print), source, (source,))
+    assert same["auc"]["all"] < 0.75
     assert found[0.3] < 0.75
     assert found[0.6] > 0.95
 
