@@ -150,14 +150,14 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
         InputError: naming the option that cannot be used.
     """
     if source.suffix == ".xodr":
-        for option, value in (
-            ("--years", options.years),
-            ("--lod", options.lod is not None),
+        for option, value, lacking in (
+            ("--years", options.years, "years of construction"),
+            ("--lod", options.lod is not None, "levels of detail"),
         ):
             if value:
                 raise InputError(
-                    f"{option}: {source} is a road network, without any; leave"
-                    " the option out"
+                    f"{option}: {source} is a road network, which has no"
+                    f" {lacking}; leave the option out"
                 )
     if options.grow is not None and options.years:
         raise InputError(

@@ -60,7 +60,8 @@ class Motion(NamedTuple):
         steps = 1 + max(1, int(np.ceil(angle / _LARGEST_STEP_RAD)))
         if steps > _MOST_STEPS:
             raise ValueError(
-                f"a body turns {angle:.0f} rad while the LiDAR does once"
+                f"a body turns by {angle:.0f} rad during one revolution"
+                " of the LiDAR"
             )
         return steps
 

@@ -97,7 +97,7 @@ def overlap_matrix(
     result[[len(points) == 0 for points in clouds]] = math.nan
     columns = track(
         range(len(placed)),
-        f"overlap: seeing {database.name}",
+        f"overlap: comparing {database.name}",
         len(placed),
         "places",
     )

@@ -314,7 +314,7 @@ def check_has_match(outcome: PlaceOutcome) -> None:
     if protocol.overlap is not None:
         raise InputError(
             f"{outcome.query}: no place of {database} shows"
-            f" {protocol.overlap:.0%} of what a query shows"
+            f" {protocol.overlap:.0%} of a query's scan"
         )
     raise InputError(
         f"{outcome.query}: no query lies within {protocol.radius:g} m of a"

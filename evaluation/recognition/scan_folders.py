@@ -64,8 +64,8 @@ def write_scores(
     """
     if method.config.sequence:
         raise InputError(
-            f"{method.name}: sequence: scans of a folder have no poses, and so"
-            " no way"
+            f"{method.name}: sequence: needs the poses of scans, which a"
+            " folder of scans does not have"
         )
     place_files = _scan_files(database)
     query_files = _scan_files(query)

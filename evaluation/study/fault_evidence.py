@@ -101,7 +101,7 @@ def find_evidence(
     shown = {}
     for place in track(
         np.flatnonzero(is_needed).tolist(),
-        f"why: seeing {database.name}",
+        f"reasons: reading {database.name}",
         int(is_needed.sum()),
         "places",
     ):
@@ -120,7 +120,7 @@ def find_evidence(
     changed_classes = [""] * number
     fits = {method: np.full(number, math.nan) for method in wrong}
     for row in track(
-        range(number), f"why: comparing {query.name}", number, "queries"
+        range(number), f"reasons: comparing {query.name}", number, "queries"
     ):
         frame = int(query_frames[row])
         query_scan = _Shown.of(query, frame, protocol.max_range)

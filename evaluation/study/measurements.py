@@ -320,7 +320,9 @@ def _compare(
         and len(searched.places.frames) > _MANY
         and _takes_long(method, searched, query)
     ):
-        reporter.note(f"{choice.name}: it would take over an hour")
+        reporter.note(
+            f"{choice.name}: left out, because it would take over an hour"
+        )
         return []
     plain, *by_gate = compare_with_gates(
         method,

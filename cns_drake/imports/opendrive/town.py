@@ -511,7 +511,9 @@ def _build(
     generated = [one for one in city.structures if one.name not in imported]
     lanes_of_traffic = lane_drives.lanes_for_traffic(bands, kerbs)
     if lanes_of_traffic is None:
-        faults.add("no lanes for traffic: none leads on for ever", source.name)
+        faults.add(
+            "no lanes for traffic: each comes to a dead end", source.name
+        )
     missing = {} if options.grow is None else {"missing": options.grow}
     stages = starter_stages(City(tuple(generated), city.cars), **missing)
     return Town(

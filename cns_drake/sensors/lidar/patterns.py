@@ -326,7 +326,7 @@ class SpinningPattern(BeamPattern):
             )
         if not np.ptp(self.azimuths_rad or 0.0) <= 2.0 * math.pi + 1e-9:
             raise ValueError(
-                f"azimuths_rad: {self.azimuths_rad} is no part of a turn"
+                f"azimuths_rad: {self.azimuths_rad} is no range within 360 deg"
             )
 
     @property

@@ -67,7 +67,7 @@ def test_signals_and_objects_stand_at_their_places(tmp_path):
     assert found["object_1_5"].semantic_class == "vegetation"
     rows = {kind: number for kind, number, _ in built.faults.rows()}
     assert rows == {
-        "no lanes for traffic: none leads on for ever": 1,
+        "no lanes for traffic: each comes to a dead end": 1,
         "signal over a lane, left out": 1,
         "object that is painted on the road, left out": 1,
     }
@@ -352,6 +352,6 @@ def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
         "tunnel, its road left open": 2,
         # Road 2 has a deck above road 1.
         "bridge over no other road, laid on the ground": 1,
-        "no lanes for traffic: none leads on for ever": 1,
+        "no lanes for traffic: each comes to a dead end": 1,
     }
     assert len(build_town(path, ImportOptions()).faults.rows()) == 1

@@ -200,5 +200,5 @@ def test_points_in_the_world_lie_where_they_were_met():
 def test_it_turns_too_fast():
     meeting = Meeting(SHAPES["box"][0])
     meeting.move(STILL, SpatialVelocity(w=[0, 0, 1e4], v=[0, 0, 0]))
-    with pytest.raises(ValueError, match="a body turns 1000 rad while"):
+    with pytest.raises(ValueError, match="a body turns by 1000 rad during"):
         meeting.eval()

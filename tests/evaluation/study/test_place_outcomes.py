@@ -198,5 +198,6 @@ def test_methods_that_would_take_very_long_are_left_out(
     step.run(reporter)
     assert step.part.read() == []
     assert notes == [
-        f"{choice.name}: it would take over an hour" for choice in METHODS
+        f"{choice.name}: left out, because it would take over an hour"
+        for choice in METHODS
     ]
