@@ -52,8 +52,8 @@ _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 class ReferenceSystem:
     """The reference system of a CityJSON file: axes and units of coordinates.
 
-    If the system defines no heights, their unit is assumed to be that of the
-    first two coordinates.
+    If the system defines no heights, heights are assumed to have the unit of
+    the first two coordinates.
 
     Attributes:
         name: name of the system in the file; "" if there is none.

@@ -247,7 +247,7 @@ def make_imported(
         surfaces: part of the surface -> triangles (M, 3, 3) [m]. Empty parts
             are left out; at least one part must not be empty.
         finishes: part of the surface -> its colour and material. Parts without
-            an entry have those of the class.
+            an entry have the colour and material of the class.
         year: year in which the structure was built; None if unknown.
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.

@@ -116,9 +116,9 @@ def load() -> ctypes.CDLL:
 class PacketFunction(types.WrapperAddressProtocol):
     """A C function that casts a packet of rays, for compiled code.
 
-    The function takes four addresses: those of the mask of active rays, the
-    scene, the packet and the arguments. Unlike a ctypes function, it can be an
-    argument of a compiled function whose machine code numba keeps on disk.
+    The function takes the addresses of the mask of active rays, the scene, the
+    packet and the arguments. Unlike a ctypes function, it can be an argument of
+    a compiled function whose machine code numba keeps on disk.
     """
 
     def __init__(self, function: object):
@@ -143,8 +143,9 @@ def native_packet(
 ) -> tuple[int, PacketFunction]:
     """Returns the number of rays in a packet, and the function that casts it.
 
-    The number is that of the processor's vector units, such as 16 with AVX-512
-    and 8 with AVX2. In a larger packet, Embree would cast the rays one by one.
+    The number is the width of the processor's vector units, such as 16 with
+    AVX-512 and 8 with AVX2. In a larger packet, Embree would cast the rays one
+    by one.
 
     Args:
         embree: Embree's C interface.

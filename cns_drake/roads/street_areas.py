@@ -31,7 +31,7 @@ _SPACING = 0.5
 class RoadSurface:
     """The height of carriageways, continued beyond their edges.
 
-    Roads are level across. The height at a place is therefore that of the
+    Roads are level across. The height at a place is therefore the height of the
     nearest point on a centreline. Away from the roads, the height has a step
     where the nearest road changes.
     """

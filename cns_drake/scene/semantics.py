@@ -50,7 +50,7 @@ MOVING_IDS = {
 def moving_id(semantic_class: str) -> int:
     """Returns SemanticKITTI's id for a class while its objects move.
 
-    Classes without such an id get that of SemanticKITTI's
+    Classes without such an id get the id of SemanticKITTI's
     `moving-other-vehicle`.
     """
     return MOVING_IDS.get(semantic_class, OTHER_MOVING_ID)

@@ -13,9 +13,9 @@ scans. (The method's authors describe all clouds in one world frame. This
 favours the method, because the grids on which planes and keypoints are found
 then coincide.)
 
-Scores are those of the public program (equal for 243 single scans of two LiDARs
-and 163 submaps, each against 308 places). Two details that the method leaves
-open follow the program. One is the order in which planes are compared
+Scores equal the public program's scores (checked on 243 single scans of two
+LiDARs and 163 submaps, each against 308 places). Two details that the method
+leaves open follow the program. One is the order in which planes are compared
 (`btc_planes`); because of it, scores depend on the order of a cloud's points.
 The other is an error in the positions of keypoints where the ground slopes
 sideways, which lowers scores there; `image_axes: orthogonal` corrects it.

@@ -38,7 +38,7 @@ class MethodConfig(InputModel):
 
     Attributes:
         sensor_height: height of the LiDAR above the ground [m]. The default is
-            that of the CNS vehicle.
+            the height on the CNS vehicle.
         place: which of several merged scans gives a place its pose: the scan in
             the `middle`, or the `first`. By default the protocol decides.
             Methods that describe single scans do not use this parameter.

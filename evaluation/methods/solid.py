@@ -70,8 +70,8 @@ class SolidConfig(MethodConfig):
     def field(self, lidar: LidarField = _CNS) -> LidarField:
         """Returns the number of rings and the elevation limits [deg] to use.
 
-        They are those of the LiDAR, except where the settings `elevations`,
-        `lowest_deg` and `highest_deg` replace them.
+        These are the LiDAR's own values, except where the settings
+        `elevations`, `lowest_deg` and `highest_deg` replace them.
 
         Args:
             lidar: number of rings of the LiDAR, and lowest and highest

@@ -89,9 +89,10 @@ class PairEvidence:
 
     @property
     def visible_change_added(self) -> float:
-        """Mean visible change minus that of the control; NaN without a control.
+        """Mean visible change minus the mean in the control.
 
-        The control is the same comparison without a change of the city.
+        The control is the same comparison without a change of the city. The
+        result is NaN without a control.
         """
         return visible_change_added(self.overlaps, self.unchanged)
 

@@ -51,7 +51,7 @@ MAX_RANK = 25
 class PrCurve:
     """The precision-recall curve: a point for every distinct score.
 
-    The first point is that of the best score.
+    The threshold of the first point is the best score.
 
     Attributes:
         thresholds: (K,) least accepted scores, decreasing.
@@ -324,7 +324,7 @@ def own_samples(
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns metrics of bootstrap samples, paired with those of `other`.
+    """Returns metrics of bootstrap samples, paired with samples of `other`.
 
     Sample k contains the same blocks of queries as sample k of
     `own_samples(other)`. The metrics of both methods or conditions can thus be

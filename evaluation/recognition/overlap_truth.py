@@ -6,7 +6,7 @@ overlap is the share of the query's points that are shown. Points that were
 occluded for the place's sensor, or absent when the sensor passed, are not
 shown.
 
-The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
+The idea comes from OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
 """
 
@@ -118,7 +118,7 @@ def overlap_matrix(
 def compared_frames(
     database: Drive, query: Drive, protocol: RetrievalProtocol
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the frames that are compared: those of queries, and of places.
+    """Returns the frames of queries and of places that are compared.
 
     Args:
         database: the drive of the places.

@@ -118,8 +118,8 @@ class PlaceOutcome:
             retrieval: scores and ground truth of Q queries and D places.
             query: name of the drive of the queries, and time stamps (Q,) [ns]
                 and positions (Q, 3) [m] of the queries.
-            drives: name of each place's drive (D names). The first name is
-                that of the database drive.
+            drives: name of each place's drive (D names). The first name is the
+                name of the database drive.
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
                 match. None if it is unknown.
@@ -301,7 +301,7 @@ def check_has_match(outcome: PlaceOutcome) -> None:
     """Checks that a query has a match.
 
     Raises:
-        InputError: none has one.
+        InputError: no query has a match.
     """
     if outcome.outcomes.has_match.any():
         return
@@ -330,7 +330,7 @@ def faults(
 ) -> np.ndarray:
     """Returns, for each query, why its top-ranked place is wrong.
 
-    The top-ranked place is the one that the method ranks first.
+    The top-ranked place is the place that the method ranks first.
 
     Args:
         outcomes: outcomes of Q queries.
@@ -359,7 +359,7 @@ def faults(
 
 
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
-    """Returns the mean visible change minus that of a baseline.
+    """Returns the mean visible change minus the mean in a baseline.
 
     The visible change also contains parts of a scan that are occluded only
     because the viewpoints differ (parallax). Subtracting the baseline removes

@@ -124,7 +124,7 @@ class RetrievalProtocol:
     def scans_before(self, method: Method) -> int:
         """Returns how many merged scans come before the scan of the place.
 
-        The place's scan is the one that gives the place its pose.
+        The place's scan is the scan that gives the place its pose.
         """
         is_middle = self.of(method).place == "middle"
         return self.scans(method) // 2 if is_middle else 0

@@ -21,8 +21,8 @@ class Search:
     """A method's search in a database, one group of its places after another.
 
     If the descriptors are a list, or the method does not divide databases,
-    there is one group. Results are those of one search in the whole database,
-    bit for bit, if the method compares each place by itself (see
+    there is one group. Results equal the results of one search in the whole
+    database, bit for bit, if the method compares each place by itself (see
     `Method.divides`).
 
     Attributes:

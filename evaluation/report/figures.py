@@ -1,8 +1,8 @@
 """Pictures of the maps: the routes, and the change.
 
-Millions of points are projected orthographically, hidden ones removed by a
-depth buffer, and edges darkened where the depth steps (eye-dome lighting:
-Boucheny 2009), which shows shape without normals.
+Millions of points are projected orthographically, occluded points are removed
+by a depth buffer, and edges are darkened where the depth steps (eye-dome
+lighting: Boucheny 2009), which shows shape without normals.
 """
 
 from collections.abc import Sequence

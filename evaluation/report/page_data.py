@@ -82,7 +82,7 @@ class CameraImages:
             A mapping for JSON. `files` contains the images as base64 text. Two
             lists have an entry for each of the K frames: `nearest` is the index
             in `files` of the image that is nearest in time, and `later` is the
-            time of this image minus that of the frame [s].
+            time of this image minus the time of the frame [s].
         """
         times_ns = self.times_ns[::step]
         nearest = _nearest(times_ns, self.stamps_ns)

@@ -197,8 +197,8 @@ def choose_methods(
 
     Raises:
         InputError: `names` contains an unknown name, a method or a file twice,
-            or a file that registers no method or one whose name is taken; an
-            optional method is not installed; or a setting is unknown or its
+            or a file that registers no method, or a method whose name is taken;
+            an optional method is not installed; or a setting is unknown or its
             value is not valid.
     """
     chosen: list[MethodChoice] = []

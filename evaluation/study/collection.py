@@ -113,7 +113,8 @@ class MapDrives:
     def change_pairs(self) -> list[Recordings]:
         """Returns the pairs of drives between which change is measured.
 
-        Each drive of an earlier stage is paired with that of the last stage.
+        Each drive of an earlier stage is paired with the drive of the last
+        stage.
         """
         *earlier, _ = sorted(self.stages, key=natural_key)
         return [(self.stages[key], self.last) for key in earlier]

@@ -164,8 +164,8 @@ def change_job(
     Args:
         city: the city.
         pair: recordings in the earlier and in the later stage of the city.
-        changes: files with the change of the pair, and with that of its
-            control, if there is one; see `ChangeTask`.
+        changes: files with the change of the pair and, if there is a control,
+            with the change of the control; see `ChangeTask`.
         files: files of the study.
         planned: adds the features that are drawn.
     """

@@ -414,7 +414,7 @@ def crowded(
         num_others: number of places to append.
         beside: files with the same method's descriptors of further drives in
             the same world, from older to newer. All of their places come before
-            those of other cities.
+            the places of other cities.
         keep: which places in this world are kept, see `kept_places`.
         cell: side of the cells by which places are kept [m].
         divides: whether descriptors are read while they are searched, if they

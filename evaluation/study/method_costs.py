@@ -23,8 +23,8 @@ def measure_method_costs(
 ) -> list[Cost]:
     """Returns the time and memory that each method needs on one core.
 
-    The cost of a search is that of the task `cost`; the time to describe a
-    cloud is added.
+    The cost of a search is the result of the task `cost`; the time to describe
+    a cloud is added.
 
     Args:
         reporter: reports progress.

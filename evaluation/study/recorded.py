@@ -120,7 +120,8 @@ def chosen_sessions(
     """Returns the recordings of a database of several, from older to newer.
 
     Args:
-        city: all recordings of the map; the query is that of the last stage.
+        city: all recordings of the map; the query is the recording of the last
+            stage.
         names: names of the recordings.
         where: file and field of the names, for errors.
 

@@ -111,7 +111,7 @@ class StagesReport:
     def published(self) -> Engine:
         """The engine of second runs, by the protocol of published numbers.
 
-        The tables do not contain its pairs, but only those of `stages`.
+        The tables contain only the pairs of `stages`, not those of this engine.
         """
         return Engine(
             self.reference.title,

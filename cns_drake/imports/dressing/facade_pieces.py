@@ -1,6 +1,6 @@
 """Walls and roofs with details for imported buildings.
 
-A wall is divided into storeys and bays, which get the same details as those of
+A wall is divided into storeys and bays, which get the same details as in
 generated buildings. A roof gets equipment or chimneys.
 """
 

@@ -92,8 +92,8 @@ def find_free_space(
 ) -> FreeSpace:
     """Returns the space for a car that is free in all stages of a city.
 
-    `structures` are those of all stages. If the city has roads, only space on
-    roads counts as free.
+    `structures` contains the structures of all stages. If the city has roads,
+    only space on roads counts as free.
     """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1

@@ -368,10 +368,10 @@ class Thing(NamedTuple):
         kind: type of the thing, in lower case.
         s, t: coordinates along and across the road [m].
         z: height above the road [m].
-        heading: heading relative to that of the road [rad].
+        heading: heading relative to the heading of the road [rad].
         size: length, width and height; 0 where unknown [m].
-        outline: (N, 4) corners as u, v, height of the foot above that of the
-            object, and height above this foot [m]; None if not in the file.
+        outline: (N, 4) corners as u, v, height of the foot above the foot of
+            the object, and height above this foot [m]; None if not in the file.
         road_outline: (N, 4) corners as s, t, height of the foot above the road,
             and height above this foot [m]; None if not in the file.
         is_open: whether the outline is a line, not the edge of an area.

@@ -10,8 +10,8 @@ with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and L = 2.29
 R^-0.45 for snow; D is the diameter in mm (for a flake, the diameter of the
 melted drop); R is the rate in mm/h of water. Extinction follows geometric
 optics: each drop counts with twice its cross-section. The back-scatter of a
-raindrop is that of LISA (Kilic et al., 2021). The back-scatter of a flake
-follows from the lidar ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
+raindrop follows LISA (Kilic et al., 2021). The back-scatter of a flake follows
+from the lidar ratio of ice crystals, 25 sr (Young and Vaughan, 2009).
 
 Fog is a homogeneous medium. With the meteorological visibility V [m], its
 extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
