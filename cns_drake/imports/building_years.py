@@ -50,8 +50,9 @@ def year_of_date(text: str) -> int | None:
     """Returns the year that a text states; None if it states none.
 
     For a range (`1914..1918`), the result is the last year; for `before 1910`
-    and `~1855`, the year in the text. For a period such as a century, it is the
-    middle year, or an earlier or later one if the text says "early" or "late".
+    and `~1855`, the year in the text. For a period such as a century, the
+    result is the middle year, or an earlier or later year if the text says
+    "early" or "late".
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)

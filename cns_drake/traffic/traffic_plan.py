@@ -401,8 +401,8 @@ class Tracks:
 
     Between two of these times, every coordinate is a cubic polynomial with a
     continuous rate (Catmull-Rom spline). In the first and the last interval of
-    a body it is a parabola, and before the first and after the last time it is
-    a straight line.
+    a body, the coordinate is a parabola; before the first and after the last
+    time, it is a straight line.
 
     Attributes:
         dt: time between two of the times [s].

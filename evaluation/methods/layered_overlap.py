@@ -1,9 +1,9 @@
 """Layered overlap: a matched filter on binary maps, robust to change.
 
 A scan becomes maps from above: one for each layer of height, one for poles and
-one for kerbs. Two scans are compared at the pose at which most of their filled
-cells coincide. Objects that are gone or new only lower this number, while
-unchanged objects all coincide at the same pose.
+one for kerbs. Two scans are compared at the pose at which the greatest number
+of their filled cells coincide. Objects that are gone or new only lower this
+number, while unchanged objects all coincide at the same pose.
 
 Matched filters for place recognition come from Joseph, Fischer and Milford
 (arXiv 2409.03998), who use one map of occupied cells. The layers, poles and

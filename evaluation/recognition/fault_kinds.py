@@ -82,8 +82,8 @@ class PairEvidence:
     def visible_change(self) -> tuple[float, int]:
         """Mean visible change of queries with a match, and their number.
 
-        The visible change of a query is the share of its scan that the scan of
-        its right place does not show, 1 minus the overlap.
+        The visible change of a query is 1 minus the overlap: the share of its
+        scan that the scan of its right place does not show.
         """
         return mean_visible_change(self.overlaps)
 

@@ -255,9 +255,9 @@ def weights_by_drive(
     """Yields how often queries are in bootstrap samples, for sets of queries.
 
     Sets of queries of one drive are not independent: where the streets suit a
-    method, it tends to be right under all conditions. Therefore samples of the
-    sets of one drive contain the same blocks. Different drives are sampled
-    independently.
+    method, the method tends to be right under all conditions. Therefore samples
+    of the sets of one drive contain the same blocks. Different drives are
+    sampled independently.
 
     Args:
         blocks: for each set, the block (Q,) of the route of each query.

@@ -41,8 +41,8 @@ class Searched(NamedTuple):
         described: the described places.
         drives: name of each place's drive.
         num_here: number of places in the query's own world; they come first.
-        rows: (num_here,) index of each of these among all places of the drives
-            through the query's world.
+        rows: (num_here,) index of each place in the query's own world, among
+            all places of the drives through this world.
     """
 
     described: DriveDescriptors

@@ -1,10 +1,10 @@
 """Searches two drives through a city that share a part of their paths.
 
 The first drive is approximately the longest of all shortest paths. The second
-drive shares the middle part of the first drive, but begins and ends elsewhere:
-with two "arms" of its own. A path is a sequence of pieces, such as lanes of
-streets or cells of free space. A `WayGraph` says which piece can follow which;
-a sequence of its pieces is called a way.
+drive shares the middle part of the first drive, but has a beginning and an end
+of its own, which are called arms. A path is a sequence of pieces, such as lanes
+of streets or cells of free space. A `WayGraph` says which piece can follow
+which; a sequence of its pieces is called a way.
 """
 
 from abc import ABC, abstractmethod

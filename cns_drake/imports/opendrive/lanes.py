@@ -253,7 +253,7 @@ def stations(
     end: float,
     more: Sequence[Cubics] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the places along a road that its shape needs.
+    """Returns distances along a road at which its shape must be sampled.
 
     Between two places the road is nearly straight. A joint of two pieces of the
     road is contained twice, once for each piece.

@@ -186,9 +186,10 @@ class Piece:
     shape: Shape
 
     def evaluate(self, s: np.ndarray) -> np.ndarray:
-        """Returns x, y [m] and heading [rad] (N, 3) at distances (N,) [m].
+        """Returns x, y [m] and heading [rad] in W, (N, 3).
 
-        The distances `s` are along the road, and the result is in W.
+        Args:
+            s: (N,) distances along the road [m].
         """
         u, v, turn = self.shape.evaluate(s - self.s).T
         c, sine = math.cos(self.heading), math.sin(self.heading)
@@ -433,7 +434,9 @@ class ImportedRoad:
     spans: tuple[str, ...] = ()
 
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """Returns x, y, z, heading and roll (N, 5) of the reference line.
+        """Returns x, y, z [m], heading and roll [rad] of the reference line.
+
+        The result has the shape (N, 5).
 
         Args:
             s: (N,) distances along the road [m].

@@ -53,7 +53,7 @@ _HEADROOM = 2.0
 
 
 class Passage(NamedTuple):
-    """A way that leads through what is built.
+    """A way that leads through a building or under a roof.
 
     Attributes:
         name: id of the way.
@@ -182,7 +182,7 @@ def note_walled_up(
         streets: ids and lines of the streets in W [m].
         solids: footprints of buildings in W, and the heights at which they
             begin [m].
-        passages: the passages; they are not counted.
+        passages: the passages, whose streets are not counted.
         faults: counts the streets.
     """
     low = [polygon for polygon, begin in solids if begin < _HEADROOM]

@@ -1,8 +1,8 @@
 """Reads the parts of an OpenStreetMap file that make up a city.
 
-Some files are sorted first, such as those of Overpass and of editors. The
-reader needs nodes before ways before relations, by ascending positive ids, and
-the newest version of each only.
+The reader needs first the nodes, then the ways, then the relations, each by
+ascending positive id and only in its newest version. Files in another order,
+such as files of Overpass and of editors, are sorted first.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

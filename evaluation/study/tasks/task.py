@@ -50,9 +50,9 @@ class NamedDrive:
     """A drive that is measured.
 
     Attributes:
-        name: its unique name.
-        source: function that opens it.
-        needs: names of the jobs that record it; empty if it is recorded
+        name: unique name of the drive.
+        source: function that opens the drive.
+        needs: names of the jobs that record the drive; empty if it is recorded
             already, or is simulated while it is read.
         length: about how long the drive is [m], to estimate costs.
     """
