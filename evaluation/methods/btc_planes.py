@@ -63,7 +63,7 @@ class Planes:
 def voxel_planes(
     points: np.ndarray, voxel_size: float, max_points: int, flatness: float
 ) -> Planes:
-    """Returns a plane for each voxel whose points lie on one.
+    """Returns a plane for each voxel whose points lie on a plane.
 
     The planes are in the same order as in the public program of BTC, which
     depends on the order of the points.

@@ -363,8 +363,8 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
     """Returns indices of points that are far apart from each other.
 
-    The first point comes first. Each further point is the one that is farthest
-    from all points before it.
+    This is farthest point sampling. The first index is 0. Each further index is
+    the point whose distance to the nearest point chosen so far is greatest.
 
     Args:
         points: (N, 3) points [m].

@@ -65,7 +65,7 @@ class StoredDrives:
     def described(
         self, places: DescribedScans, drive_of: np.ndarray, rows: np.ndarray
     ) -> DescribedScans:
-        """Returns places with their descriptors, and clouds if there are some.
+        """Returns places with their descriptors, and with clouds if kept.
 
         Args:
             places: D places of these drives without descriptors.

@@ -101,7 +101,7 @@ def find_panels(
     walls: Sequence[np.ndarray],
     is_wanted: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> list[Panel]:
-    """Returns the walls of buildings as panels; a bent wall as several.
+    """Returns the walls of buildings as panels; bent walls become several.
 
     Args:
         walls: for each building, its vertical triangles (M, 3, 3), which face

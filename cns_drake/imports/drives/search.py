@@ -100,7 +100,7 @@ class WaypointRoute:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> WaypointRoute | Obstacle:
-    """Returns the drive along waypoints, or the place (2,) where it fails.
+    """Returns the drive along waypoints, or the place (2,) of its failure.
 
     A drive fails at an obstacle, or at a bend that is too tight for the car. If
     a drive is too short, the result is the place in its middle.
@@ -220,7 +220,7 @@ class WayGraph(ABC):
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
-        """Returns the drive along a way, or the place (2,) where it fails [m].
+        """Returns the drive along a way, or the place (2,) of its failure [m].
 
         A drive fails at an obstacle or a bend that is too tight, see
         `steerable_drive`. `way` is a sequence of piece numbers.

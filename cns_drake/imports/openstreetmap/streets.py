@@ -152,7 +152,7 @@ _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 def laid(
     name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
 ) -> Iterator[Imported]:
-    """Yields one level surface that fills areas; nothing if they are empty.
+    """Yields one level surface that fills areas; nothing for empty areas.
 
     Args:
         name: name of the surface: a word, an underscore, and the id of the
