@@ -594,7 +594,7 @@ def _try(
     task: _Task, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
     """Returns a new plan, or the best one so far if the new is no better."""
-    trial = Trial(task, rng)
+    trial = begin_trial(task, rng)
     num_steps = len(task.streets.until)
     for first in range(0, num_steps, _PART):
         trial.run(range(first, min(first + _PART, num_steps)))
@@ -609,34 +609,37 @@ def _try(
 class Trial:
     """One simulation of traffic, which finds bodies that would collide."""
 
-    def __init__(self, task: _Task, rng: np.random.Generator):
-        """Places vehicles and pedestrians for the first time."""
-        number = min(
-            _with_spare(task.vehicles),
-            max(task.vehicles, motion.room_for_vehicles(task.graph)),
-        )
-        kinds = [KINDS[k] for k in draw_kinds(number, rng)]
+    def __init__(
+        self,
+        task: _Task,
+        kinds: Sequence[VehicleKind],
+        crowd: Crowd,
+        traffic: Traffic,
+        follower: Follower | None,
+        seed: int,
+    ):
+        """Takes the bodies before the first time step.
+
+        Args:
+            task: what all trials have in common.
+            kinds: kinds of the vehicles in `traffic`, without the ego car.
+            crowd: the pedestrians.
+            traffic: the vehicles. If the ego car follows others, it is the last
+                of them.
+            follower: the ego car, if it follows others.
+            seed: seed of the random routes.
+        """
         self._task = task
-        cars, found = motion.place_vehicles(kinds, task.streets, rng)
-        self._kinds = [kinds[k] for k in found]
-        crossings = motion.make_crossings(task.graph)
-        walkers = _with_spare(task.walkers)
-        self._crowd = Crowd(walkers, task.walkways, crossings, rng)
-        self._seed = int(rng.integers(2**31))
-        self._follower: Follower | None = None
+        self._kinds = kinds
+        self._crowd = crowd
+        self._traffic = traffic
+        self._follower = follower
+        self._seed = seed
         self._num_steps = 0
-        if task.drive is not None:
-            self._follower = Follower(
-                task.graph, task.drive, task.ego_box, _FIRST
-            )
-            cars = np.append(cars, self._follower.record(task.streets))
-        self._traffic = motion.begin_traffic(
-            task.streets, cars, crossings, self._seed
-        )
         num_steps = len(task.streets.until)
         num_walkers = len(self._crowd.walkers)
         # The columns are those of `TrafficPlan`.
-        self._vehicles = np.zeros((num_steps, len(found), 5))
+        self._vehicles = np.zeros((num_steps, len(kinds), 5))
         self._walkers = np.zeros((num_steps, num_walkers, 5))
         # Ego car, vehicles, pedestrians.
         self._half_sizes = _APART / 2 + np.array(
@@ -739,6 +742,28 @@ class Trial:
             if self._follower is not None and self._follower.arrived
             else None,
         )
+
+
+def begin_trial(task: _Task, rng: np.random.Generator) -> Trial:
+    """Returns a trial in which vehicles and pedestrians have random places."""
+    number = min(
+        _with_spare(task.vehicles),
+        max(task.vehicles, motion.room_for_vehicles(task.graph)),
+    )
+    kinds = [KINDS[k] for k in draw_kinds(number, rng)]
+    cars, found = motion.place_vehicles(kinds, task.streets, rng)
+    crossings = motion.make_crossings(task.graph)
+    walkers = _with_spare(task.walkers)
+    crowd = Crowd(walkers, task.walkways, crossings, rng)
+    seed = int(rng.integers(2**31))
+    follower: Follower | None = None
+    if task.drive is not None:
+        follower = Follower(task.graph, task.drive, task.ego_box, _FIRST)
+        cars = np.append(cars, follower.record(task.streets))
+    traffic = motion.begin_traffic(task.streets, cars, crossings, seed)
+    return Trial(
+        task, [kinds[k] for k in found], crowd, traffic, follower, seed
+    )
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
