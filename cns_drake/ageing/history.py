@@ -60,6 +60,8 @@ _PLANTED = (2.6, 3.6)
 _YOUNG_YEARS = 10
 # Lower plants are no trees [m].
 _LEAST_TREE = 3.0
+# A tree grows about the origin of its frame S if S is so close to its foot [m].
+_FOOT = 2.0
 # A crown keeps this share of its reach away from walls.
 _CROWN_PART = 0.8
 # Street furniture that moves does so by at least this distance [m].
@@ -387,7 +389,12 @@ class AgeingCity:
             is_tree = one.kind == kinds.TREE or height > 4.0
             if height < _LEAST_TREE or not is_tree:
                 continue
+            middle = one.footprint.centroid
+            foot = (round(middle.x, 3), round(middle.y, 3), one.bottom)
             whole = self._world.structure(one.name)
+            if math.dist(whole.xyz, foot) > _FOOT:
+                # The frame of a tree of CityJSON is W.
+                whole = whole.with_origin(foot)
             species = [
                 one
                 for part in whole.model.parts
@@ -398,7 +405,6 @@ class AgeingCity:
             if species and "young" in whole.model.parts[0].shape.mesh:  # type: ignore
                 low, high = 7.0, 9.0
             rng = random_generator(self._seed, "size", one.name)
-            middle = one.footprint.centroid
             wall = float(middle.distance(walls[int(tree.nearest(middle))]))
             reach = _reach(self._world.triangles(one.name), middle)
             fits = wall / (_CROWN_PART * reach) * height
@@ -685,10 +691,7 @@ class AgeingCity:
                 self._tell("grown", tree.name, detail=f"{tree.height:g} m")
 
     def _plant(self, tree: _Tree) -> None:
-        area = self._feet.get(tree.name, self._added.get(tree.name))
         place = shapely.Point(tree.whole.xyz[:2]).buffer(0.4)
-        if area is not None and tree.whole.xyz[:2] == (0.0, 0.0):
-            place = area.centroid.buffer(0.4)
         if self.near(place):
             return
         old = tree.name

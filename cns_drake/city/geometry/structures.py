@@ -1,13 +1,14 @@
 """Structures: the named objects of which a city consists, and their parts."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import inspect
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from shapely.affinity import translate
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -176,6 +177,22 @@ class Structure:
     def footprint_W(self) -> BaseGeometry:
         """Ground area of the model, seen from above, in W [m]."""
         return placed(self.model.footprint, self.xyz[:2], self.yaw)
+
+    def with_origin(self, xyz: tuple[float, float, float]) -> "Structure":
+        """Returns the same structure with the origin of S elsewhere in W.
+
+        `xyz` is the new origin [m]. Only poses change: the structure stays
+        where it is.
+        """
+        p_WW = np.subtract(xyz, self.xyz)
+        p_SS = rotation((0.0, 0.0, -self.yaw)) @ p_WW
+        parts = tuple(
+            replace(part, xyz=triple(np.subtract(part.xyz, p_SS).round(4)))
+            for part in self.model.parts
+        )
+        footprint = translate(self.model.footprint, *(-p_SS[:2]))
+        model = replace(self.model, parts=parts, footprint=footprint)
+        return replace(self, model=model, xyz=xyz)
 
     @property
     def p_WFs(self) -> np.ndarray:

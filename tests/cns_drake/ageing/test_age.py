@@ -301,6 +301,41 @@ def test_buildings_that_stay_are_known_by_their_kind(
 
 
 @pytest.mark.slow
+def test_trees_grow_about_their_feet_in_any_frame(town, world, tmp_path):
+    """CityJSON has no frames of objects: S is the world's frame W."""
+    copied(town, tmp_path / "town")
+    rows = _rows(town, "structures.csv")
+    trees = [row for row in rows if row["name"].startswith("tree_")]
+    for row in trees:
+        row |= {"x": "0.000", "y": "0.000", "z": "0.000", "yaw": "0.00000"}
+    with (tmp_path / "town" / "structures.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(rows)
+    found = []
+    for one in (world, OldWorld(MapFolder(tmp_path / "town"))):
+        city = AgeingCity(one, _BUSY, 2, shapely.Polygon())
+        for _ in range(3):
+            city.live()
+        events = {e.event: e.structure for e in city.events}
+        assert {"grown", "planted"} <= events.keys()
+        found.append(
+            {
+                name: plots.structure_triangles(tree)
+                for name, tree in city.standing.items()
+                if tree is not None and tree.semantic_class == "vegetation"
+            }
+        )
+    assert found[0].keys() == found[1].keys()
+    assert len(found[0]) > 5
+    for name, triangles in found[0].items():
+        apart = np.abs(found[1][name] - triangles).max(axis=(0, 1))
+        assert apart[:2].max() < 0.1
+        # Generated trees grow from the ground, above their roots.
+        assert apart[2] < 0.6
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "is_open"),
     [
