@@ -60,7 +60,8 @@ _PLANTED = (2.6, 3.6)
 _YOUNG_YEARS = 10
 # Lower plants are no trees [m].
 _LEAST_TREE = 3.0
-# A tree grows about the origin of its frame S if S is so close to its foot [m].
+# A tree grows about the origin of its frame, unless this is so much lower or
+# higher than its foot [m].
 _FOOT = 2.0
 # A crown keeps this share of its reach away from walls.
 _CROWN_PART = 0.8
@@ -390,10 +391,12 @@ class AgeingCity:
             if height < _LEAST_TREE or not is_tree:
                 continue
             middle = one.footprint.centroid
-            foot = (round(middle.x, 3), round(middle.y, 3), one.bottom)
             whole = self._world.structure(one.name)
-            if math.dist(whole.xyz, foot) > _FOOT:
+            *xy, z = whole.xyz
+            is_below = one.outline.covers(shapely.Point(xy))
+            if not is_below or abs(z - one.bottom) > _FOOT:
                 # The frame of a tree of CityJSON is W.
+                foot = (round(middle.x, 3), round(middle.y, 3), one.bottom)
                 whole = whole.with_origin(foot)
             species = [
                 one
