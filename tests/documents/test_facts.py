@@ -131,7 +131,7 @@ def test_the_tutorial_names_the_colours_that_its_page_shows():
     )
     assert " ".join(said.split()) == (
         "structures that stage 02 adds turn red, "
-        "and structures that it clears away turn violet"
+        "and structures that stage 02 clears away turn violet"
     )
 
 
