@@ -319,7 +319,7 @@ def simulated_drives(
         drive = open_drive(path)
         if field and drive.lidar_field == field:
             source = RecordingSource(path.absolute())
-            alike.append(NamedDrive(drive.name, source))
+            alike.append(NamedDrive(drive.name, source, num_scans=len(drive)))
             for note in drive.notes:
                 on_note(note)
     return alike

@@ -155,7 +155,7 @@ def open_images(folder: Path) -> list[NamedDrive]:
         shown = _parts(one)[0] or one
         frames = tuple(range(len(_read(shown)[0])))
         source = ImageSource(shown, one.name, frames)
-        found.append(NamedDrive(one.name, source))
+        found.append(NamedDrive(one.name, source, num_scans=len(frames)))
     return found
 
 
@@ -270,6 +270,7 @@ def _opened(
         NamedDrive(
             one := f"{name}_{role}",
             ImageSource(shown, one, tuple(split[k] for k in numbers)),
+            num_scans=len(numbers),
         )
         for role, shown, split, numbers in chosen
     )

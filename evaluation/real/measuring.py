@@ -232,7 +232,10 @@ def _add_unit(
         made: simulated drives of this model.
         choices: the methods.
     """
-    drives = {id(one): NamedDrive(one.name, one.source) for one in sets}
+    drives = {
+        id(one): NamedDrive(one.name, one.source, num_scans=len(one.drive))
+        for one in sets
+    }
     asked = [one for one in sets if one.data_set.poses]
     methods: tuple[MethodChoice, ...] = ()
     if asked:

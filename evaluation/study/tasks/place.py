@@ -204,10 +204,11 @@ class CostTask(Task):
 
 def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
     """Returns the expected time of queries by all methods [s]."""
-    num_places = pair.distractors + sum(
-        num_described(drive, "places", pair.protocol)
-        for drive in (pair.database, *pair.beside)
+    own, others = (
+        sum(num_described(one, "places", pair.protocol) for one in drives)
+        for drives in ((pair.database, *pair.beside), jobs.distractors)
     )
+    num_places = own + min(pair.distractors, others)
     each = len(jobs.methods) * (_QUERY_COST + _PLACE_COST * num_places)
     return _STARTING_COST + num_queries * each
 

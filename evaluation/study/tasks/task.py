@@ -3,6 +3,7 @@
 import abc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, TypeAlias
 
@@ -55,12 +56,14 @@ class NamedDrive:
         needs: names of the jobs that record the drive; empty if it is recorded
             already, or is simulated while it is read.
         length: about how long the drive is [m], to estimate costs.
+        num_scans: number of its scans, if known: no more are described.
     """
 
     name: str
     source: DriveSource
     needs: tuple[str, ...] = ()
     length: float = USUAL_LENGTH
+    num_scans: float = math.inf
 
     @property
     def share(self) -> float:
@@ -397,7 +400,7 @@ def num_described(
     spacing = protocol.place_spacing
     if role == "queries":
         spacing = protocol.query_spacing
-    return drive.length / spacing
+    return min(drive.num_scans, drive.length / spacing)
 
 
 def job_name(part: Part) -> str:

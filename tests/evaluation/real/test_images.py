@@ -127,6 +127,8 @@ def test_a_few_queries_each_have_one_place(tmp_path):
     (found,) = open_sequences(root / "kitti_bev", notes.append, 4)
     assert found.name == "town"
     assert found.queries.source.frames == (40, 52, 66, 78)
+    # Costs are estimated by it.
+    assert (found.places.num_scans, found.queries.num_scans) == (4, 4)
     near = [
         {k for k in range(40) if np.hypot(k - query + 40, 3.0) <= 5.0}
         for query in found.queries.source.frames
