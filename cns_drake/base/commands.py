@@ -36,9 +36,9 @@ Methods = Annotated[
     typer.Option(
         "--method",
         metavar="NAME|FILE.py",
-        help="Method to run, instead of all standard methods: the name of a "
-        "shipped method, standard for all standard methods, or a Python file "
-        "that registers your own method. May be repeated.",
+        help="Method to run: the name of a shipped method, a Python file that "
+        "registers your own method, or the word standard, which means all "
+        "standard methods. By default all standard methods. May be repeated.",
     ),
 ]
 MethodSettings = Annotated[

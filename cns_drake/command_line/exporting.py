@@ -144,8 +144,8 @@ def export(
             (bird's-eye images with poses); or film.
         output: Folder to write; created if it does not exist. With mcap and
             film, the output is a file. The name of a film ends in .webp, or in
-            .mp4, which needs ffmpeg. The folder of two maps or of images must
-            not exist yet.
+            .mp4, which needs ffmpeg. With map-truth, map-sessions and
+            bev-images, the folder must be new or empty.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in this other stage get SemanticKITTI's labels of
             moving objects (252 to 259), as if these structures had moved. Only

@@ -55,11 +55,11 @@ def train(
             --minutes.
         seed: Seed of all random choices. Another seed gives other cities and
             other weights.
-        without: Kind of variation to leave out of the training: changes of the
-            city between drives (change); weather, and LiDAR returns with the
-            losses and errors of a data sheet (returns); or wandering in the
-            lane and lane changes (driver). Use it to measure what each kind
-            contributes. May be repeated.
+        without: Kind of variation to leave out of the training: change (changes
+            of the city between drives); returns (weather, and the losses and
+            errors of a LiDAR's data sheet); or driver (wandering in the lane,
+            and lane changes). Use it to measure what each kind contributes. May
+            be repeated.
         drawn_streets: Sample the streets at random as well, instead of using
             the streets of the shipped maps. Weights trained like this have not
             seen the streets of the shipped maps, and can be tested there.

@@ -111,8 +111,8 @@ def study(
         task: Task to measure: place, pose, localise, map, change, cost or seen.
             By default the tasks of the experiment. May be repeated.
         method: Method to run, instead of the methods of the experiment: the
-            name of a shipped method, standard for all standard methods, or a
-            Python file with your own method. May be repeated.
+            name of a shipped method, a Python file with your own method, or the
+            word standard, which means all standard methods. May be repeated.
         override: Setting of a method to change, such as btc.candidates=20, or
             field of the experiment to replace, such as seeds=[1,2]. For a field
             inside another field, join both names by a dot, such as

@@ -519,7 +519,8 @@ class EmbreeScene:
         Args:
             rays: the rays.
             with_normals: whether to find normals as well.
-            solid: what can be hit: `SOLID`, or only `CURVED` shapes.
+            solid: shapes that rays can hit: flat and curved ones (`SOLID`), or
+                only curved ones (`CURVED`).
         """
         hits = self._first.cast(
             rays, mask=solid | PROXY, with_normals=with_normals

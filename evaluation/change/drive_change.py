@@ -223,11 +223,13 @@ def spread_over_grids(
     change: TemporalChange,
     grids: Sequence[tuple[float, float, float]] = GRIDS,
 ) -> tuple[float, float]:
-    """Returns the least and the greatest TCR_sym if the grid is shifted.
+    """Returns the least and the greatest TCR_sym over positions of the grid.
+
+    The positions are the unshifted grid and each of the shifts.
 
     Args:
         source, target: the two maps.
-        change: their change on the grid as it is, which counts, too.
+        change: their change on the unshifted grid.
         grids: shifts of the grid [m].
     """
     values = [change.symmetric]

@@ -117,8 +117,8 @@ class BtcConfig(MethodConfig):
             that match; [O] 0.7.
         min_votes: number of matching triangles that a place needs to be a
             candidate; [P] 5.
-        candidates: number of candidates, those with the most matching
-            triangles, whose planes are then compared; [O] 50.
+        candidates: number of candidates whose planes are compared: the places
+            with the most matching triangles; [O] 50.
         normal_limit: largest difference between the normals of two planes that
             match; [O] 0.2.
         distance_limit: largest distance from the centre of a plane to a plane
@@ -309,8 +309,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         """Yields candidate places, each with the motion X_PQ of its triangles.
 
         Args:
-            max_candidates: number of candidates, those with most matches; None
-                for all.
+            max_candidates: number of candidates: the places with the most
+                matches; None for all.
         """
         table = database.table
         of_query, of_table = self._matches(query, database)

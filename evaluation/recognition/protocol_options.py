@@ -76,8 +76,8 @@ _FIELDS: Options = {
             None,
             "Turn on loop closure: each drive is also compared with itself. A "
             "query is then compared only with places that the car passed at "
-            "least this long before [s], such as 30. All methods score every "
-            "such place, even those that otherwise score only a few "
+            "least this long before [s], such as 30. Every method scores all "
+            "of these places, even a method that otherwise scores only a few "
             "candidates, such as scan-context++.",
             "S",
         ),

@@ -194,8 +194,8 @@ def recognition_table(
     Args:
         results: results of one protocol.
         changes: change between the drives of each pair.
-        mode: which queries count: `all`, or only those with a match
-            (`filtered`); None for those that the reference counts for each
+        mode: which queries count: `all`, or only queries with a match
+            (`filtered`). None for the mode that the reference has for each
             method.
         reference: published results to compare with.
         evidence: names of a database and a query -> why queries went wrong.

@@ -15,7 +15,7 @@ from evaluation.study.parts import MakePart, Part
 
 
 def spend(jobs: Iterable[Job]) -> None:
-    """Removes descriptors where `FeatureExtraction.spends` says so.
+    """Removes the descriptors of the steps with `FeatureExtraction.spends`.
 
     All jobs must be done.
 

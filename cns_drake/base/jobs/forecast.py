@@ -102,7 +102,7 @@ def forecast(
         jobs: the jobs, of which some may be done.
         cluster: runs the jobs.
         space: space on the disk that the jobs need, if it is known.
-        least: nothing is told of jobs that take a shorter time [s].
+        least: shortest time that is worth a message [s].
 
     Returns:
         One line of text; None if all jobs are done, take less than `least`, or

@@ -97,7 +97,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 def top_of(model: Model) -> float:
     """Returns the height of a building's top, without roof equipment [m].
 
-    The height is -inf if the model contains nothing else.
+    The height is -inf if the model contains no other part than roof equipment.
     """
     return max(
         (

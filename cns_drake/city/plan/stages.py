@@ -43,14 +43,16 @@ class Stage(_Model):
         story: text that says which changes a visitor would see until the next
             stage.
         absent: structures that exist in the next stage but not in this one:
-            lists of names, each list under a heading of your choice. Not in the
-            last stage.
-        lower: buildings and plants that are lower than in the next stage, under
-            headings of your choice. Not in the last stage.
-        sites: buildings that are under construction in this stage only, under
-            headings of your choice. Each is shown as a frame of the given
-            height with scaffolds and a crane, and needs a lot of at least 16 m
-            by 16 m.
+            lists of names, each list under a heading of your choice. The last
+            stage cannot have this field.
+        lower: groups of buildings and plants that are lower than in the next
+            stage, each group under a heading of your choice. The last stage
+            cannot have this field.
+        sites: groups of buildings that are under construction in this stage
+            only, each group under a heading of your choice. Each building is
+            shown as a frame of the given height with scaffolds and a crane, and
+            needs a lot of at least 16 m by 16 m. The last stage cannot have
+            this field.
     """
 
     story: str

@@ -75,9 +75,9 @@ class LidarSection(Mount):
         echoes: which echoes of a beam are reported, with calibrated returns.
             `dual` reports the strongest and the last one. Fog has an echo only
             in beams without any other echo.
-        unit_seed: seed of the individual unit, with calibrated returns, which
-            decides the errors in the ranges, angles and gains of the unit's
-            lasers. Use the same seed in all drives with the same unit.
+        unit_seed: seed of the errors in the ranges, angles and gains of an
+            individual unit's lasers, with calibrated returns. Use the same seed
+            in all drives with the same unit.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
             drive must be a multiple of this rate. If the lasers of a unit fire
             at a fixed rate, a slower revolution has more columns.
