@@ -15,6 +15,7 @@ import csv
 import hashlib
 import io
 import itertools
+import math
 from pathlib import Path
 import re
 import subprocess
@@ -31,6 +32,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.signal import welch
 from scipy.spatial import cKDTree
+from scipy.special import stdtrit
 import yaml
 
 from cns_drake import Scenario, load_scenario, make_station
@@ -69,6 +71,8 @@ from evaluation.results.headlines import SURVIVES, listed, survivors
 from evaluation.results.table import OWN, STAGE, Results, Row
 from evaluation.results.table_forms import title
 
+# Colours of estimators of poses.
+_ESTIMATORS = {"icp": PALE, "gicp": INK}
 # The methods that this project made; all others are published ones.
 OURS = {"layered-overlap", "learned"}
 ROOT = Path(__file__).resolve().parents[1]
@@ -405,6 +409,76 @@ def sessions(path: Path) -> None:
     _plain(axes, "both")
     axes.legend(loc="lower right", frameon=False)
     _head(figure, "Leaves cost nothing in Suburbia")
+    figure.savefig(path, dpi=_DPI)
+
+
+def upkeep(
+    path: Path,
+    experiment: str,
+    conditions: Mapping[str, str],
+    panels: Mapping[str, Mapping[str, str]],
+    finding: str,
+) -> None:
+    """Draws what methods reach with each database, a panel a metric.
+
+    Values are means over realisations of cities, with their 95 % t intervals.
+
+    Args:
+        path: where to save the picture.
+        experiment: whose rows of `docs/notes/upkeep.csv` to draw.
+        conditions: condition -> its name in the picture, in order.
+        panels: title of each panel -> values of columns of its rows.
+        finding: title of the picture.
+    """
+    with open(ROOT / "docs/notes/upkeep.csv", newline="") as stream:
+        rows = [
+            row
+            for row in csv.DictReader(stream)
+            if row["experiment"] == experiment
+        ]
+    figure = Figure(
+        figsize=(_WIDTH, 2.0 + 0.85 * len(conditions)), layout="constrained"
+    )
+    methods = [*METHOD_STYLES, *_ESTIMATORS]
+    shown: dict[str, str] = {}
+    grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axes, (name, wanted) in zip(grid, panels.items(), strict=True):
+        found: dict[tuple[str, str], list[float]] = {}
+        for row in rows:
+            if wanted.items() <= row.items():
+                place = row["condition"], row["method"]
+                found.setdefault(place, []).append(float(row["value"]))
+        here = [one for one in methods if any(one == m for _, m in found)]
+        for (condition, method), values in found.items():
+            colour = _ESTIMATORS.get(method) or METHOD_STYLES[method][0]
+            shown[method] = colour
+            y = list(conditions).index(condition)
+            y += 0.7 * ((here.index(method) + 0.5) / len(here) - 0.5)
+            mean = float(np.mean(values))
+            margin = float(
+                stdtrit(len(values) - 1, 0.975)
+                * np.std(values, ddof=1)
+                / math.sqrt(len(values))
+            )
+            ends = np.clip([mean - margin, mean + margin], 0.0, 1.0)
+            axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
+            axes.plot(mean, y, color=colour, marker="o", ms=5)
+        axes.set(xlim=(-0.03, 1.03), ylim=(len(conditions) - 0.5, -0.5))
+        axes.set_xticks((0.0, 0.5, 1.0), ("0", "0.5", "1"))
+        axes.set_yticks(range(len(conditions)), list(conditions.values()))
+        axes.set_title(name)
+        _plain(axes)
+    _head(figure, finding)
+    handles = [
+        Line2D([], [], color=shown[name], marker="o", ms=5, lw=3, alpha=0.8)
+        for name in methods
+        if name in shown
+    ]
+    figure.legend(
+        handles,
+        [title(name) for name in methods if name in shown],
+        loc="outside lower center", ncols=4, frameon=False,
+    )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
 
 
