@@ -643,13 +643,12 @@ class PairMaker:
             where = f"{self.source}: {side}.route"
             drawn = validated(DrawnRoute, left.pop("route"), where)
             wanted = drive.folder.roads, drawn.length, drawn.seed
-            route = self._drawn.get(wanted)
-            drive = drive.replaced(
-                route=route or self._draw(*wanted), waypoints=None
-            )
-            if route is None:
-                self._check_map(side, drive, {"route": drive.route})
-                self._drawn[wanted] = drive.route
+            known = self._drawn.get(wanted)
+            route = known or self._draw(*wanted)
+            drive = drive.replaced(route=route, waypoints=None)
+            if known is None:
+                self._check_map(side, drive, {"route": route})
+                self._drawn[wanted] = route
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}

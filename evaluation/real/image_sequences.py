@@ -268,8 +268,8 @@ def _opened(
     )
     drives = (
         NamedDrive(
-            one := f"{name}_{role}",
-            ImageSource(shown, one, tuple(split[k] for k in numbers)),
+            drive := f"{name}_{role}",
+            ImageSource(shown, drive, tuple(split[k] for k in numbers)),
             num_scans=len(numbers),
         )
         for role, shown, split, numbers in chosen
