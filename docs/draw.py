@@ -133,7 +133,7 @@ def main(names: Sequence[str]) -> None:
             with rc_context(_FONT):
                 globals()[draw](PICTURES / name, **entry)
         head, mark, rest = REGISTRY.read_text().partition(f"\n{name}:")
-        rest = rest.replace(f": {made}", f": {digest(data)}", 1)
+        rest = rest.replace(f"digest: {made}", f"digest: {digest(data)}", 1)
         REGISTRY.write_text(head + mark + rest)
 
 
@@ -437,7 +437,7 @@ def upkeep(
             if row["experiment"] == experiment
         ]
     figure = Figure(
-        figsize=(_WIDTH, 2.0 + 0.85 * len(conditions)), layout="constrained"
+        figsize=(_WIDTH, 2.2 + 0.7 * len(conditions)), layout="constrained"
     )
     methods = [*METHOD_STYLES, *_ESTIMATORS]
     shown: dict[str, str] = {}
@@ -477,7 +477,7 @@ def upkeep(
     figure.legend(
         handles,
         [title(name) for name in methods if name in shown],
-        loc="outside lower center", ncols=4, frameon=False,
+        loc="outside lower center", ncols=3, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
 
