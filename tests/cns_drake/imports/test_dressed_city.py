@@ -421,9 +421,10 @@ def digest(folder):
     for path in paths:
         content = path.read_bytes()
         if path.name == "structures.csv":
-            # The column `material`, the last one, came later.
+            # The columns `material` and `kind`, the last ones, came later.
             lines = content.decode().splitlines()
-            kept = (line.rpartition(",")[0] + "\n" for line in lines)
+            later = {"material", "kind"}.intersection(lines[0].split(","))
+            kept = (line.rsplit(",", len(later))[0] + "\n" for line in lines)
             content = "".join(kept).encode()
         whole.update(str(path.relative_to(folder)).encode())
         whole.update(content)

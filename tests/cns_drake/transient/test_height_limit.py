@@ -1,5 +1,6 @@
 """Buildings and plants of less height, as before a city grew."""
 
+from dataclasses import replace
 import itertools
 
 from helpers.building_checks import typical_model
@@ -69,7 +70,7 @@ def test_a_box_is_cut_and_gets_a_parapet(tmp_path):
         # The band outside reaches from 0.5 m below the roof to the top of the
         # parapet, 0.04 m before the walls; the parapet is 0.3 m wide.
         walls = 28.0 * 5.0 + 28.32 * 1.4 + (28.0 - 8 * 0.3) * 0.9
-        plain = type(after[name])(name, "building", (body, roof))
+        plain = replace(after[name], parts=(body, roof))
         assert wall_area(plain) == pytest.approx(walls, rel=2e-3)
         assert height(after[name]) < 5.0 + EQUIPMENT
         assert all(one.name.startswith("new_0_") for one in equipment)

@@ -370,4 +370,4 @@ def test_a_method_matches_sequences(capsys, towns, tmp_path):
     (tmp_path / "scans").mkdir()
     scores = ["pr", *2 * [tmp_path / "scans"], "--method", "solid"]
     scores += ["--set", "sequence=20", "--scores", tmp_path / "scores.csv"]
-    assert_refused(capsys, scores, "solid: sequence: scans of a folder")
+    assert_refused(capsys, scores, "solid: sequence: needs the poses of scans")
