@@ -14,7 +14,6 @@ REGISTRY = yaml.safe_load(draw.REGISTRY.read_text())
 # Pictures of results on the cities of version 2.0.0, as their pages say; they
 # are drawn anew when the results are measured anew.
 OF_FORMER_CITIES = {
-    "map_update.jpg",
     "track.png",
 }
 
