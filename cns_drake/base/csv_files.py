@@ -9,17 +9,11 @@ import re
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
 from cns_drake.base.number_rows import other_separator, to_number
-from cns_drake.base.terminal import note
 from cns_drake.base.value_lists import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
 _WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
-# Column name in files of earlier versions -> its present name.
-_FORMER_COLUMNS = {
-    "radius_told": "gate",
-    "recall_at_100_precision": "recall_at_full_precision",
-}
 
 
 def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
@@ -100,9 +94,7 @@ def read_records(
         columns: names of the columns that the file must have. It may have more.
 
     Returns:
-        For each row, its line number and a dictionary column -> cell. If an
-        earlier version of this program wrote the file, renamed columns appear
-        under their present names, and a note on stderr says so.
+        For each row, its line number and a dictionary column -> cell.
 
     Raises:
         InputError: the file cannot be read as CSV (see
@@ -110,10 +102,6 @@ def read_records(
             twice, or a row has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]
-    for former, now in _FORMER_COLUMNS.items():
-        if former in names and now not in names:
-            note(f"{path}: the column {former} is named {now} now")
-            names = [now if name == former else name for name in names]
     for column in filter(None, repeated(names)):
         raise InputError(f"{path}: column '{column}' is there twice")
     for column in columns:

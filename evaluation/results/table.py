@@ -25,6 +25,7 @@ import numpy as np
 from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes, write_text
+from cns_drake.base.terminal import note
 from cns_drake.base.value_lists import repeated
 from cns_drake.base.version import __version__
 from evaluation.recognition.place_outcome import Number
@@ -49,8 +50,8 @@ OWN = "own"
 LAST = "last"
 # The factor of the frozen redraws of the shipped maps.
 FROZEN_REDRAW = "both.redraw.frozen"
-# Names of factors in tables of earlier versions -> names of now.
-_FORMER_FACTORS = {"both.fresh": FROZEN_REDRAW}
+# Names of columns in tables of earlier versions -> names of now.
+_FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
 # Names of other columns of `Key`, which no factor can have.
 _NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
@@ -710,7 +711,10 @@ class _Cells:
                     " character"
                 )
         needed = tuple(needed)
-        names = [_FORMER_FACTORS.get(name, name) for name in names]
+        for former, now in _FORMER_NAMES.items():
+            if former in names and now not in names:
+                note(f"{file}: the column {former} is named {now} now")
+                names[names.index(former)] = now
         width = len(names)
         missing = [name for name in needed if name not in names]
         for former, command in _FORMER:

@@ -32,23 +32,9 @@ def test_rows_with_the_numbers_of_their_lines(tmp_path):
     ]
 
 
-def test_a_column_of_an_earlier_version_has_its_name_of_now(tmp_path, capsys):
-    # Columns without a name are not read.
+def test_columns_without_a_name(tmp_path):
     path = write(tmp_path, b"a,b,,\n1,2,,\n")
     assert read_records(path, ("b",)) == [(2, {"a": "1", "b": "2", "": ""})]
-    assert capsys.readouterr().err == ""
-    path = write(tmp_path, b"radius_told,b\n1,2\n")
-    assert read_records(path, ("gate", "b")) == [(2, {"gate": "1", "b": "2"})]
-    note = "the column radius_told is named gate now"
-    assert capsys.readouterr().err == f"{path}: {note}\n"
-    path = write(tmp_path, b"recall_at_100_precision\n0.5\n")
-    now = "recall_at_full_precision"
-    assert read_records(path, (now,)) == [(2, {now: "0.5"})]
-    path = write(tmp_path, b"radius_told,gate\n1,0\n")
-    assert read_records(path, ("gate",)) == [
-        (2, {"radius_told": "1", "gate": "0"})
-    ]
-    assert "radius_told" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -359,6 +359,20 @@ def test_answers_that_cannot_be(tmp_path, column, cell, words):
     assert str(raised.value).startswith(f"{path}: line 3: ")
 
 
+def test_a_former_name_of_a_column_is_read_with_a_note(tmp_path, capsys):
+    path = tmp_path / "results.csv"
+    now = Results.read(write(path, HEADER, LINE))
+    assert capsys.readouterr().err == ""
+    former = HEADER.replace("gate", "radius_told")
+    assert Results.read(write(path, former, LINE)) == now
+    note = f"{path}: the column radius_told is named gate now\n"
+    assert capsys.readouterr().err == note
+    # Beside the name of now, it is a factor of the user's.
+    both = Results.read(write(path, f"{HEADER},radius_told", f"{LINE},3"))
+    assert both.factors == (FACTOR, "radius_told")
+    assert capsys.readouterr().err == ""
+
+
 def test_former_tables_of_queries(tmp_path):
     header = "map,db,query,method,correct,has_match,score"
     path = write(tmp_path / "queries.csv", header, "a,01,02,btc,1,1,0.5")
