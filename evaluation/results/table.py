@@ -717,8 +717,8 @@ class _Cells:
                 names[names.index(former)] = now
         width = len(names)
         missing = [name for name in needed if name not in names]
-        for former, command in _FORMER:
-            if missing and former <= set(names):
+        for columns_then, command in _FORMER:
+            if missing and columns_then <= set(names):
                 raise InputError(
                     f"{file}: a table of an earlier version; '{command}' makes"
                     " one with the columns of now"

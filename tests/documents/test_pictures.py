@@ -11,11 +11,6 @@ from docs import draw
 pytestmark = pytest.mark.slow
 
 REGISTRY = yaml.safe_load(draw.REGISTRY.read_text())
-# Pictures of results on the cities of version 2.0.0, as their pages say; they
-# are drawn anew when the results are measured anew.
-OF_FORMER_CITIES = {
-    "track.png",
-}
 
 
 def test_every_picture_is_registered_and_shown():
@@ -33,8 +28,8 @@ def test_a_picture_has_a_command(name):
     assert callable(getattr(draw, entry.get("draw", "main")))
 
 
-def test_only_pictures_of_former_cities_are_older_than_their_data():
-    assert {line.split()[0] for line in draw.stale()} == OF_FORMER_CITIES
+def test_no_picture_is_older_than_its_data():
+    assert draw.stale() == []
 
 
 def test_a_picture_is_stale_after_a_change_of_its_data(tmp_path, monkeypatch):
