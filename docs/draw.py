@@ -71,8 +71,6 @@ from evaluation.results.headlines import SURVIVES, listed, survivors
 from evaluation.results.table import OWN, STAGE, Results, Row
 from evaluation.results.table_forms import title
 
-# Colours of estimators of poses.
-_ESTIMATORS = {"icp": PALE, "gicp": INK}
 # The methods that this project made; all others are published ones.
 OURS = {"layered-overlap", "learned"}
 ROOT = Path(__file__).resolve().parents[1]
@@ -439,8 +437,7 @@ def upkeep(
     figure = Figure(
         figsize=(_WIDTH, 2.2 + 0.7 * len(conditions)), layout="constrained"
     )
-    methods = [*METHOD_STYLES, *_ESTIMATORS]
-    shown: dict[str, str] = {}
+    shown: set[str] = set()
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (name, wanted) in zip(grid, panels.items(), strict=True):
         found: dict[tuple[str, str], list[float]] = {}
@@ -448,10 +445,10 @@ def upkeep(
             if wanted.items() <= row.items():
                 place = row["condition"], row["method"]
                 found.setdefault(place, []).append(float(row["value"]))
-        here = [one for one in methods if any(one == m for _, m in found)]
+        here = [one for one in METHOD_STYLES if any(one == m for _, m in found)]
+        shown.update(here)
         for (condition, method), values in found.items():
-            colour = _ESTIMATORS.get(method) or METHOD_STYLES[method][0]
-            shown[method] = colour
+            colour = METHOD_STYLES[method][0]
             y = list(conditions).index(condition)
             y += 0.7 * ((here.index(method) + 0.5) / len(here) - 0.5)
             mean = float(np.mean(values))
@@ -469,14 +466,15 @@ def upkeep(
         axes.set_title(name)
         _plain(axes)
     _head(figure, finding)
+    methods = [name for name in METHOD_STYLES if name in shown]
     handles = [
-        Line2D([], [], color=shown[name], marker="o", ms=5, lw=3, alpha=0.8)
+        Line2D([], [], color=METHOD_STYLES[name][0], marker="o", ms=5, lw=3,
+               alpha=0.8)
         for name in methods
-        if name in shown
-    ]
+    ]  # fmt: skip
     figure.legend(
         handles,
-        [title(name) for name in methods if name in shown],
+        [title(name) for name in methods],
         loc="outside lower center", ncols=3, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)

@@ -108,6 +108,10 @@ def forecast(
         One line of text; None if all jobs are done, take less than `least`, or
         nothing is known about them.
     """
+    # Whether a job is done, which takes a look at the disk, is asked only if
+    # all jobs together may take long enough.
+    if sum(job.cost for job in jobs) < least:
+        return None
     left = [job for job in jobs if not nothing_left(job.step)]
     number = min(cluster.slots or len(left), len(left))
     seconds = shortest_time(left, number) if left else 0.0
