@@ -10,7 +10,6 @@ shows in an image from above. `write_images` makes such a folder of any drive.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-import io
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -187,10 +186,7 @@ def write_images(drive: Drive, folder: Path, on_note: OnNote) -> None:
         for frame in track(range(number), "making images", number, "images"):
             scan = deskew(drive, frame) if moved else drive.scan(frame)
             image = Image.fromarray(count_image(xyz(scan)))
-            content = io.BytesIO()
-            image.save(content, format="PNG")
-            path = draft / _IMAGES / f"{frame:06d}.png"
-            path.write_bytes(content.getvalue())
+            image.save(draft / _IMAGES / f"{frame:06d}.png")
         rows = drive.X_WS[:, :3].reshape(-1, 12).tolist()
         (draft / _TABLE).write_text(
             "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
