@@ -25,10 +25,10 @@ Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, to run "
-        "the jobs on several machines. All machines must see the output folder "
-        "under the same path. By default the environment variable "
-        "DASK_SCHEDULER_ADDRESS, if it is set.",
+        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, which "
+        "runs the jobs on several machines. All machines need access to the "
+        "output folder under the same path. By default the value of the "
+        "environment variable DASK_SCHEDULER_ADDRESS, if there is one.",
     ),
 ]
 Methods = Annotated[
@@ -36,9 +36,9 @@ Methods = Annotated[
     typer.Option(
         "--method",
         metavar="NAME|FILE.py",
-        help="Method to run: the name of a shipped method, a Python file that "
-        "registers your own method, or the word standard, which means all "
-        "standard methods. By default all standard methods. May be repeated.",
+        help="Method to run: the name of a shipped method, a Python file with "
+        "your own method, or the word standard, which means all standard "
+        "methods. By default all standard methods run. May be repeated.",
     ),
 ]
 MethodSettings = Annotated[
@@ -46,17 +46,17 @@ MethodSettings = Annotated[
     typer.Option(
         "--set",
         metavar="METHOD.NAME=VALUE",
-        help="Setting of a method to change, such as btc.candidates=20. "
+        help="New value for a setting of a method, such as btc.candidates=20. "
         "Separate the numbers of a list by commas. If only one method runs, "
-        "you may leave out the name of the method. May be repeated.",
+        "you may leave out its name: candidates=20. May be repeated.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Whether to also measure the time and memory that each method "
-        "needs. These numbers differ from run to run.",
+        help="Whether to measure the time and memory of each method as well. "
+        "The measured costs differ from run to run.",
     ),
 ]
 Tables = Annotated[
@@ -76,8 +76,8 @@ LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="LiDAR to read, if a recording has several: the name in its "
-        "topic /NAME/points, or the whole topic.",
+        help="LiDAR whose scans are read, if a recording has several LiDARs. "
+        "Give NAME from the topic /NAME/points, or the whole topic.",
     ),
 ]
 Columns = Annotated[
@@ -86,9 +86,8 @@ Columns = Annotated[
         "--columns",
         metavar="N",
         min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, of which the "
-        "first three are x, y and z. By default the number is guessed from the "
-        "values; give the number if the guess is wrong.",
+        help="Number of float32 values per point in .bin files, including x, y "
+        "and z. By default the program guesses this number from the values.",
     ),
 ]
 

@@ -101,64 +101,63 @@ def export(
 ) -> None:
     """Export drives to the formats of other programs.
 
-    With --format cns, kitti, mulran or tum, DRIVE is a recording, and the
-    command converts it. With mcap, DRIVE is a damaged .mcap file, whose
-    readable part is written to a new file.
+    The formats cns, kitti, mulran and tum convert a recording. The format mcap
+    writes the readable part of a damaged .mcap file to a new file.
 
-    With pointnetvlad, overlap or overlap-table, each DRIVE is a shipped drive
-    or a scenario file. The command simulates the drives without recording them,
-    and writes point clouds with exact positives, negatives and overlaps, to
-    train place recognition. To resume after an interruption, run the same
+    The formats pointnetvlad, overlap and overlap-table are data for training
+    place recognition: point clouds with exact positives, negatives and
+    overlaps. Each DRIVE is a shipped drive or a scenario file, which is
+    simulated but not recorded. To resume after an interruption, run the same
     command again.
 
-    With map-truth, the command makes maps of two drives through the same place,
-    the older one first, and labels exactly what changed between them: every
-    point of the older map is kept, gone or unobserved in the newer drive, and
-    every point of the newer map is kept, new or newly seen. Each DRIVE is a
-    recording of cns-drake, a shipped drive or a scenario file. cns-eval
-    map-update scores the labels of your own change detector against these
-    labels. With map-sessions, the command makes the same maps without labels,
-    from recordings whose world is unknown, such as real drives. Before cns-eval
-    map-update can score labels of such maps, add the ground truth: A/truth.npy
-    and B/truth.npy.
+    The format map-truth is the ground truth for change detection: maps of two
+    drives through the same place, the older drive first, with an exact label
+    for each point. Points of the older map are kept, gone or unobserved in the
+    newer drive; points of the newer map are kept, new or newly seen. Each DRIVE
+    is a recording of cns-drake, a shipped drive or a scenario file. cns-eval
+    map-update compares the labels of your own change detector with this ground
+    truth.
 
-    With bev-images, DRIVE is a recording or a real drive, and the command
-    writes a bird's-eye image of each scan, with the poses, as cns-eval real
-    reads them.
+    The format map-sessions has the same maps without labels, from recordings
+    whose world is unknown, such as real drives. Before cns-eval map-update can
+    use these maps, add ground truth of your own: A/truth.npy and B/truth.npy.
 
-    With film, DRIVE is a shipped drive or a scenario file, and the command
-    films the same stretch of the drive in each stage of the city: first in one
-    shot per stage from behind the car, with the points that the LiDAR measures,
-    then in one shot per stage from above.
+    The format bev-images has a bird's-eye image and a pose of each scan of a
+    recording or of a real drive. cns-eval real reads this format.
+
+    The format film shows the same stretch of a shipped drive or of a scenario
+    file in each stage of the city: first in one shot per stage from behind the
+    car, with the points that the LiDAR measures, then in one shot per stage
+    from above.
 
     Args:
-        drives: Drives to export. By default, pointnetvlad and overlap export
-            all shipped drives, or none with --vary.
+        drives: Drives to export. If you name none, pointnetvlad and overlap
+            export all shipped drives, or with --vary only the drives of the
+            experiment.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan), tum (only the trajectory), mcap (a repaired copy);
-            pointnetvlad (clouds and pickle files as PointNetVLAD reads them),
-            overlap (scans and the exact overlap of each pair), overlap-table
-            (only a table of the overlaps between a database and a query drive,
-            for cns-eval pr --exact-overlaps); map-truth (two maps with labels
-            of what changed), map-sessions (two maps without labels); bev-images
-            (bird's-eye images with poses); or film.
-        output: Folder to write; created if it does not exist. With mcap and
-            film, the output is a file. The name of a film ends in .webp, or in
-            .mp4, which needs ffmpeg. With map-truth, map-sessions and
-            bev-images, the folder must be new or empty.
+            mulran (MulRan), tum (only the trajectory), mcap (a repaired copy),
+            pointnetvlad (clouds and pickle files for PointNetVLAD), overlap
+            (scans and the exact overlap of each pair), overlap-table (only the
+            overlaps between a database and a query drive, for cns-eval pr
+            --exact-overlaps), map-truth (two maps with labels of what changed),
+            map-sessions (two maps without labels), bev-images (bird's-eye
+            images with poses) or film.
+        output: Folder to write; created if it does not exist. With map-truth,
+            map-sessions and bev-images, the folder must be new or empty. With
+            mcap and film, the output is a file instead; a film's name ends in
+            .webp, or in .mp4, which needs ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
-            that do not exist in this other stage get SemanticKITTI's labels of
-            moving objects (252 to 259), as if these structures had moved. Only
-            with --format kitti.
+            that do not exist in that stage get SemanticKITTI's labels of moving
+            objects (252 to 259). Only with --format kitti.
         sequence: Number of the exported drive, which names its folder
             sequences/NN. By default the digits at the end of the drive's name.
             Only with --format kitti.
-        spacing: Distance that the car drives between two clouds of the training
-            data, or between two scans of a map [m]; by default 10, or 1 for
-            maps. A smaller distance makes a denser map.
-        held_out: Drive to keep for evaluation only. This drive is left out of
-            the training data even if you also name it as a training drive. May
-            be repeated. Only with --format pointnetvlad or overlap.
+        spacing: Distance that the car drives between two clouds of training
+            data, by default 10, or between two scans of a map, by default 1
+            [m]. A smaller distance makes a denser map.
+        held_out: Drive that is used for evaluation only, and never for
+            training, even if DRIVE or --vary names it. May be repeated. Only
+            with --format pointnetvlad or overlap.
         scans: Number of consecutive scans that are merged into each cloud (a
             submap). Only with --format pointnetvlad.
         max_range: Leave out points of training data that are farther than this
@@ -168,10 +167,9 @@ def export(
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
             default, the stretch begins where the road ahead is straightest.
-        traffic: Number of moving vehicles in the film. The same number of
-            pedestrians is added. By default as the scenario says; if the
-            scenario has no traffic, 60 vehicles and 60 pedestrians are added,
-            provided that the streets have room.
+        traffic: Number of moving vehicles in the film, and also of pedestrians.
+            By default as the scenario says, or, if the scenario has no traffic,
+            up to 60, as far as the streets have room.
     """
     values: dict[str, Any] = {
         "lidar": lidar,

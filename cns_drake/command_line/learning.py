@@ -43,30 +43,30 @@ def train(
     packages of the extra `train` (JAX).
 
     Args:
-        output: File for the weights. The training curve goes to FILE.png.
-            FILE.npz.training keeps the state, so that the same command resumes
-            an interrupted training.
-        minutes: Approximate computing time on one core in minutes. This time
-            only sets the numbers of cities and steps: the training does not
-            stop when this time is over.
+        output: File for the weights. The training curve is written to FILE.png,
+            and the state of the training to FILE.npz.training, from which the
+            same command resumes after an interruption.
+        minutes: Approximate computing time on one core in minutes, from which
+            the numbers of cities and steps follow. The training ends after
+            these steps, not after exactly this time.
         cities: Number of cities to train on; by default the number follows from
             --minutes.
         steps: Number of training steps; by default the number follows from
             --minutes.
         seed: Seed of all random choices. Another seed gives other cities and
             other weights.
-        without: Kind of variation to leave out of the training: change (changes
-            of the city between drives); returns (weather, and the losses and
-            errors of a LiDAR's data sheet); or driver (wandering in the lane,
-            and lane changes). Use it to measure what each kind contributes. May
-            be repeated.
-        drawn_streets: Sample the streets at random as well, instead of using
-            the streets of the shipped maps. Weights trained like this have not
-            seen the streets of the shipped maps, and can be tested there.
+        without: Kind of variation to leave out of the training, in order to
+            measure what each kind contributes: change (changes of the city
+            between drives); returns (weather, and the losses and errors of a
+            LiDAR's data sheet); or driver (wandering in the lane, and lane
+            changes). May be repeated.
+        drawn_streets: Generate random streets as well, instead of using the
+            streets of the shipped maps. The shipped maps can then serve as a
+            test, because the training has never seen their streets.
         graded: Train with exact overlaps: the more of a query's scan a place
-            shows, the higher the place should rank. Without this option, every
-            place within 7.5 m of a query counts as right. Exact overlaps make
-            the training about 1.5 times as long.
+            shows, the higher its target rank. Without --graded, every place
+            within 7.5 m of a query is an equally good match. Exact overlaps
+            make the training about 1.5 times as long.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

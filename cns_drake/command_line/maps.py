@@ -71,17 +71,17 @@ RateFactor = Annotated[
     typer.Option(
         min=0.0,
         metavar="FACTOR",
-        help="Factor by which all yearly rates are multiplied; 2 makes the "
-        "city change twice as fast.",
+        help="Factor by which all yearly rates are multiplied. With 2, the "
+        "city changes twice as fast.",
     ),
 ]
 RatesFile = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.yaml",
-        help="File with rates of your own. Each line has the form event: rate, "
-        "with the probability per year, from 0 to 1. Events that the file does "
-        "not name keep their rates.",
+        help="File with your own rates. Each line has the form event: rate, "
+        "where the rate is the probability per year, from 0 to 1. All other "
+        "events have their default rates.",
     ),
 ]
 
@@ -96,11 +96,11 @@ def list_drives(
 
     The columns are the length and duration of each drive, its number of frames,
     and the numbers of structures and triangles in its stage. A narrow terminal
-    shows fewer columns; in a file or pipe, all columns are written.
+    shows fewer columns. A file or pipe gets all columns.
 
     Args:
-        folders: Map folders of your own, to list their drives; by default the
-            shipped maps.
+        folders: Folders of your own maps, whose drives are listed; by default
+            the drives of the shipped maps.
     """
     with uninterrupted():
         from cns_drake.scenarios.drive_table import drive_rows
@@ -181,7 +181,7 @@ def import_city(
     """Make a map from data of a real city.
 
     Writes the stages of the map, two drives along its streets and a picture of
-    it from above.
+    the map from above.
 
     Args:
         source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
@@ -189,13 +189,14 @@ def import_city(
         output: Folder of the map to write; its name becomes the map's name.
         years: Years for which to make stages. Each stage contains the buildings
             that were built by its year.
-        year_attribute: Name of the attribute of the file that contains each
-            building's year of construction. By default the usual names are
-            tried.
-        undated: Stages that contain the buildings without a year: all stages
-            (first), only the last stage (last), or no stage (never).
-        lod: Level of detail (LoD) in which to read the buildings of CityJSON,
-            such as 1.2; by default the highest that each building has.
+        year_attribute: Name of the attribute in the file that contains each
+            building's year of construction. By default the command tries the
+            usual names.
+        undated: Where buildings without a year of construction appear: from the
+            first stage on (first), only in the last stage (last), or in no
+            stage (never).
+        lod: Level of detail (LoD) of the buildings in CityJSON to read, such as
+            1.2; by default the highest level of each building.
         seed: Seed of all random choices: the buildings that are missing or
             lower in the first stage (--grow), and the details that are added to
             buildings and streets. For an OpenDRIVE file, which has no
@@ -205,16 +206,16 @@ def import_city(
             the command otherwise makes.
         within: Leave out structures that are farther than this from the drives
             [m], to save memory. By default, no structure is left out.
-        drive_on: Side of the street on which cars drive; by default as the file
-            says, or right if the file does not say.
-        grow: Share of the buildings that are missing or lower in an additional
-            first stage, from 0.01 to 0.9. These buildings are chosen at random;
-            the default is 0.3. For an OpenDRIVE file, the buildings in the east
-            are missing, and the default is 0.35. With --years or --plain, no
-            such stage is added, and --grow is an error.
+        drive_on: Side of the street on which cars drive; by default the side
+            that the file names, or right if the file names none.
+        grow: Add a first stage in which this share of the buildings, sampled at
+            random, is missing or lower, from 0.01 to 0.9; by default 0.3. For
+            an OpenDRIVE file, the buildings in the east are missing instead, by
+            default 0.35 of all. Not with --years or --plain, which add no such
+            stage.
         plain: Do not add windows, lamps, parked cars and other details that the
-            file does not contain. Buildings along the roads of an OpenDRIVE
-            file are added nevertheless.
+            file does not contain. Only OpenDRIVE files, which contain no
+            buildings, still get buildings along their roads.
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
@@ -336,24 +337,25 @@ def city(
 ) -> None:
     """Build the stages of a city from its roads and plan.
 
-    You write the roads, and a plan of the districts along the roads. The
-    command generates an SDF world for each stage.
+    You write the files roads.yaml, with the roads, and city.yaml, with the
+    districts along the roads. The command generates an SDF world for each
+    stage.
 
     Args:
-        folder: Folder with roads.yaml, city.yaml and stages.yaml. The stages
-            are written to this folder, and the table of drives in it is
-            updated.
-        new: First write the files that are missing in a folder with
-            roads.yaml: a plan with a district for each block, two stages, and a
-            drive for each stage. Existing files are kept.
-        seed: Seed of the random plan and drives that --new writes; by default
-            0.
+        folder: Folder with roads.yaml, city.yaml and stages.yaml. The command
+            writes the stages to this folder, and updates the folder's table of
+            drives.
+        new: Start from a folder with only roads.yaml: first write the missing
+            files, which are a city.yaml with a district for each block, two
+            stages, and a drive for each stage. Existing files are not changed.
+        seed: Seed of the random districts and drives that --new writes; by
+            default 0.
         check: Write nothing. List the files that would change, and exit with
-            status 1 if there are any.
-        repair_stages: Update the names of structures in stages.yaml. Use it
-            after you have added something to the plan, because additions
-            renumber the structures. Structures are recognised by their
-            coordinates in structures.csv, as the last run wrote it.
+            status 1 if any would.
+        repair_stages: Update the names of structures in stages.yaml. Use this
+            option after additions to city.yaml, which renumber the structures.
+            The command recognises structures by their coordinates in the
+            structures.csv of the last run.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (
@@ -430,8 +432,8 @@ def age(
 
     Every year, each lot, tree and street object may change, with a given
     probability: buildings are built, torn down and replaced, trees die, lamps
-    and signs move. Writes a map with a stage for today and one for each given
-    year, a table of all events, the observed rates, and pictures.
+    and signs move. Writes a map with a stage for today and a stage for each
+    given year, a table of all events, the observed rates, and pictures.
 
     Args:
         source: Name of a shipped map, or folder of a map.

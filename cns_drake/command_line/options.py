@@ -53,24 +53,26 @@ Recording = Annotated[
 Graphviz = Annotated[
     Path | None,
     typer.Option(
-        help="File for a graph of Drake's Diagram, which shows how its systems "
-        "are connected, as Graphviz text. By default no graph is written."
+        help="File for a graph of the connected systems in Drake's Diagram, as "
+        "Graphviz text. By default no graph is written."
     ),
 ]
 Overwrite = Annotated[
     bool,
     typer.Option(
-        "--overwrite", help="Record again, and replace existing recordings."
+        "--overwrite",
+        help="Replace existing recordings. By default, existing recordings are "
+        "not changed.",
     ),
 ]
 Vary = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE.yaml",
-        help="Experiment whose drives are taken in addition to the named "
-        "drives: the name of a shipped experiment, or a file. The scenario "
-        "files of these drives are written to <output>/scenarios, and cities "
-        "that are made for these drives to <output>/cities.",
+        help="Name of a shipped experiment, or experiment file, whose drives "
+        "are added to the drives that you name. The command writes the "
+        "experiment's scenario files to <output>/scenarios, and its generated "
+        "cities to <output>/cities.",
     ),
 ]
 Maps = Annotated[

@@ -25,9 +25,10 @@ Kind = Literal["ideal", "calibrated"]
 Returns = Annotated[
     Kind | None,
     typer.Option(
-        help="Model of the LiDAR's returns: ideal, or calibrated, which has "
-        "the noise, the lost points and the intensities of the unit's data "
-        "sheet. By default as the scenario says, or else ideal."
+        help="Model of the LiDAR's returns. ideal returns are exact; "
+        "calibrated returns have the noise, the losses and the intensities of "
+        "the LiDAR's data sheet. By default the model that the scenario sets, "
+        "or ideal if there is none."
     ),
 ]
 DriveNames = Annotated[
@@ -161,29 +162,30 @@ def simulate(
 ) -> None:
     """Simulate a drive and record it.
 
-    Writes a rosbag2 folder, which ROS 2 tools can read. It contains an MCAP
-    file with the scans, the poses and all other sensor data, and its metadata.
+    Writes a rosbag2 folder, which ROS 2 tools can read. The folder contains an
+    MCAP file with the scans, the poses and the data of all other sensors, and a
+    file with metadata.
 
     Args:
         scenario: Name of a shipped drive, as cns-drake list shows it, or a
             scenario file of your own.
-        transient: Temporary changes to the city. For example,
-            snow=0.25,leaves=0.15 means 0.25 m of snow, and that 15 % of the
-            leaves are left. Other switches are parked_cars, scaffolds, works,
-            furniture and roadsides: the share that is changed or added, from 0
-            to 1. height_limit=METRES lowers buildings and plants. seed=N
-            samples other changes. May be repeated.
-        driver: How the car is driven. With real, the car wanders in its lane
-            and changes lanes, as in published data sets; with none, the car
-            stays in the middle of its lane. By default as the scenario says.
+        transient: Temporary changes to the city, such as snow=0.25,leaves=0.15.
+            The switches are: snow, the depth of the snow [m]; leaves, the share
+            of leaves that trees keep; parked_cars, scaffolds, works, furniture
+            and roadsides, the share of each that is changed or added, from 0 to
+            1; height_limit, the greatest height of buildings and plants [m];
+            and seed, another integer for other random changes. May be repeated.
+        driver: Model of the driver. With real, the car wanders in its lane and
+            changes lanes, as in published data sets. With none, the car stays
+            in the middle of its lane. By default as the scenario says.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
-            poor). The road shakes the car on its springs. With none the car is
-            steady. By default as the scenario says.
-        imu_rate: Samples of the IMU per second [Hz]; by default as the scenario
+            poor), which shakes the car on its springs. With none, the car does
+            not shake. By default as the scenario says.
+        imu_rate: Sampling rate of the IMU [Hz]; by default as the scenario
             says.
-        camera: Add a camera that looks ahead. Give its width and height in
-            pixels and its images per second, such as 640x480@2. The camera also
-            records images of the depth and of the classes.
+        camera: Add a camera that looks ahead: width and height of its images in
+            pixels, and images per second, such as 640x480@2. The camera also
+            records depth images and images of semantic classes.
     """
     with uninterrupted():
         from cns_drake.command_line.drive_script import run_drive
@@ -260,11 +262,11 @@ def scan(
         pose: Pose of the LiDAR in the world: position, then roll, pitch and yaw
             [m, rad].
         output: File for the scan; its name ends in .pcd, .bin or .npy.
-        seed: Seed of the random noise and weather. Another seed gives other
-            random errors with the same statistics.
-        model_path: Folder in which to look for model:// files of the world,
-            before the folders of GZ_SIM_RESOURCE_PATH and SDF_PATH. May be
-            repeated.
+        seed: Seed of the random noise and weather. Other seeds give other
+            errors with the same statistics.
+        model_path: Folder with model:// files of the world, which is searched
+            before the folders in the environment variables GZ_SIM_RESOURCE_PATH
+            and SDF_PATH. May be repeated.
     """
     with uninterrupted():
         import numpy as np
@@ -319,8 +321,9 @@ def generate(
 ) -> None:
     """Record many drives.
 
-    Skips finished recordings and resumes interrupted ones, so after an
-    interruption you can run the same command again.
+    Simulates and records the named drives one by one, or several at once on
+    several cores. To resume after an interruption, run the same command again:
+    finished recordings are skipped.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

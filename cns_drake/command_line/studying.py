@@ -38,10 +38,10 @@ def reproduce(
     change between them, and writes a report.
 
     Args:
-        pages: Also write a web page of each drive. This is the default, except
-            with --no-recordings.
-        recordings: Whether to keep the recordings. Without them, the drives are
-            simulated but not recorded, which saves time and disk space; the
+        pages: Whether to write a web page of each drive as well. By default
+            yes, except with --no-recordings.
+        recordings: Whether to record the drives. With --no-recordings, the
+            drives are only simulated, which saves time and disk space; the
             report is the same.
     """
     with uninterrupted():
@@ -93,12 +93,11 @@ def study(
 ) -> None:
     """Measure how a change affects each method.
 
-    An experiment is a file that describes two drives, what differs between
-    them, and which tasks and methods to measure. One drive makes the database,
-    the other the queries. The drives are simulated but not recorded. The
-    command writes results.csv (one number per row), queries.csv (one query per
-    row) and a page, index.html. To resume after an interruption, run the same
-    command again.
+    An experiment is a file that describes a database drive and a query drive,
+    what differs between the two drives, and which tasks and methods to measure.
+    The drives are simulated but not recorded. The command writes results.csv
+    (one number per row), queries.csv (one query per row) and a page,
+    index.html. To resume after an interruption, run the same command again.
 
     Args:
         name: Name of a shipped experiment, as --list shows it, or an experiment
@@ -107,22 +106,24 @@ def study(
             maps, or folders of your own maps.
         output: Folder for the results; created if it does not exist.
         quick: Measure less and finish sooner. The section `quick` of the
-            experiment says what is left out.
+            experiment says what is measured then.
         task: Task to measure: place, pose, localise, map, change, cost or seen.
             By default the tasks of the experiment. May be repeated.
         method: Method to run, instead of the methods of the experiment: the
             name of a shipped method, a Python file with your own method, or the
             word standard, which means all standard methods. May be repeated.
-        override: Setting of a method to change, such as btc.candidates=20, or
-            field of the experiment to replace, such as seeds=[1,2]. For a field
-            inside another field, join both names by a dot, such as
-            database.years=[0,5]. Separate the numbers of a setting by commas; a
-            list in brackets makes the setting a factor. May be repeated.
-        allow_code: Run the Python files that the experiment names. A file that
-            you name yourself, by --method or --set, runs without this option.
+        override: New value for a setting of a method, such as
+            btc.candidates=20, or for a field of the experiment, such as
+            seeds=[1,2]. For a field inside another field, join both names by a
+            dot, such as database.years=[0,5]. A list in brackets makes a
+            setting a factor, which varies. If a setting has several numbers,
+            separate them by commas without brackets. May be repeated.
+        allow_code: Allow the experiment to run the Python files that it names.
+            Python files that you name yourself, with --method or --set, run
+            even without --allow-code.
         list_all: List the shipped experiments, and do nothing else.
-        show: Print the file of the experiment, as a start for your own, and do
-            nothing else.
+        show: Print the experiment file, as a start for your own experiment, and
+            do nothing else.
     """
     with uninterrupted():
         from cns_drake.studies.experiment import (

@@ -70,11 +70,13 @@ class RoadEntry(RoadStyle):
             radius of the bend]` [m].
         heights: heights of the road between the junctions, each as `[distance
             along the centreline, height]` [m]. A monotone cubic curve joins
-            them; it is level where the road meets a junction.
+            these heights; the curve is level where the road meets a junction.
         start_setback: distance from the position of the first junction to the
-            start of the road [m]. By default it follows from the kerb radius.
+            start of the road [m]. By default this distance follows from the
+            kerb radius.
         end_setback: distance from the end of the road to the position of the
-            last junction [m]. By default it follows from the kerb radius.
+            last junction [m]. By default this distance follows from the kerb
+            radius.
     """
 
     start: str
@@ -107,7 +109,8 @@ class RoadsFile(_Model):
     """The file `roads.yaml`: a common style, junctions and roads.
 
     Attributes:
-        defaults: style of all roads. It sets the fields that a road leaves out.
+        defaults: style of all roads, from which a road takes all fields that it
+            does not set.
         junctions: junctions by name, at least one.
         roads: roads by name, at least one.
     """

@@ -41,13 +41,14 @@ class Losses(Section):
     Attributes:
         missing: share of the buildings and plants to remove, from 0 to 1: those
             nearest to a place that the seed of the condition selects.
-        scattered: name of a class -> share of its structures to remove at
-            random all over the map, besides those of `missing`, such as
-            `{pole: 0.3}`. Its key `seed` replaces the seed of the condition, so
-            that the two drives can lack different structures.
+        scattered: name of a class -> share of the structures of this class that
+            are removed at random all over the map, in addition to those of
+            `missing`, such as `{pole: 0.3}`. The key `seed` replaces the seed
+            of the condition, so that the two drives can lack different
+            structures.
         towards: another stage of the map, usually an earlier one. Only
-            structures that do not exist in this other stage are removed.
-            Structures that are lower there keep their height.
+            structures that do not exist in that stage are removed. Structures
+            that are only lower in that stage do not change.
     """
 
     missing: _Part = 0.0

@@ -144,9 +144,9 @@ class DriverConfig(Section):
 
     Attributes:
         wander: standard deviation of the car's lateral offset from the middle
-            of its lane [m], where the road has room for it. The lateral offset
-            between the paths of two drives with this value has a standard
-            deviation that is 1.4 times as large.
+            of its lane [m], where the road is wide enough. Between the paths of
+            two such drives, the lateral offset has 1.4 times this standard
+            deviation.
         wander_length: distance along the road after which the autocorrelation
             of this lateral offset has fallen to 1/e [m].
         lane_changes: average number of changes to a neighbouring lane per
@@ -319,8 +319,8 @@ class Scenario(Section):
         title: one line for readers that says what the drive shows.
         route: lanes to follow, road by road. Give either `route` or
             `waypoints`.
-        waypoints: CSV file of points for the car to pass. A drive through a
-            `world` needs it, because an SDF world has no roads.
+        waypoints: CSV file of points for the car to pass. Required with
+            `world`, because an SDF world has no roads.
         u_turns: whether the car makes a U-turn where the waypoints lead
             straight back.
         aside: lateral offset of the car from the centreline of its lane,
@@ -332,11 +332,11 @@ class Scenario(Section):
         traffic: vehicles and pedestrians that move.
         transient: temporary changes to the city, such as other parked cars, or
             snow.
-        lidars: LiDARs by name. The frame and the topic of a LiDAR have its
-            name. By default there is one LiDAR, named `lidar`.
-        cameras: cameras by name. The optical frame (x right, y down, z ahead)
-            and the topics of a camera have its name. By default there is no
-            camera.
+        lidars: LiDARs by name. The name of a LiDAR is also the name of its
+            frame and its topic. By default there is one LiDAR, named `lidar`.
+        cameras: cameras by name. The name of a camera is also the name of its
+            optical frame (x right, y down, z ahead) and its topics. By default
+            there is no camera.
         imu: the inertial measurement unit.
         weather: fog, rain and snowfall for calibrated returns.
         odometry: how often the vehicle's ground-truth motion is recorded.

@@ -113,7 +113,7 @@ class Fleet(Section):
     Attributes:
         cars: number of drives a year.
         years: number of years. The first drives take place this number of years
-            before the query, and the last ones one year before it.
+            before the query, and the last drives one year before the query.
         length: smallest length of a route [m].
         seed: seed of the random choices; by default the seed of the condition.
     """

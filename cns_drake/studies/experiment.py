@@ -203,16 +203,17 @@ class Experiment(Section):
         both: scenario fields of both drives. A list of values makes the field a
             factor, which varies.
         database: scenario fields of the drive that makes the database. A list
-            of values makes the field a factor. Its field `sessions` is a list
-            of several drives, each with further fields of its own; `keep` says
-            how many of their places are kept, and `maintain` what updates
-            their maps.
+            of values makes the field a factor. The field `sessions` is a list
+            of several database drives, each with fields of its own. With
+            `sessions`, the field `keep` limits how many places enter the
+            database, and `maintain` names what updates the maps of these
+            drives.
         query: scenario fields of the drive that makes the queries. A list of
             values makes the field a factor.
-        cases: kinds of change by name. Each has fields of one or both drives,
-            or is a list of other cases to combine. A list of values gives the
-            levels of a case, the weakest first. Each case is measured by itself
-            and compared with the case `none`, in which nothing differs.
+        cases: kinds of change by name. Each case sets fields of one or both
+            drives, or is a list of other cases to combine. A list of values
+            sets the levels of a case, the weakest first. Each case is measured
+            by itself and compared with the case `none`, which changes nothing.
         levels: numbers of the levels of the cases to measure; by default all. A
             case with fewer levels is measured at its last level.
         design: how factors are combined. `product`: each value of a factor with
@@ -230,9 +231,9 @@ class Experiment(Section):
             protocol from which all other fields come.
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
-        frozen: table with the fingerprint of the drives of each level. Use it
-            to keep shipped worlds the same: if a drive no longer has its
-            fingerprint, the study stops with an error.
+        frozen: table with a fingerprint of each level's drives, which protects
+            a benchmark from changes: if a drive no longer has its fingerprint,
+            the study stops with an error.
         charts: charts to show on the page of the experiment.
         quick: fields to replace if `--quick` is given. `tasks`, `methods` and
             lists are replaced as a whole; in other mappings, only the fields

@@ -98,15 +98,15 @@ def tcr(
         source: Drive or map before the change.
         target: Drive or map after the change.
         control: Third drive, on A's route in B's stage or on B's route in A's
-            stage. The command then also prints how large TCR_sym is if only the
-            routes differ and nothing has changed.
-        paths: Compare the paths and speeds of the two drives, instead of what
-            changed. Every 5 m along A, the command measures how B differs from
-            A: lateral offset, lane, heading and height. The command also prints
-            which share of the time each car stands, and its speeds. For
-            comparison, the command shows the same numbers for two pairs of real
-            drives: two drives of Boreas, 28 days apart, and KAIST 01 and 02 of
-            MulRan.
+            stage. With the control, the command also prints TCR_sym of two
+            drives in the same stage, which differ only in their routes.
+        paths: Compare the paths and speeds of the two drives, instead of
+            measuring change. Every 5 m along A, the command measures how B
+            differs from A in lateral offset, lane, heading and height. The
+            command also prints the speeds of each car, and the share of the
+            time during which the car stands. For comparison, it prints the same
+            numbers of two pairs of real drives: two drives of Boreas, 28 days
+            apart, and KAIST 01 and 02 of MulRan.
     """
     if paths:
         commands.check_only_with(context, "paths", _WITH_PATHS)
@@ -214,31 +214,31 @@ def pr(
             a match in the database (filtered).
         across_maps: Allow two drives through maps of different names, such as
             two cities generated along the same streets.
-        truth: What makes a place a match of a query. With radius, the place
-            lies within --radius. With overlap:PART, such as overlap:0.5, the
-            place's scan shows at least this share of what the query's scan
-            shows, at any distance.
-        overlaps: CSV file to write, with the overlap of each query with each
-            place. Needs --truth overlap:PART.
-        exact_overlaps: File with exact overlaps, as cns-drake export --format
-            overlap-table writes it. Without this file, overlaps are estimated
-            from the scans. Needs --truth overlap:PART.
-        turn_queries: Whether to give each query a random yaw, as if the car had
-            another heading. By default as --protocol says.
-        tilt_queries: Tilt each query by a random roll and pitch of up to this
-            angle [deg]. By default as --protocol says.
-        hide_sector: Occlude a random sector of this angle in each query [deg],
-            as a truck beside the car would.
+        truth: What makes a place a match of a query. With radius, a match lies
+            within --radius of the query. With overlap:PART, such as
+            overlap:0.5, a match's scan shows at least PART of what the query's
+            scan shows, at any distance.
+        overlaps: CSV file to write: the overlap of each query with each place.
+            Needs --truth overlap:PART.
+        exact_overlaps: File with exact overlaps, from cns-drake export --format
+            overlap-table. Without such a file, overlaps are estimated from the
+            scans. Needs --truth overlap:PART.
+        turn_queries: Whether to rotate each query by a random yaw, as if the
+            car had another heading. By default as --protocol says.
+        tilt_queries: Greatest angle of the random roll and pitch by which each
+            query is tilted [deg]. By default as --protocol says.
+        hide_sector: Width of a random sector in which each query's points are
+            removed [deg], as if a truck beside the car occluded them.
         seed: Seed of the random yaws, tilts and occluded sectors of the
             queries.
-        output: Folder to write results.csv and queries.csv to, in the same form
-            as those of a study; created if it does not exist.
-        scores: CSV file to write, with a score for each pair of a query and a
-            place, instead of the results. DATABASE and QUERY are then folders
-            of scans without poses, in .bin, .pcd, .npy or .ply files. Every
-            query is compared with every place, even if the method usually skips
-            some places to save time. The score is empty where the method
-            rejects the place.
+        output: Folder for the tables results.csv and queries.csv, which have
+            the columns of a study's tables; created if it does not exist.
+        scores: CSV file for the score of each pair of a query and a place. Use
+            this option for scans without poses: DATABASE and QUERY are folders
+            with .bin, .pcd, .npy or .ply files, and no results are computed.
+            Every query is compared with every place, even if the method usually
+            skips some places to save time. If the method rejects a place, the
+            score is empty.
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)
@@ -382,10 +382,11 @@ def report(
 ) -> None:
     """Evaluate all recordings in a folder and write a report.
 
-    The command compares the drives of each map in place recognition and
-    structural change. The folder then contains report.html, figures, and the
-    tables results.csv and queries.csv, in the same format as those of cns-drake
-    study. To resume after an interruption, run the same command again.
+    The command measures place recognition and structural change between the
+    drives of each map. It writes report.html, figures, and the tables
+    results.csv and queries.csv, which have the same columns as the tables of
+    cns-drake study. To resume after an interruption, run the same command
+    again.
 
     Args:
         recordings: Folder that contains the recordings.
@@ -431,27 +432,30 @@ def compare(
 
     RESULTS are files like results.csv, or folders that contain such a file. The
     command ranks the methods in these tables and in the shipped tables by their
-    means over the conditions that all tables share. If there are four or more
-    maps, each mean has a 95 % t interval over maps; with only one map, it has
-    an interval over four or more conditions. If a queries.csv lies next to each
-    table, the command also prints the difference in AUC between any two
-    methods. The p-value of a difference is corrected by Holm's method for the
-    number of differences. With --rankings, Kendall's tau says how similarly two
-    tables rank the methods.
+    means over the conditions that all tables share.
+
+    Each mean has a 95 % t interval over maps if there are at least four maps,
+    or over conditions if there are one map and at least four conditions. If
+    each table has a queries.csv next to it, the command also prints the
+    difference in AUC between any two methods, with a p-value that is corrected
+    for the number of differences by Holm's method. With --rankings, the command
+    prints Kendall's tau between the rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
-        metric: Metric to rank by: auc, r1 or another one in the tables. Give an
-            unknown name to see the list of metrics.
-        protocol: Compare only results that were measured by this protocol. Use
-            own for results that were measured with changed options. By default,
-            results are compared with each other only if they used the same
+        metric: Metric by which the methods are ranked: auc, r1 or another
+            metric in the tables. An unknown name makes the command list all
+            metrics.
+        protocol: Protocol of the results to compare; own stands for results
+            that were measured with changed options. By default results of all
+            protocols are used, each compared only with results of the same
             protocol.
-        verified: Compare the results with geometric verification. By default,
-            the results without geometric verification are compared.
-        rankings: Compare only the order of the methods in the tables. Each
-            table is ranked over its own conditions. The tables may therefore
-            have different conditions, such as simulated and real drives.
+        verified: Rank the results that were measured with geometric
+            verification. By default, the results without geometric verification
+            are ranked.
+        rankings: Compare only how the tables rank the methods. Each table is
+            ranked over its own conditions, so that tables with different
+            conditions can be compared, such as simulated and real drives.
     """
     from evaluation.results import comparing
 

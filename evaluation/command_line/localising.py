@@ -53,23 +53,22 @@ def localise(
 ) -> None:
     """Localise scans in a map.
 
-    Each scan of QUERY is aligned to MAP from an initial guess of its pose: the
-    ground-truth pose, moved by --start in a random direction and rotated by
-    --start-turn about a random axis. With --track, the estimated pose of the
-    previous scan is used instead. The results are pose errors and success
-    rates.
+    Each scan of QUERY is aligned to MAP by registration, from an initial guess
+    of the scan's pose: the ground-truth pose, moved by --start in a random
+    direction and rotated by --start-turn about a random axis. With --track, the
+    initial guess follows from the estimated pose of the previous scan instead.
+    The results are pose errors and success rates.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
-    odometry, CNS) or point clouds (.pcd .ply .npy .bin). The scans of a drive
-    as MAP are merged at their ground-truth poses. A point cloud as QUERY is one
-    scan, whose ground-truth pose is the origin of the map.
+    odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
+    scans are merged at their ground-truth poses. If QUERY is a point cloud, it
+    counts as one scan, whose ground-truth pose is the origin of the map.
 
-    With --estimate, the command measures the errors of poses that another
-    program estimated, and nothing else: MAP is then the drive with the ground
-    truth, and there is no QUERY. The command prints two errors, as evo and
-    KITTI define them. ATE is the root mean square of the distances from the
-    ground truth after rigid alignment. Drift is the error of the motion over
-    100 m of path.
+    With --estimate, the command only measures the errors of poses that another
+    program estimated. MAP is then the drive with the ground truth, and there is
+    no QUERY. The command prints two errors: ATE, as evo defines it, is the root
+    mean square of the distances from the ground truth after rigid alignment;
+    drift, as KITTI defines it, is the error of the motion over 100 m of path.
 
     Args:
         place: Drive or point cloud to use as the map.
@@ -84,24 +83,23 @@ def localise(
             moved and rotated.
         query_spacing: Distance that the car drives between two queries [m]; by
             default 10. Not with --track.
-        track: Track the whole drive instead of localising single scans: the
+        track: Track the whole drive instead of localising single scans. The
             initial guess of each scan is the estimated pose of the previous
             scan, moved by the odometry.
         odometry_drift: Drift of the simulated odometry that --track uses, as a
             share of the distance driven. With 0.01, the default, lengths are
             wrong by about 1 %, and the heading drifts by about 0.01 deg per
             metre.
-        estimate: File with the trajectory of MAP as another program estimated
-            it. The file has the TUM format: time [s], x y z and a quaternion x
-            y z w.
+        estimate: File with a trajectory that another program estimated for MAP,
+            in the TUM format: time [s], x y z and a quaternion x y z w.
         frame: Frame whose poses --estimate contains: the LiDAR's (lidar) or the
             vehicle's (base_link).
-        time_offset: Time to add to the times of --estimate [s], if its clock
-            differs from that of the drive.
-        output: Folder to write results.csv and queries.csv to, in the same form
-            as those of a study; created if it does not exist. The folder also
-            gets localisation.csv, with all values of each query, and a picture
-            if you give --track.
+        time_offset: Time to add to the times of --estimate [s], if they come
+            from another clock than the times of the drive.
+        output: Folder for the tables results.csv and queries.csv, which have
+            the columns of a study's tables, for localisation.csv, with all
+            values of each query, and for a picture with --track; created if it
+            does not exist.
     """
     import math
 

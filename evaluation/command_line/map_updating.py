@@ -26,28 +26,29 @@ def map_update(
     output: Annotated[Path | None, typer.Option(metavar="FOLDER")] = None,
     json: Json = False,
 ) -> None:
-    """Compute scores for labels of what changed between two maps.
+    """Score the labels of a change detector on two maps.
 
-    The command compares labels with the ground truth: your own labels
-    (--labels-a and --labels-b) or, without these options, those of a shipped
-    change detector, the baseline. DIR is a folder that cns-drake export
-    --format map-truth wrote, or a folder with the same files for real drives:
-    A/map.ply, A/truth.npy, B/map.ply and B/truth.npy. A baseline also needs the
-    scans and poses in this folder. Points whose label in the ground truth is
+    The command compares labels of what changed between map A and map B with the
+    ground truth. The labels are your own (--labels-a and --labels-b), or those
+    of a shipped change detector (--baseline). DIR is a folder from cns-drake
+    export --format map-truth, or a folder with the same files for real drives:
+    A/map.ply, A/truth.npy, B/map.ply and B/truth.npy. A shipped change detector
+    also needs the scans and poses in DIR. Points whose ground-truth label is
     255 are ignored.
 
     Args:
         folder: Folder with the maps and their ground truth.
-        baseline: Shipped change detector to score, instead of labels of your
-            own. By default free-space, if you give no labels.
-        labels_a: File with your labels of A's map: 0 unobserved, 1 kept, 2
-            gone. The file is a .npy file, or a .ply file with a property
+        baseline: Shipped change detector to score. By default free-space, if
+            you give no labels of your own.
+        labels_a: File with your labels of map A: 0 unobserved, 1 kept, 2 gone.
+            The file is a .npy file, or a .ply file with a property
             `prediction`. Needs --labels-b.
-        labels_b: File with your labels of B's map: 1 kept, 3 new, 4 newly seen.
-            The file has one of the formats of --labels-a. Needs --labels-a.
-        output: Folder for results.csv and queries.csv, in the same form as
-            those of a study, and for the detector's labels of both maps, A.npy
-            and B.npy.
+        labels_b: File with your labels of map B: 1 kept, 3 new, 4 newly seen.
+            The file is a .npy file, or a .ply file with a property
+            `prediction`. Needs --labels-a.
+        output: Folder for the tables results.csv and queries.csv, and for the
+            labels that were scored, A.npy and B.npy; created if it does not
+            exist.
     """
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder

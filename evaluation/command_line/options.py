@@ -24,25 +24,24 @@ Frame = Literal["lidar", "base_link"]
 Align = Annotated[
     When,
     typer.Option(
-        help="Whether to align the drives to each other before they are "
-        "compared. With auto, they are aligned only if their world frames "
-        "differ."
+        help="Whether to align the drives to each other before the comparison. "
+        "auto aligns only drives with different world frames."
     ),
 ]
 MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="Place-recognition method: the name of a shipped one, or a Python "
-        "file that registers your own.",
+        help="Place-recognition method to run: the name of a shipped method, "
+        "or a Python file with your own method.",
     ),
 ]
 Tables = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR",
-        help="Folder to write results.csv and queries.csv to, in the same form "
-        "as those of a study; created if it does not exist.",
+        help="Folder for the tables results.csv and queries.csv, which have "
+        "the columns of a study's tables; created if it does not exist.",
     ),
 ]
 SensorHeight = Annotated[

@@ -20,32 +20,32 @@ def real(
 ) -> None:
     """Measure place recognition and registration on real scans.
 
-    DIR contains excerpts of public data sets, each in a folder with the name
-    that the page "Real drives" of the documentation lists: KITTI 00 and its
-    revisits, nuScenes 1072, Newer College, NCLT, HeLiPR, bird's-eye images of
-    KITTI with poses, and results of other programs over sessions. If a data set
-    is missing, the command prints a note and continues with the others. The
-    command writes results.csv and queries.csv, which cns-eval compare reads. To
-    resume after an interruption, run the same command again.
+    DIR contains excerpts of public data sets: KITTI 00 and its revisits,
+    nuScenes 1072, Newer College, NCLT, HeLiPR, bird's-eye images of KITTI with
+    poses, and results of other programs over sessions. The page "Real drives"
+    of the documentation lists the name of each data set's folder. The command
+    names missing data sets, and measures all others. The results are written to
+    results.csv and queries.csv, which cns-eval compare reads. To resume after
+    an interruption, run the same command again.
 
     Args:
         folder: Folder with the excerpts of public data sets.
         output: Folder for the results; created if it does not exist.
-        method: Method of place recognition or of registration to run, instead
-            of all shipped methods: the name of a shipped method, standard for
-            all standard methods of place recognition, or a Python file that
-            registers your own method or defines your own function `localise`.
+        method: Method of place recognition or of registration to run: the name
+            of a shipped method, a Python file with your own method or your own
+            function `localise`, or the word standard, which means all standard
+            methods of place recognition. By default all shipped methods run.
             May be repeated.
-        simulated: Folder with simulated recordings. If a recording has the same
-            model of LiDAR as a data set, its scans become further places of the
-            data set's database. A classifier then also tries to tell these
-            scans from the real ones, which shows how realistic the simulation
-            is. The classifier also uses a folder kitti_bev with bird's-eye
-            images in it.
-        queries: Number of queries in each sequence of bird's-eye images. They
-            are chosen evenly among the queries with a match; for each of them,
-            one random match is the place. By default, all queries and all
-            places.
+        simulated: Folder with simulated recordings. The scans of a recording
+            are added as distractors to the database of each data set with the
+            same model of LiDAR. A classifier is also trained to distinguish
+            simulated from real scans, which shows how realistic the simulation
+            is. If the folder contains a folder kitti_bev with bird's-eye
+            images, the classifier uses these images as well.
+        queries: Number of queries in each sequence of bird's-eye images, at
+            equal intervals among the queries with a match. The database then
+            contains one random match of each query. By default all queries and
+            all places are used.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.real.measuring import measure_real

@@ -93,7 +93,7 @@ class BtcConfig(MethodConfig):
             `public` copies the authors' program, in which a wrong term tilts
             the second axis out of the plane (see
             `evaluation.methods.btc_triangles.image_axes`). `orthogonal`
-            corrects it. [P] public.
+            corrects this error. [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
         height_range: lowest and highest height above the ground of the points
             that are used [m]; [O] -1, 4.
@@ -105,8 +105,8 @@ class BtcConfig(MethodConfig):
         suppression_radius: radius within which only the keypoint with the most
             layers is used [m]; [O] 2.
         max_keypoints: largest number of keypoints per place; [O] 500.
-        num_neighbours: number of nearest keypoints that form triangles with
-            each keypoint, including itself; [O] 10.
+        num_neighbours: number of nearest keypoints, including the keypoint
+            itself, that form triangles with each keypoint; [O] 10.
         side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.
         side_resolution: step to which side lengths are rounded in the hash

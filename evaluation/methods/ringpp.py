@@ -60,8 +60,8 @@ class RingPlusPlusConfig(MethodConfig):
         height_unit: number by which heights are divided where the shape around
             a point is described [m]. Horizontal coordinates are divided by
             `half_width`.
-        neighbours: number of nearest points that describe the shape around a
-            point, including itself.
+        neighbours: number of nearest points, including the point itself, that
+            describe the shape around a point.
         cells: number of rows and of columns of the map from above, and also of
             angles and of rays of its Radon transform.
     """

@@ -18,10 +18,10 @@ _NAMED: Options = {
             Literal["fair", "paper", "recorded"],
             typer.Option(
                 "--protocol",
-                help="How the scans of the query drive become queries. fair "
-                "gives each scan a random yaw and tilt, so that no method "
-                "profits from equal headings. paper follows the CNS paper. "
-                "recorded leaves the scans as they are.",
+                help="Protocol, which says how the scans of the query drive "
+                "become queries. fair rotates each scan by a random yaw and "
+                "tilt, so that no method profits from equal headings. paper "
+                "follows the CNS paper. recorded leaves the scans unchanged.",
             ),
         ],
         "fair",
@@ -65,8 +65,8 @@ _FIELDS: Options = {
             "scans_per_place",
             int | None,
             None,
-            "Number of consecutive scans that are merged for each place and "
-            "each query, with every method. By default each method's own "
+            "Number of consecutive scans to merge for each place and each "
+            "query, with all methods. By default each method uses its own "
             "number.",
             "N",
         ),
@@ -74,11 +74,11 @@ _FIELDS: Options = {
             "exclude_recent",
             float | None,
             None,
-            "Turn on loop closure: each drive is also compared with itself. A "
-            "query is then compared only with places that the car passed at "
-            "least this long before [s], such as 30. Every method scores all "
-            "of these places, even a method that otherwise scores only a few "
-            "candidates, such as scan-context++.",
+            "Measure loop closure: compare each drive with itself as well. "
+            "Give the shortest time between a place and a query of the same "
+            "drive [s], such as 30; more recent places are excluded. Every "
+            "method then scores all places that remain, even scan-context++, "
+            "which otherwise scores only a few candidates.",
             "S",
         ),
     )
@@ -89,10 +89,10 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Geometric verification: reject top-ranked places that "
-                "are farther from the query than --radius, according to the "
-                "method's own pose estimate. The option has no effect on "
-                "methods that estimate no pose.",
+                help="Use geometric verification: reject a top-ranked place if "
+                "the method's own pose estimate puts the query farther than "
+                "--radius from this place. Methods without pose estimates are "
+                "not affected.",
             ),
         ],
         False,

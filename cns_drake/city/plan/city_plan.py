@@ -96,7 +96,7 @@ class RowPlan(_Model):
     Attributes:
         setback: distance from the inner edge of the sidewalk to the building
             fronts [m].
-        archetypes: weights of the archetypes in the random choice, by name,
+        archetypes: weight of each archetype, by name, in the random choice,
             such as `{house: 3, office: 1}`.
         width: smallest and largest width of a lot [m]. The width of each lot is
             sampled between these limits.
@@ -195,9 +195,9 @@ class LinePlan(_Model):
         objects: weights of the objects in the random choice, by name.
         points: points of the line [m]. The objects face its right side.
         spacing: smallest and largest distance between two objects [m]. Without
-            it, each straight part of the line becomes one object, such as a
-            fence or a hedge, which is as long as this part. Long or steep parts
-            become several objects, end to end.
+            `spacing`, each straight part of the line becomes one object of the
+            same length, such as a fence or a hedge. Long or steep parts become
+            several objects, end to end.
         yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
         kind: first part of the objects' names in the tables; by default the
@@ -238,15 +238,15 @@ class StreetPlan(_Model):
     """The objects on the sidewalks in front of a district.
 
     Attributes:
-        trees: weights of the tree species in the random choice, by name.
-            Without it there are no trees.
+        trees: weight of each tree species, by name, in the random choice. By
+            default there are no trees.
         tree_spacing: smallest and largest distance between neighbouring trees
             [m].
         tree_gaps: share of the trees that are left out at random.
         lamp: name of the object to use as street lamp.
         lamp_spacing: distance between neighbouring lamps [m].
-        furniture: weights of other objects, such as benches, in the random
-            choice, by name.
+        furniture: weight of each other object, such as a bench, by name, in the
+            random choice.
         furniture_spacing: smallest and largest distance between neighbouring
             pieces of furniture [m].
     """
@@ -265,13 +265,14 @@ class DistrictPlan(_Model):
 
     Attributes:
         name: unique name, from lower-case letters, digits and underscores. The
-            random numbers of the district depend on it.
+            random numbers of the district depend on this name.
         block: `[x, y]` of a point [m]. The district fills the block between
             streets that contains this point. Give `block`, `area` or neither.
         area: corners of the district [m]. A district with neither `block` nor
             `area` gets all ground that belongs to no other district.
         ground: kind of ground of the district.
-        relief: height of the swells of its lawns [m]; 0 for level ground.
+        relief: height of the swells (gentle hills) in the district's lawns [m];
+            0 for level ground.
         relief_margin: distance from paths and buildings over which the swells
             rise to their full height [m].
         patches: parts of the district with another kind of ground.
@@ -316,8 +317,8 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
             world [m].
         water_level: height of the water's surface [m].
-        cars: weights of the models of cars in the random choice of parked cars,
-            by name.
+        cars: weight of each car model, by name, in the random choice of parked
+            cars.
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
         medians: objects on the medians of roads; only the fields `trees` and

@@ -27,8 +27,7 @@ class Growth(_Model):
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
             for any text and `?` for any one character.
-        but: names of structures that are exceptions, although they match
-            `structures`.
+        but: names of exceptions, which match `structures` but are not lower.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -64,11 +63,11 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked in each stage.
 
-    The last stage is the whole city. Each earlier stage lists how it differs
-    from the next stage: which structures it lacks, and which are lower in it.
-    A city therefore only grows from stage to stage, with one exception:
-    temporary objects on an empty lot, such as a market, are removed when the
-    lot is built on.
+    The last stage is the whole city. Each earlier stage lists its differences
+    from the next stage: the structures that are missing, and the structures
+    that are lower. A city therefore only grows from stage to stage, with one
+    exception: temporary objects on an empty lot, such as a market, are removed
+    when the lot is built on.
 
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in
