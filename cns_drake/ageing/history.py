@@ -1,8 +1,8 @@
 """The history of a city: what happens to it, year after year.
 
 The city in a year follows from the city in the year before. Each object has its
-own random numbers for each year and event, so that a longer history begins with
-the same events as a shorter one.
+own random numbers for each year and event, so that a simulation of more years
+begins with the same events as a simulation of fewer years.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -420,7 +420,7 @@ class AgeingCity:
     # A year.
 
     def live(self) -> None:
-        """Simulates one year: draws which structures change."""
+        """Simulates one year: samples which structures change."""
         self.year += 1
         for name in self._passing:
             self._remove(name, event="scaffold")

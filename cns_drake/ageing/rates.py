@@ -15,7 +15,7 @@ from cns_drake.base.yaml_files import parse_yaml, read_yaml
 MOVED = "moved"
 # Upper limit of this distance [m].
 _FARTHEST = 20.0
-# Events that are drawn at random -> their rate per year, see rates.yaml.
+# Events that are sampled at random -> their rate per year, see rates.yaml.
 DEFAULT_RATES: Mapping[str, float] = {
     event: values["metres" if event == MOVED else "rate"]
     for event, values in parse_yaml(
@@ -117,15 +117,15 @@ class Tally:
     number: Counter[str] = field(default_factory=Counter)
 
     def count(self, event: str, share: float, hit: bool, things: int) -> None:
-        """Counts one random draw of an event.
+        """Counts one random trial of an event.
 
         Args:
             event: name of the event.
-            share: probability of the event in this draw.
+            share: probability of the event in this trial.
             hit: whether the event happened.
-            things: number of objects that this draw adds to `exposure`, the
+            things: number of objects that this trial adds to `exposure`, the
                 number of objects to which the event can happen. Use 0 if an
-                earlier draw has added these objects.
+                earlier trial has added these objects.
         """
         self.expected[event] += share
         self.exposure[event] += things

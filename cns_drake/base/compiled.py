@@ -21,11 +21,12 @@ _Function = TypeVar("_Function", bound=Callable)
 def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
-    The machine code is kept between runs in the user's cache folder, by the
-    content of the source: an installation and a checkout with the same source
-    share it, and so do two releases. If that folder cannot be written, each
-    process compiles anew. If several processes need the same function at once,
-    one of them compiles it and the others wait.
+    The machine code stays in the user's cache folder between runs, under a hash
+    of its source code, so that all installations and releases with the same
+    source code share the compiled function. If the cache folder cannot be
+    written, each process compiles the function again. If several processes need
+    the same function at once, one process compiles the function, and the others
+    wait.
 
     A compiled function may call only compiled functions of its own folder. If
     any file in that folder changes, all of its functions are compiled again;

@@ -94,7 +94,7 @@ class TimeLeft:
         self._most_running = max(self._most_running, running)
 
     def found(self, name: str, share: float) -> None:
-        """Records at which share of its work a job begins, 0 to 1."""
+        """Records which share of a job was done before its start, 0 to 1."""
         work = self._works[name]
         if work.first is None:
             work.first = share

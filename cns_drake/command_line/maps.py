@@ -227,7 +227,9 @@ def import_city(
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
     if plain and grow is not None:
-        raise InputError("--grow: --plain has nothing drawn at random")
+        raise InputError(
+            "--grow: not with --plain, which adds nothing at random"
+        )
     if not plain and not stages and path.suffix != ".xodr" and grow is None:
         grow = _GROW
     options = ImportOptions(
@@ -286,7 +288,7 @@ def _shortcomings(
         yield (
             f"{report.dated} of {report.dated + report.undated} buildings have"
             f" a year, and the stages {numbers} structures; in place of"
-            " --years, --grow draws a change at random"
+            " --years, --grow samples a change at random"
         )
 
 

@@ -85,7 +85,7 @@ class Imported:
 
     @property
     def draw_name(self) -> str:
-        """Name on which the random draws for the structure depend.
+        """Name on which the random numbers for the structure depend.
 
         A variant of a structure has the draw name of the original.
         """

@@ -264,9 +264,10 @@ def rendered_intrinsics(camera: CameraInfo) -> np.ndarray:
     """Returns the intrinsic matrix K (3, 3) of the images that Drake renders.
 
     Pixel (u, v) of an image shows what lies along K^-1 (u, v, 1), in the
-    optical frame. Drake's renderers count the principal point of `camera` from
-    the outer corner of the first pixel, but its documentation, like ROS, from
-    the centre of this pixel: K is half a pixel less in both.
+    optical frame. The principal point in K is half a pixel less than that of
+    `camera`, in both directions: Drake's renderers count from the outer corner
+    of the first pixel, while ROS and Drake's documentation count from the
+    centre of the first pixel.
     """
     K = camera.intrinsic_matrix()
     K[:2, 2] -= 0.5

@@ -1,11 +1,11 @@
 """Chunks of an MCAP file that hold one topic each.
 
-To read one message, a reader has to uncompress the chunk that holds it. With
-chunks in the order of time, the poses of a drive would cost as much as all its
-clouds, between which they lie. So the messages of a short span are held, and
-written topic by topic. The topics keep the order of their first messages:
-readers sort messages by their log times, and messages of equal time by their
-places in the file.
+To read one message, a reader has to uncompress the whole chunk that contains
+the message. If chunks contained all messages in the order of time, a reader of
+the poses would uncompress all clouds as well. The messages of a short span of
+time are therefore collected, and written topic by topic. The topics keep the
+order of their first messages: readers sort messages by their log times, and
+messages of equal time by their places in the file.
 """
 
 from collections import Counter

@@ -166,7 +166,7 @@ def merge_surfaces(
 
 
 class GeometryRecord(NamedTuple):
-    """What a SceneGraph says of one geometry; mesh files are not read.
+    """The data of one geometry in a SceneGraph; mesh files are not read.
 
     Attributes:
         geometry_id: id of the geometry.

@@ -883,7 +883,7 @@ def moved(
         drive: the drive.
         ahead: how far the LiDARs are moved forwards [m].
         left: how far they are moved to the left [m].
-        heading_deg: angle by which they are turned to the left [deg].
+        heading_deg: angle by which they are rotated to the left [deg].
     """
     lidars = {}
     for name, config in drive.lidars.items():

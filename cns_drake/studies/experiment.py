@@ -66,7 +66,7 @@ LEVEL = "level"
 NO_CAUSE = "none"
 # Field of the database with its drives, each with fields of its own.
 SESSIONS = "sessions"
-# Field of the database with drives that are drawn at random.
+# Field of the database with drives that are sampled at random.
 FLEET = "fleet"
 _MOST_CONDITIONS = 20_000
 

@@ -3,11 +3,11 @@
 Rays that are cast in the worlds of both drives determine the labels.
 
 - A drive **observes** a point if the LiDAR can see it from one of the drive's
-  poses: the point is within the LiDAR's ranges and field of view, and no
-  surface hides it. A surface hides a point that lies more than `NEAR` behind it
-  along the line of sight. At grazing angles, the point must lie farther behind
-  the surface, so that a wall that has moved a little does not occlude its old
-  position.
+    poses: the point is within the LiDAR's ranges and field of view, and no
+    surface occludes it. A surface occludes a point that lies more than `NEAR`
+    behind the surface along the line of sight. At grazing angles, the point
+    must lie farther behind the surface, so that a wall that has moved a little
+    does not occlude its old position.
 - A surface is **there** if it passes within `NEAR` of the point, measured
   perpendicular to the surface. Moving objects do not count.
 
@@ -294,8 +294,8 @@ def observed(
     """Returns which points a simulated drive observes, (N,) bool.
 
     A point is observed if the LiDAR can see it at one of the given frames: the
-    point is within the LiDAR's ranges and field of view, and no surface hides
-    it.
+    point is within the LiDAR's ranges and field of view, and no surface
+    occludes it.
 
     Args:
         points: (N, 3) points in W [m].

@@ -54,9 +54,9 @@ _TRIAL_STEP = 2.0
 class Piece:
     """A piece of a vehicle's path: part of a lane, or a path in a junction.
 
-    A path through a junction is called a way. A vehicle enters a way only if it
-    can drive to its end: it waits in the lane before the way until all
-    conflicting ways are free.
+    A path through a junction is called a way. A vehicle waits in the lane
+    before the way until all conflicting ways are free, so that it never stops
+    on the way.
 
     Attributes:
         points: (N, 3) points along the middle of the piece, in driving

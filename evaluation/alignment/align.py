@@ -90,7 +90,8 @@ class AlignmentReport:
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
         move: how far the middle frame of the moved drive was moved along x, y,
             z [m].
-        turn_deg: angle by which that frame was turned about the vertical [deg].
+        turn_deg: angle by which that frame was rotated about the vertical
+            [deg].
         bend: greatest difference between the move of a frame and that of the
             middle frame [m].
         straightened: for the fixed and the moved drive, the error where the

@@ -3,7 +3,7 @@
 Without common coordinates, the transformation is found from places that look
 alike. Scan Context proposes pairs of keyframes, with the heading between them.
 A consensus of pairs (RANSAC on two pairs at a time) fixes the four numbers by
-which two upright worlds can differ: a turn about the vertical and a
+which two upright worlds can differ: a rotation about the vertical and a
 translation.
 """
 

@@ -1,9 +1,10 @@
 """Registration of one cloud to another, from a rough guess.
 
 Point-to-plane ICP (Chen and Medioni 1991) of small_gicp: each point is paired
-with the nearest one of the other cloud and drawn to its plane. The distance
-limit shrinks from stage to stage. At first it lets a poor guess converge; later
-it keeps changed parts from disturbing the pairs.
+with the nearest point of the other cloud, and its distance to the plane of that
+point is minimised. The maximum correspondence distance shrinks from stage to
+stage: a large distance lets a poor initial guess converge, and a small distance
+excludes wrong pairs at changed parts.
 """
 
 from dataclasses import dataclass

@@ -176,7 +176,7 @@ def trajectory_errors(
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Returns the distances (N,) of estimated positions from true ones [m].
 
-    The estimated positions are first moved and turned so that they fit best.
+    The estimated positions are first moved and rotated so that they fit best.
 
     Args:
         p: (N, 3) ground-truth positions [m].

@@ -1,9 +1,10 @@
 """Bird's-eye images that count voxels, as in the data of BEVPlace.
 
 An image is (151, 151) uint8 and shows the points within 25.2 m of the LiDAR: up
-is ahead, left is left. A pixel is a column of voxels with sides of 0.4 m. It
-counts the voxels with points beyond the first, which is mostly ground, up to
-10. Counts are scaled so that the largest one in the image is 255.
+is ahead, left is left. A pixel is a column of voxels with sides of 0.4 m. The
+value of a pixel is the number of voxels with points, minus one because the
+first of these voxels is mostly ground, and at most 10. Values are scaled so
+that the largest value in the image is 255.
 
 The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
 their images of KITTI makes other images than these. The rules above were found

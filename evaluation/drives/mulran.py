@@ -45,9 +45,9 @@ class MulranDrive(BinDrive):
     `evaluation.drives.scan_files.to_world`). If the poses are in local
     coordinates, W is the drive's own frame. The pose of a scan is interpolated
     at its stamp. Points without a return, which are stored as (0, 0, 0), are
-    left out. A complete scan has the fields `ring` and `t` [ns since the stamp]
-    beside the stored ones. A scan with too few points lacks these two, because
-    its file does not show which points are missing.
+    left out. A complete scan has two fields in addition to the stored fields:
+    `ring` and `t` [ns since the stamp]. An incomplete scan lacks `ring` and
+    `t`, because its file does not show which points are missing.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

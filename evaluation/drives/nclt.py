@@ -58,7 +58,7 @@ class NcltDrive(FileDrive):
     """The scans of the HDL-32E in a session of NCLT.
 
     The unit hangs upside down, and its field of view reaches up to 30.67 deg.
-    The files contain scans from which the motion during a turn has been
+    The files contain scans from which the motion during a revolution has been
     removed. The rings of the points are numbered by elevation, from the lowest;
     they are not the laser numbers of the unit.
     """

@@ -30,13 +30,13 @@ _MOST_BENT = 1.1
 
 @dataclass(frozen=True, eq=False)
 class QuerySensor:
-    """A turned sensor Q that replaces the recorded sensor S in a query.
+    """A rotated sensor Q that replaces the recorded sensor S in a query.
 
     Q and S are at the same position. A sector of azimuths can be occluded in Q:
     the points in this sector are removed from the scan.
 
     Attributes:
-        X_SQ: (4, 4) a rotation; None if Q is not turned.
+        X_SQ: (4, 4) a rotation; None if Q is not rotated.
         hidden_from: azimuth in S at which the occluded sector begins [rad].
         hidden_angle: angle of the occluded sector [rad]; 0 for none.
     """
@@ -57,10 +57,11 @@ class QuerySensor:
         """Returns a query's sensor with random yaw, tilt and occluded sector.
 
         The result depends on the frame's number but not on the drive, so that
-        queries at the same frames of two drives are turned alike.
+        queries at the same frames of two drives have the same random yaw and
+        tilt.
 
         Args:
-            seed: seed of the draws.
+            seed: seed of the random numbers.
             frame: frame of the query.
             turns: whether the query gets a random yaw.
             tilt_deg: greatest roll, and greatest pitch [deg].
@@ -87,10 +88,10 @@ class QuerySensor:
 
 
 def corners(positions: np.ndarray, apart: float) -> list[int]:
-    """Returns indices of positions that follow each other at a distance.
+    """Returns indices of positions that are at least a given distance apart.
 
-    The first is 0; each further one is the next position that is at least
-    `apart` metres from the one before.
+    The first index is 0. Each further index is that of the next position at a
+    distance of at least `apart` [m] from the previous position in the result.
     """
     points = positions.tolist()
     kept = [0]

@@ -105,14 +105,14 @@ COLUMNS = tuple(QUERY.fields or ())
 
 @dataclass(frozen=True)
 class Starts:
-    """How the random initial poses of scans are drawn.
+    """How the random initial poses of scans are sampled.
 
     Attributes:
         radius: distance of each initial position from the ground-truth position
             [m].
         turn_deg: angle between each initial and true orientation [deg].
         seed: seed of the random directions in which initial poses are moved and
-            turned.
+            rotated.
 
     Raises:
         InputError: if a value is out of range.
@@ -356,7 +356,7 @@ def localise(
         localisers: maps with their estimators.
         query: the drive.
         frames: frames of the scans, in any order.
-        starts: how the initial poses are drawn.
+        starts: how the initial poses are sampled.
         jobs: number of processes, where the system can fork.
 
     Returns:

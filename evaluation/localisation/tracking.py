@@ -46,15 +46,15 @@ def drifting_steps(
     """Returns the motion between poses as a drifting odometry measures it.
 
     The odometry has a relative error of lengths, and a drift of the heading
-    [deg/m]. Both are drawn anew every 100 m of path, from normal distributions
-    of mean 0 and standard deviation `drift`.
+    [deg/m]. Both are sampled anew every 100 m of path, from normal
+    distributions of mean 0 and standard deviation `drift`.
 
     Args:
         X_WS: (N, 4, 4) ground-truth poses of the LiDAR.
         way: (N,) length of the path up to each pose [m].
         drift: standard deviation of both errors; 0 for none. For example, 0.01
             means 1 % of each length and 0.01 deg/m of heading.
-        seed: seed of the draws.
+        seed: seed of the random numbers.
 
     Returns:
         (N - 1, 4, 4) pose of the LiDAR in its frame at the previous pose.
@@ -91,7 +91,7 @@ def track_drive(
         localiser: the map and the estimator.
         query: the drive.
         is_mapped: (N,) bool, which frames lie within the map.
-        starts: how the initial pose of a section's first scan is drawn.
+        starts: how the initial pose of a section's first scan is sampled.
         drift: see `drifting_steps`.
 
     Returns:

@@ -5,9 +5,10 @@ change detector labels the points of the map A and of the map of B (see
 `evaluation.map_update.baselines`). Points that are gone leave the map, and the
 points of B join it.
 
-A place of an older drive sees what the updated map shows from there: its scan
-without the points that are gone, and with the new points that nothing hides. So
-the maps for localisation and the places for recognition come from one map.
+The scan of a place of an older drive becomes what the updated map shows from
+there: the scan without the points that are gone, and with all new points that
+are not occluded. The maps for localisation and the places for recognition
+therefore come from one map.
 """
 
 from __future__ import annotations

@@ -116,10 +116,11 @@ def open_sequences(
 ) -> list[ImageSequence]:
     """Returns the sequences of images in a folder.
 
-    The frames of places and queries are those by which BEVPlace was evaluated.
-    Of another sequence, the first half are places, and the second half queries,
-    unless it has a folder for either. As in that evaluation, only queries with
-    a match count; the others are left out.
+    For the sequences on which BEVPlace was evaluated, the frames of places and
+    queries are those of that evaluation. In any other sequence, the first half
+    are places and the second half queries, unless the sequence has a folder for
+    each. Queries without a match are left out, as in the evaluation of
+    BEVPlace.
 
     Args:
         folder: folder with a folder for each sequence; it need not exist.

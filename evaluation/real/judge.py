@@ -1,13 +1,14 @@
 """Tests whether a classifier can tell real scans from simulated scans.
 
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
-features. Boosted trees then learn to tell the patches of the two sets apart; a
-place is never in both training and test data. A place consists of the scans
-less than 30 m from its first scan, even of several passes or drives, or of all
-scans in a folder without poses. The AUC of the classifier is 1 if it tells all
-patches apart, and 0.5 for guessing. As a control, the classifier tells the
-first half of the simulated places from the second half. All AUCs are means over
-random samples of patches; single draws differ by up to 0.04.
+features. Boosted trees are then trained to distinguish the patches of the two
+sets; a place is never in both training and test data. A place consists of the
+scans less than 30 m from its first scan, even of several passes or drives, or
+of all scans in a folder without poses. The AUC of the classifier is 1 if it
+classifies all patches correctly, and 0.5 for guessing. As a control, the
+classifier distinguishes the first half of the simulated places from the second
+half. All AUCs are means over random samples of patches; single samples differ
+by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If

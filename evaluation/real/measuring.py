@@ -3,10 +3,10 @@
 Each scan of a data set with poses is a query. The places among which it is
 searched are all other scans of the same model of LiDAR: from its data set, from
 other data sets and from simulated recordings. A place is a single scan; queries
-are turned and tilted as in the protocol `fair`. Each scan is also localised,
-from a random start, in a map of the scans around it. A classifier (see
-`evaluation.real.judge`) also tries to tell each data set from simulated scans
-of the same model of LiDAR.
+get a random yaw and tilt, as in the protocol `fair`. Each scan is also
+localised, from a random initial guess, in a map of the scans around it. In
+addition, a classifier is trained to distinguish each data set from simulated
+scans of the same model of LiDAR (see `evaluation.real.judge`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -96,8 +96,9 @@ def measure_real(
             function `localise`.
         settings: `METHOD.NAME=VALUE` each, for methods of place recognition.
         simulated: folder of simulated recordings. Their scans are added as
-            places, and a classifier tries to tell the real scans from them. The
-            folder can also hold sequences of images, for the classifier.
+            places, and a classifier tries to distinguish them from the real
+            scans. The folder can also contain sequences of images, for the
+            classifier.
         on_note: is called with each note for the user.
         queries: number of queries of each sequence of images, see
             `open_sequences`.
@@ -174,7 +175,8 @@ def _add_images(
     Args:
         engine: the engine.
         sequences: the sequences.
-        made: simulated drives, from whose images a classifier tells them.
+        made: simulated drives, from whose images the classifier tries to
+            distinguish the real images.
         choices: the methods.
     """
     if not sequences:
@@ -378,7 +380,7 @@ def judge_scans(
 ) -> dict[str, Any] | None:
     """Returns how well a classifier tells a data set from simulated scans.
 
-    Images are told from images that are made of the simulated scans.
+    Real images are compared with images that are made of the simulated scans.
 
     Args:
         reporter: reports notes.

@@ -50,8 +50,9 @@ class Shares(NamedTuple):
 
     Attributes:
         shown: share of points on surfaces that the scan shows.
-        hidden: share of points that the scan's sensor cannot see: the returns
-            in neighbouring directions are all nearer than the point.
+        hidden: share of occluded points, which the scan's sensor cannot see:
+            the returns in neighbouring directions are all nearer than the
+            point.
     """
 
     shown: float

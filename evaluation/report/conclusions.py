@@ -15,7 +15,12 @@ from typing import NamedTuple
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
-from evaluation.results.headlines import KEPT, listed, survival, told_apart
+from evaluation.results.headlines import (
+    KEPT,
+    by_significance,
+    listed,
+    survival,
+)
 from evaluation.results.summaries import Ranked, ranking
 from evaluation.results.table import (
     OWN,
@@ -109,7 +114,7 @@ def _headline(
     apart = Counter(
         name
         for of_pair in p_values
-        for name in told_apart(ranked[0].method, of_pair)[0]
+        for name in by_significance(ranked[0].method, of_pair)[0]
     )
     never = [f"{name} ({auc})" for name, auc in others if not apart[name]]
     partly = [
@@ -118,13 +123,15 @@ def _headline(
         if 0 < apart[name] < num_pairs
     ]
     if not never and not partly:
-        return f"{text}; it is told apart from all others on each pair."
+        return f"{text}; its lead over all others is significant on each pair."
     if not never:
-        names = listed(partly)
-        return f"{text}; it is on some pairs only told apart from {names}."
-    text += f"; it is not told apart from {listed(never)} on any pair"
+        return (
+            f"{text}; its lead over {listed(partly)} is significant on some"
+            " pairs only."
+        )
+    text += f"; its lead over {listed(never)} is significant on no pair"
     if partly:
-        text += f", and only on some from {listed(partly)}"
+        text += f", and over {listed(partly)} on some pairs only"
     return f"{text}."
 
 

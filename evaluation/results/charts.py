@@ -147,7 +147,7 @@ class _Chart:
     queries: QueryRows | None
 
     def tested(self, message: str, last: object) -> str:
-        """Adds to a message what tests tell apart at the last value."""
+        """Adds to a message which methods differ at the last value."""
         if self.metric != "auc":
             return message
         rows = [row for row in self.rows if row[self.keys["over"]] == last]
@@ -203,10 +203,10 @@ def draw(
         chart: description of the chart, as in an experiment's file.
         results: the table.
         width: width of the drawing [px].
-        alone: whether the drawing stands alone and therefore includes its
-            message and legend.
-        queries: the answers behind the table, from which the message says what
-            is told apart; None if they are unknown.
+        alone: whether the drawing is shown without a page, and therefore
+            includes its message and legend.
+        queries: the answers from which the table was made, for the message on
+            significant differences; None if they are unknown.
 
     Raises:
         InputError: the chart has an unknown kind or column, or selects no rows.
@@ -586,7 +586,9 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
     )
     doubtful = [title(one.method) for one in found if one.low <= 0 <= one.high]
     if doubtful:
-        message += f"; not told from 0 with {listed(doubtful)}"
+        message += (
+            f"; not significantly different from 0 with {listed(doubtful)}"
+        )
     return message, figure
 
 

@@ -106,9 +106,9 @@ def name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
 def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
     """Writes a figure as one file for each of several formats.
 
-    Equal figures give equal bytes. SVG and WebP files, which are for web pages,
-    end above the legend of the whole figure, which stands at its bottom: the
-    page writes it below the figure, in letters that can be read on a phone.
+    Equal figures give equal bytes. SVG and WebP files are for web pages, and do
+    not contain the legend at the bottom of the figure: the page itself writes
+    this legend, in letters that can be read on a phone.
 
     Args:
         figure: the figure.

@@ -1,7 +1,7 @@
 """Sentences on what a chart or a report shows, and on what it does not show.
 
-A method is *told apart* from another if the difference of their AUC has a
-corrected p-value below 0.05, see `evaluation.recognition.metrics`.
+Two methods differ significantly if the difference of their AUC has a corrected
+p-value below 0.05, see `evaluation.recognition.metrics`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -51,10 +51,10 @@ def from_least_to_greatest(
     return f"from {least} ({ends[0]}) to {greatest} ({ends[1]})"
 
 
-def told_apart(
+def by_significance(
     best: str, p_values: Mapping[tuple[str, str], float]
 ) -> tuple[list[str], list[str]]:
-    """Returns the methods that the best is told apart from, and the others.
+    """Returns methods that differ significantly from the best, and others.
 
     Args:
         best: label of the best method.
@@ -128,7 +128,7 @@ def _share(value: float) -> str:
 
 
 def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
-    """Returns from which methods that with the greatest AUC is told apart.
+    """Returns which methods differ significantly from the best, by AUC.
 
     Args:
         rows: rows of the metric `auc`.
@@ -157,12 +157,11 @@ def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     )
     best = max(labels, key=lambda n: sum(some[n][0] for some in common))
     p_values = {pair: p for pair, (_, p) in compared.items()}
-    apart, rest = told_apart(best, p_values)
-    text = f"the greatest AUC, of {title(best)}, is "
+    apart, rest = by_significance(best, p_values)
+    text = f"the greatest AUC, of {title(best)}, "
     if not rest:
-        return f"{text}told apart from all others"
+        return f"{text}differs significantly from all others"
+    text += "does not differ significantly from "
     if not apart and len(rest) > 2:
-        return f"{text}not told apart from any other"
-    if not apart:
-        return f"{text}not told apart from {listed(rest)}"
-    return f"{text}told apart from {listed(apart)}, not from {listed(rest)}"
+        return f"{text}any other"
+    return f"{text}{listed(rest)}"

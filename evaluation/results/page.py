@@ -261,9 +261,10 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
 
 
 def _told_factors(results: Results) -> list[str]:
-    """Returns the factors that tell apart the conditions of a task.
+    """Returns the factors in which the conditions of a task differ.
 
-    Settings of methods stand beside the names of the methods.
+    Settings of methods do not count, because they are shown with the names of
+    the methods.
     """
     if CAUSE in results.factors:
         # All other factors follow from the cause and its level.

@@ -2,7 +2,8 @@
 
 Every table and figure passes this check before it is written. A name is a
 metric of `results.csv`, the head of a column of a table, or the label of an
-axis; what a reader sees under it lies in the range that is listed here.
+axis. All values under a name must lie within the range that is listed here for
+this name.
 """
 
 from collections.abc import Iterable

@@ -37,8 +37,9 @@ def curves(x: np.ndarray, y: np.ndarray) -> Iterator[Curve]:
 
     Runs of fewer than five points, or with a single x, have no curve. A curve
     is a local linear regression, and its band is by bootstrap over the points
-    of the run. Both stay between the least and the greatest y of the run, since
-    what lies beyond was not measured, and may be no possible value at all.
+    of the run. Curve and band are limited to the range from the least to the
+    greatest y of the run, because values outside of this range were not
+    measured, and may be impossible.
 
     Args:
         x, y: (N,) coordinates of the points.

@@ -221,9 +221,9 @@ def excesses(queries: QueryRows) -> list[Summary]:
 
 
 def median_kept(shares: Iterable[float]) -> float:
-    """Returns what is kept over several pairs: the median of known shares.
+    """Returns the median of the retained shares of several pairs.
 
-    It is NaN if no share is known.
+    Unknown shares do not count. The result is NaN if no share is known.
     """
     known = [share for share in shares if not math.isnan(share)]
     return float(np.median(known)) if known else math.nan
@@ -472,11 +472,11 @@ def ranking(
     """Returns methods ranked by their means over conditions.
 
     Only conditions count that were measured with all methods. The intervals of
-    the means are t intervals with maps as independent units if there are
-    several, and conditions otherwise. They stay within the metric's range, and
-    are unknown for two or three units, which say next to nothing. The samples
-    are those of a bootstrap that draws these units, the same for all methods
-    and for all tables of the same maps; tables of other maps are drawn
+    the means are t intervals. Their independent units are maps if there are
+    several maps, and conditions otherwise. Intervals are limited to the
+    metric's range, and unknown for two or three units, which say next to
+    nothing. The bootstrap samples contain the same units for all methods and
+    for all tables of the same maps; tables of other maps are sampled
     independently. For a single condition, the intervals are those in the rows.
 
     Args:
@@ -535,12 +535,12 @@ def ranking(
 def worths(results: Results, metric: str) -> list[Summary]:
     """Returns what each change detector is worth that updates a map.
 
-    The worth is the detector's share of the way from a map that is never
-    updated to one that is updated by exact labels: 0 if the metric is as in the
-    former, 1 if it is as in the latter, and negative if the detector does harm.
-    It is the quotient of two sums of differences, over all conditions that were
-    measured with the detector, without updates and with exact ones. If exact
-    updates change nothing, there is no worth.
+    The worth is 0 if the metric is the same as in a map that is never updated,
+    1 if the metric is the same as in a map that is updated by exact labels, and
+    negative if the detector does harm. The worth is the quotient of two sums of
+    differences, over all conditions that were measured with the detector,
+    without updates and with exact updates. If exact updates change nothing,
+    there is no worth.
 
     Args:
         results: the table of results.

@@ -240,7 +240,7 @@ def _change(
     """Returns the share of two scans that is new or gone, and its main class.
 
     A point is new or gone if it lies on a structure that has no point in the
-    other scan, although nothing hides the point from the other sensor.
+    other scan, although nothing occludes the point from the other sensor.
     """
     changed: Counter[str] = Counter()
     total = 0

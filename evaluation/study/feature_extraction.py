@@ -169,7 +169,7 @@ class ExtractedFeatures:
         scans: scans of places and queries; None if they are not kept. If there
             is a map, this is a `KeptScans` with the recorded scans. Otherwise
             it is a list of arrays (N, 3) float32, in which queries are changed
-            as the protocol says: turned, tilted or without a sector.
+            as the protocol says: rotated, tilted or without a sector.
         drive: the drive with its map; None without a map.
         fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """

@@ -218,15 +218,16 @@ class Drive(abc.ABC):
 
     @property
     def session(self) -> str:
-        """Name of the drive without that of its LiDAR.
+        """Name of the drive, without the name of its LiDAR.
 
-        Without a scenario, it tells the map and the stage.
+        If the drive has no scenario, its map and stage are found from this
+        name.
         """
         return self.name
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """All files that are read, also when a scan or its labels are asked.
+        """All files from which the drive, its scans and its labels are read.
 
         Results of the drive are kept until one of these files changes. A drive
         that is not read from files has none.

@@ -198,8 +198,8 @@ class McapDrive(Drive):
     def distortion_note(self) -> str | None:
         """A note for the user if the scans contain motion distortion.
 
-        It is None if they do not, and for recordings of real LiDARs, which do
-        not state whether their scans are distorted.
+        The value is None if the scans contain none, and for recordings of real
+        LiDARs, which do not state whether their scans are distorted.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None
@@ -221,8 +221,8 @@ class McapDrive(Drive):
     def inputs(self) -> Any:
         """SHA-256 digests of the files that a simulated drive was made from.
 
-        They are the value of `inputs_sha256` in the attachment
-        `provenance.json`; None if that was not recorded.
+        The digests are the value of `inputs_sha256` in the attachment
+        `provenance.json`; None if the recording lacks this value.
         """
         found = self._json("provenance.json")
         return found.get("inputs_sha256") if isinstance(found, dict) else None
@@ -309,7 +309,7 @@ class McapDrive(Drive):
         """(M,) int64 time of each image of the first camera [ns].
 
         The times are the stamps of the images. Images that were recorded in
-        another order are sorted by them.
+        another order are sorted by their stamps.
         """
         return self._images[0]
 

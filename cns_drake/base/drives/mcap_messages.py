@@ -100,8 +100,8 @@ def read_cloud_header(data: bytes | memoryview) -> tuple[int, str]:
 def read_stamp(data: bytes | memoryview) -> int | None:
     """Returns the stamp of a message that begins with a header [ns].
 
-    It is None if the message is too short. For a message without a header, or
-    one that is compressed, the result means nothing.
+    The result is None if the message is too short. For a compressed message, or
+    a message without a header, the result is meaningless.
     """
     if len(data) < _ENCAPSULATION_BYTES + 8:
         return None

@@ -30,7 +30,7 @@ def check_topic_part(name: str) -> None:
 def check_sensor_name(
     name: str, taken: Collection[str] = (), own: str | None = None
 ) -> None:
-    """Checks the name of a sensor, which others must not have.
+    """Checks the name of a sensor, which no other sensor may have.
 
     Args:
         name: the name.

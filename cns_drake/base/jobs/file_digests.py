@@ -1,9 +1,10 @@
 """Digests of files, which are computed again only if a file has changed.
 
-A digest of the content, and not the time of the last change, identifies a file:
-a copy is the same, and a corrected file of the same size is another one. To
-read large files only once, the digests are kept in the cache folder of the
-user, each with what the file system says about its file.
+A file is identified by a digest of its content and not by its time of change: a
+copy counts as the same file, and a corrected file as another file, even if both
+have the same size. To read large files only once, the digests are stored in the
+user's cache folder, together with the size and the times that the file system
+states for each file.
 """
 
 from collections.abc import Sequence

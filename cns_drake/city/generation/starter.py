@@ -1,7 +1,7 @@
 """Writes first input files for a city whose roads already exist.
 
-A user who has drawn `roads.yaml` gets a plan with districts, two stages and two
-drives, as files to edit.
+A user who has written `roads.yaml` gets a plan with districts, two stages and
+two drives, as files to edit.
 """
 
 from collections import defaultdict
@@ -92,7 +92,7 @@ def start_city(
         rng = np.random.default_rng([seed, k])
         write(
             MapFolder(world).drive(stage).name,
-            f"A drive through stage {stage}, on a route drawn at random.",
+            f"A drive through stage {stage}, on a route sampled at random.",
             partial(_drive, network, stage, rng),
         )
     return written

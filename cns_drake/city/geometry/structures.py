@@ -164,7 +164,7 @@ class Structure:
 
     @property
     def kind_cell(self) -> str:
-        """The cell `kind` in a structure table; "" if the name says it."""
+        """The cell `kind` in a structure table; "" if the name states it."""
         return "" if self.kind == kind_in_name(self.name) else self.kind
 
     @property

@@ -289,9 +289,9 @@ def dress_buildings(
 ) -> DressedBuildings:
     """Returns the buildings of a city with windows, doors and shops.
 
-    A building looks the same in each stage and each import, since its random
-    draws depend on its name. Only walls near a drive get windows. Doors and
-    shops face streets.
+    A building looks the same in each stage and each import, because its random
+    numbers depend only on the seed and its name. Only walls near a drive get
+    windows. Doors and shops face streets.
 
     Args:
         structures: the structures of the city, of which the buildings get

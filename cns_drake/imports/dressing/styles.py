@@ -138,7 +138,7 @@ def make_style(
 ) -> Style:
     """Returns a style for a building: from its tags, otherwise random.
 
-    The number of random draws does not depend on the tags.
+    The number of random numbers that are used does not depend on the tags.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.

@@ -257,10 +257,10 @@ class Jobs:
         """Returns the source from which a job gets a drive's descriptors.
 
         If several pairs need the descriptors, this function adds a job that
-        writes them, and returns the files: first the file with the scans, then
-        one for each method. If only one pair needs them, the function returns
-        the source of the drive, and the job of this pair computes the
-        descriptors itself.
+        writes the descriptors, and returns the files: first the file with the
+        scans, then a file for each method. If only one pair needs the
+        descriptors, the function returns the source of the drive, and the job
+        of this pair computes the descriptors itself.
 
         Args:
             drive: the drive.

@@ -72,7 +72,7 @@ def test_the_ranking_comes_first(text):
     (_, first, *_), (_, second, *_) = rows
     assert (
         f"RING++ has the greatest mean AUC of 2 methods, {first} over one pair;"
-        f" it is not told apart from Scan Context++ ({second}) on any pair."
+        f" its lead over Scan Context++ ({second}) is significant on no pair."
     ) in section
     assert "<details" not in section
     # Its colour in all pictures.
@@ -92,11 +92,11 @@ def test_the_ranking_comes_first(text):
         (
             {"btc": [0.9, nan], "solid": [0.2, 0.9]},
             "BTC has the greatest mean AUC of 2 methods, 0.900 over one pair;"
-            " it is not told apart from SOLiD (0.200) on any pair.",
+            " its lead over SOLiD (0.200) is significant on no pair.",
         ),
         (
             {"btc": [0.9, 0.8], "solid": [0.2, 0.1]},
-            "2 pairs of drives; it is not told apart from SOLiD (0.150) on any",
+            "2 pairs of drives; its lead over SOLiD (0.150) is significant",
         ),
     ],
 )
@@ -138,30 +138,30 @@ def test_a_headline_is_true(aucs, words):
         # On each of two pairs: BTC and SOLiD, BTC and x, SOLiD and x.
         (
             ((0.01, 0.02, 0.9), (0.04, 0.049, 0.9)),
-            "it is told apart from all others on each pair.",
+            "its lead over all others is significant on each pair.",
         ),
         (
             ((0.11, 0.98, 0.42), (0.05, nan, 0.01)),
-            "it is not told apart from SOLiD (0.150) and x (0.100) on any"
-            " pair.",
+            "its lead over SOLiD (0.150) and x (0.100) is significant"
+            " on no pair.",
         ),
         (
             ((0.11, 0.01, 0.42), (0.05, 0.01, 0.01)),
-            "it is not told apart from SOLiD (0.150) on any pair.",
+            "its lead over SOLiD (0.150) is significant on no pair.",
         ),
         (
             ((0.11, 0.01, 0.42), (0.01, 0.06, 0.01)),
-            "it is on some pairs only told apart from SOLiD (1 of 2) and x (1"
-            " of 2).",
+            "its lead over SOLiD (1 of 2) and x (1 of 2) is significant"
+            " on some pairs only.",
         ),
         (
             ((0.11, 0.06, 0.42), (0.01, 0.06, 0.01)),
-            "it is not told apart from x (0.100) on any pair, and only on some"
-            " from SOLiD (1 of 2).",
+            "its lead over x (0.100) is significant on no pair, and"
+            " over SOLiD (1 of 2) on some pairs only.",
         ),
     ],
 )
-def test_a_headline_says_what_is_told_apart(p_values, words):
+def test_a_headline_says_which_methods_differ_significantly(p_values, words):
     aucs = {"btc": (0.9, 0.8), "solid": (0.2, 0.1), "x": (0.1, 0.1)}
     place = ("stages", "town", "a")
     rest = (1, {STAGE: OWN}, "place")
