@@ -347,8 +347,9 @@ class Sweep(NamedTuple):
 class VehicleSweep(LeafSystem):
     """A system that returns poses of a vehicle just after the current time.
 
-    A LiDAR keeps turning during a frame. Its output at a time needs poses at
-    later times, which the SceneGraph does not have.
+    A LiDAR needs these poses because it rotates during a frame: some beams of a
+    scan are cast later than the time of the scan, for which the SceneGraph has
+    poses.
 
     .. pydrake_system::
 

@@ -277,7 +277,7 @@ def rendered_intrinsics(camera: CameraInfo) -> np.ndarray:
 def make_camera_info(camera: CameraInfo, frame_id: str, stamp_ns: int) -> Any:
     """Returns a CameraInfo message of a pinhole camera without distortion.
 
-    Its K is that of `rendered_intrinsics`.
+    The matrix K of the message is the result of `rendered_intrinsics`.
 
     Args:
         camera: the camera, as Drake describes it.

@@ -148,7 +148,7 @@ class DriverConfig(Section):
             two such drives, the lateral offset has 1.4 times this standard
             deviation.
         wander_length: distance along the road after which the autocorrelation
-            of this lateral offset has fallen to 1/e [m].
+            of the lateral offset (`wander`) has fallen to 1/e [m].
         lane_changes: average number of changes to a neighbouring lane per
             kilometre [1/km], where there is such a lane. The car returns after
             15 to 270 m.

@@ -214,8 +214,9 @@ class Experiment(Section):
             drives, or is a list of other cases to combine. A list of values
             sets the levels of a case, the weakest first. Each case is measured
             by itself and compared with the case `none`, which changes nothing.
-        levels: numbers of the levels of the cases to measure; by default all. A
-            case with fewer levels is measured at its last level.
+        levels: which levels of each case to measure, as numbers from 1; by
+            default all. A case that lacks a level is measured at its last level
+            instead.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.

@@ -1,11 +1,11 @@
 """Trains the method `learned` on scans of randomly generated cities.
 
 In a batch, scans of one drive are queries for places of another drive through
-the same city. Queries and places are compared as the method does. The loss is
-the cross entropy between a softmax over all places of the batch and the weights
-of the right places. These weights grow with the exact overlap of two scans, or
-fall with their distance, so that the most similar place ranks first and less
-similar ones after it.
+the same city. The training compares queries and places in the same way as the
+method. The loss is the cross entropy between a softmax over all places of the
+batch and the target weights of the places. The target weight of a place grows
+with the exact overlap of its scan with the query's scan, or falls with its
+distance from the query, so that more similar places rank higher.
 """
 
 from collections.abc import Callable, Mapping, Sequence

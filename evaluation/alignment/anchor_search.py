@@ -421,8 +421,8 @@ def agreeing(
     """Returns which loops agree with given poses of the keyframes, (M,) bool.
 
     A loop measures the pose X_LK of the source's keyframe K in the target's
-    keyframe L. It agrees if this pose differs by less than 1 m and 2 degrees
-    from the one that follows from the given poses of K and L.
+    keyframe L. The loop agrees if this measured pose differs by less than 1 m
+    and 2 degrees from the pose that follows from the given poses of K and L.
 
     Args:
         loops: the M loops.

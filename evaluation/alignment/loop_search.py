@@ -38,8 +38,8 @@ class Loop:
         source: keyframe K of the source.
         target: keyframe L of the target.
         X_LK: (4, 4) pose of K in L.
-        covariance: (6, 6) covariance of a small motion of K in L: turn [rad],
-            move [m].
+        covariance: (6, 6) covariance of a small motion of K in L: rotation
+            [rad], translation [m].
     """
 
     source: int

@@ -85,8 +85,8 @@ class Registration:
             them may show much that was built or torn down in between.
         structure: the same share for upright points only, because flat ground
             fits nearly everywhere.
-        covariance: (6, 6) covariance of a small motion of S in T: turn [rad],
-            move [m].
+        covariance: (6, 6) covariance of a small motion of S in T: rotation
+            [rad], translation [m].
     """
 
     X_TS: np.ndarray

@@ -1,9 +1,9 @@
 """Places along a drive, and the clouds seen there.
 
-- Places d metres apart: frame i is a place when the length of the path so far
-  first reaches a multiple of d. The first frame is a place.
-- Points are limited to a range, 100 m in the paper. It is the greatest absolute
-  value of x, y and z in the frame of the sensor.
+- Places are d metres apart along the path: a frame is a place if it is the
+  first frame after a multiple of d. The first frame of a drive is a place.
+- Points are limited to a range, 100 m in the paper. The range of a point is the
+  greatest absolute value of its x, y and z in the frame of the sensor.
 """
 
 from __future__ import annotations
@@ -168,8 +168,8 @@ def gather(
             [m].
         fields: names of further fields of the points, besides x, y and z.
         num_before: how many of the scans come before the frame.
-        sensor: turn and occluded sector that are applied to the sensor; None
-            for the sensor as recorded.
+        sensor: rotation and occluded sector that are applied to the sensor;
+            None for the sensor as recorded.
 
     Returns:
         (N, 3) float64 points in the sensor's frame at that frame. If fields are

@@ -63,7 +63,8 @@ def find_columns(
 
     Returns:
         For each used column, its place in the table. None if the header names
-        too few of them; they are then where `names` has them.
+        too few of the used columns; the columns are then in the order of
+        `names`.
 
     Raises:
         ValueError: the header names a column twice, or names too few columns,

@@ -270,11 +270,13 @@ class Trajectory:
             stamps_ns: (M,) int64 times of the wanted poses [ns].
             longest_gap_ns: greatest time between two poses that are
                 interpolated [ns].
-            wanted_for: what has these times, for the error message.
+            wanted_for: what the poses are for, such as `the scan`; named in
+                error messages.
 
         Returns:
-            (K, 4, 4) poses at the times between the first and the last pose of
-            the table; (M,) bool, which of the given times these are.
+            (K, 4, 4) poses at those K of the given times that lie between the
+            first and the last pose of the table; (M,) bool, which of the given
+            times these are.
 
         Raises:
             InputError: the table spans none of the times, or a time lies in a

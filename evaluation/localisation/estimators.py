@@ -297,9 +297,10 @@ class Fit:
             at the nearest points of the map, without points more than 1 m from
             the map [m]; NaN if no point is left.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
-            of W: turn [rad], move [m]. It is the inverse Hessian of the
-            point-to-plane error, corrected for the noise of the normals, times
-            the square of the residual, or of 0.01 m if the residual is less.
+            of W: rotation [rad], translation [m]. It is the inverse Hessian of
+            the point-to-plane error, corrected for the noise of the normals,
+            times the square of the residual, or of 0.01 m if the residual is
+            less.
     """
 
     share: float

@@ -140,7 +140,7 @@ class Starts:
 
         Returns:
             (3,) offset of the position in W, in a random direction [m]; (3,)
-            turn about a random axis, as a rotation vector in S [rad]. Both
+            rotation about a random axis, as a rotation vector in S [rad]. Both
             depend only on the seed and the frame.
         """
         rng = np.random.default_rng([self.seed, frame])

@@ -219,9 +219,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     ) -> list[np.ndarray | None]:
         """Returns the poses X_PQ (4, 4) of a query's LiDAR at several places.
 
-        X_PQ is relative to the LiDAR at the place. It consists of a yaw and a
-        horizontal translation. It is None if the scan of the query or of the
-        place has no filled cell.
+        X_PQ is relative to the LiDAR at the place, and consists of a yaw and a
+        horizontal translation. The result is None for a place if its scan or
+        the scan of the query has no filled cell.
         """
         scans = [database.places[place] for place in places]
         poses: list[np.ndarray | None] = [None] * len(scans)

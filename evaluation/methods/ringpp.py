@@ -196,8 +196,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """Returns a query's pose X_PQ relative to each of several places.
 
         X_PQ (4, 4) is the pose of the query's LiDAR frame Q in the LiDAR frame
-        P of a place. It consists of a yaw and a horizontal translation. It is
-        None if the map of the query or of the place is empty.
+        P of a place. X_PQ consists of a yaw and a horizontal translation. The
+        result is None for a place if its map or the map of the query is empty.
         """
         if len(query.filled) == 0:
             return [None] * len(places)

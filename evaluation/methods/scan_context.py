@@ -72,8 +72,8 @@ class ScanContextConfig(MethodConfig):
             5 and 2.
         cart_range: half the length and half the width of the Cartesian context
             [m]; [T] 100 and 40.
-        lateral_shift: sideways shift of the copies of `augmented-polar` [m];
-            [T] 2.
+        lateral_shift: distance by which the variant `augmented-polar` shifts
+            the copies of a place to each side [m]; [T] 2.
         candidates: number of contexts that the search in the KD-tree returns;
             [E] 50. If each place has n contexts, the search returns n times
             this number.

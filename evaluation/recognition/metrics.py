@@ -422,11 +422,14 @@ def compared_by_auc(
     """Returns the difference of the mean AUC between any two methods.
 
     The mean is over one or more sets of queries. All queries count, with or
-    without a match. The p-value comes from a t test. For the sets of one drive,
-    the variance of their sum is the variance over bootstrap samples, times n /
-    (n - 1) for n blocks. These samples contain the same blocks of the route for
-    both methods and for all sets of the drive. Drives are independent, so their
-    variances add up, and so do their n - 1 degrees of freedom.
+    without a match.
+
+    The p-value comes from a t test. Several sets can have the same query drive.
+    The variance of the sum over the sets of one drive comes from a bootstrap,
+    whose samples contain the same blocks of the route for both methods and for
+    all sets of the drive. With n blocks, this variance is multiplied by n / (n
+    - 1). Different drives are independent: their variances add up, and so do
+    their degrees of freedom, n - 1 for each drive.
 
     Args:
         answers: method -> its outcomes on each set of queries. The queries must

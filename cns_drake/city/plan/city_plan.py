@@ -168,7 +168,7 @@ class ScatterPlan(_Model):
     """Plants or objects at random places on a district's open ground.
 
     Attributes:
-        objects: weights of the objects in the random choice, by name.
+        objects: weight of each object, by name, in the random choice.
         spacing: smallest distance between two objects [m].
         fill: share of the possible places that get an object.
         within: corners of an area [m]. The objects stand only there.
@@ -192,7 +192,7 @@ class LinePlan(_Model):
     """Objects along a line, such as an avenue of trees, a fence or benches.
 
     Attributes:
-        objects: weights of the objects in the random choice, by name.
+        objects: weight of each object, by name, in the random choice.
         points: points of the line [m]. The objects face its right side.
         spacing: smallest and largest distance between two objects [m]. Without
             `spacing`, each straight part of the line becomes one object of the
@@ -322,7 +322,7 @@ class CityPlan(_Model):
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
         medians: objects on the medians of roads; only the fields `trees` and
-            `tree_spacing` are used. By default as `street`.
+            `tree_spacing` are used. By default the same objects as in `street`.
         districts: districts of the city. If two overlap, the first in the list
             gets the ground.
     """

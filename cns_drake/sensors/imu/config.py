@@ -28,10 +28,10 @@ class ImuSection(Mount):
     Attributes:
         xyz: position in `base_link` [m].
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. It is
-            at most 1000 and at least the scan rate, and the time between two
-            samples must be a whole number of nanoseconds. By default the rate
-            in the file `kalibr`, or else one sample per scan.
+        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. The
+            rate must be at most 1000 and at least the scan rate, and the time
+            between two samples must be a whole number of nanoseconds. By
+            default the rate in the file `kalibr`, or else one sample per scan.
         kalibr: file in Kalibr's format with the four noise densities of the
             IMU. By default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias that

@@ -709,9 +709,9 @@ class NoddingPattern(_TimedPattern):
     """A pattern of lasers (lines) that rotate and slowly nod up and down.
 
     Each line nods within a band of elevations of its own; the bands are of
-    equal height and fill the field of view. The lines turn about z 100 times a
-    second and nod 6.18 times a second. The ratio of these rates is not a simple
-    fraction, so each frame fills gaps of the frames before.
+    equal height and fill the field of view. The lines rotate about z 100 times
+    a second and nod 6.18 times a second. The ratio of these rates is not a
+    simple fraction, so each frame fills gaps of the frames before.
 
     Attributes:
         elevations_deg: lowest and highest elevation; line 0 has the highest

@@ -97,7 +97,8 @@ def make_beam_pattern(
     """Returns the beam pattern of a preset.
 
     Args:
-        preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
+        preset: a key of `LIDAR_PRESETS`, whose values name the data sheets
+            (field `source`).
         period: duration of a revolution [s]; by default that of the data sheet.
         num_columns: columns in a revolution; by default those of the data
             sheet. If the lasers of a unit fire at a fixed rate, the period
