@@ -511,7 +511,7 @@ class AgeingCity:
         self._empty(lot)
         lot.coming, lot.old = coming, old
         lot.finished = self.year + 1 + int(rng.uniform() < _TWO_YEARS)
-        for one in plots.site(plot, f"site_{ending}", rng):
+        for one in plots.building_site_on(plot, f"site_{ending}", rng):
             fences = [p for p in lot.parts if self._class(p) == "fence"]
             if not self.near(one.footprint_W, fences):
                 self._put(one, event="site")

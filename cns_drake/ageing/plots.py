@@ -234,7 +234,9 @@ def building_plot(building: Structure) -> Plot:
     return Plot(area, building.xyz[:2], building.yaw, building.xyz[2])
 
 
-def site(plot: Plot, name: str, rng: np.random.Generator) -> list[Structure]:
+def building_site_on(
+    plot: Plot, name: str, rng: np.random.Generator
+) -> list[Structure]:
     """Returns the structures of a building site: fences, machines and so on."""
     inner = plot.inside(plot.area.buffer(-0.4))
     lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))

@@ -171,7 +171,7 @@ def ground_of(
     return guess_ground(np.concatenate(feet), corners)
 
 
-def bottom_of(
+def ground_structures(
     structures: Sequence[Imported], ground: Ground
 ) -> list[Structure]:
     """Returns the guessed ground of a city, as a list of one structure.

@@ -18,7 +18,7 @@ from cns_drake.imports.drives import search
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.ground import bottom_of, ground_of
+from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.imports.options import ImportOptions, ImportReport
@@ -109,7 +109,9 @@ def import_city(
             city.faults.add(kind, source.name)
         if lanes is not None:
             (draft / LANES_NAME).write_text(lanes, "utf-8")
-        bottom = dressing.bottom if dressing else bottom_of(bare, ground)
+        bottom = (
+            dressing.bottom if dressing else ground_structures(bare, ground)
+        )
         sizes = map_files.write_world(draft, source, staged, bottom, dressing)
         facts = map_files.city_facts(
             city, options, list(staged.standing), changes, dressing

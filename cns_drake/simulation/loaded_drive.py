@@ -219,7 +219,7 @@ def plan_scenario_traffic(
     _check_room(wanted, where, graph, walkways)
     if wanted.walkers:
         world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
-        things = _things(world)
+        things = _sidewalk_obstacles(world)
         walkways = lane_graph.kept_clear(walkways, things)
         graph, walkways = lane_graph.with_unmarked_crossings(
             graph, walkways, things
@@ -249,7 +249,7 @@ def plan_scenario_traffic(
     return plan
 
 
-def _things(world: World) -> list[BaseGeometry]:
+def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
     """Returns footprints of objects that can stand on sidewalks [m].
 
     Buildings are left out, because walkways lead along them.

@@ -133,12 +133,12 @@ class UpkeptMap:
                 [self._is_added[stays], is_new[is_free]]
             )
             X_WS = np.concatenate([self._map.X_WS, session.X_WS])
-        self._take_scans(session)
+        self._move_scans(session)
         nothing = np.zeros(len(points), np.uint16)
         self._map = Session(self._folder, points, nothing, nothing, X_WS)
         self._number += 1
 
-    def _take_scans(self, session: Session) -> None:
+    def _move_scans(self, session: Session) -> None:
         scans = self._folder / "Scans"
         scans.mkdir(parents=True, exist_ok=True)
         first = 0 if self._map is None else len(self._map.X_WS)

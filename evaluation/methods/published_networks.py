@@ -85,7 +85,7 @@ def prepare(points: np.ndarray) -> np.ndarray:
         ),
     )
     chosen = thin(points, _LEAST_VOXEL + _VOXEL_STEP * size)
-    chosen = np.concatenate([chosen, _drawn(points, chosen, rng)])
+    chosen = np.concatenate([chosen, _draw_missing(points, chosen, rng)])
     centre = chosen.mean(axis=0)
     extent = np.linalg.norm(chosen - centre, axis=1).mean()
     if extent < _LEAST_EXTENT:
@@ -96,7 +96,7 @@ def prepare(points: np.ndarray) -> np.ndarray:
     )
     # Chosen points are means, of which a voxel may have no point within.
     source = points if len(points) else chosen
-    chosen = np.concatenate([chosen, _drawn(source, chosen, rng)])
+    chosen = np.concatenate([chosen, _draw_missing(source, chosen, rng)])
     return (chosen * [-1.0, 1.0, 1.0]).astype(np.float32)
 
 
@@ -121,7 +121,7 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     ]
 
 
-def _drawn(
+def _draw_missing(
     points: np.ndarray, chosen: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
     """Returns random points, as many as `chosen` lacks to be complete."""

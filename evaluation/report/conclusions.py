@@ -55,10 +55,10 @@ def ranked_methods(
     for one in differences:
         key = one.result.method, one.other.method
         of_pair.setdefault(one.result.pair, {})[key] = one.p_value
-    return ranked, _headline(ranked, num_pairs, of_pair.values())
+    return ranked, _ranking_sentence(ranked, num_pairs, of_pair.values())
 
 
-def beside(results: Results) -> dict[str, dict[str, Ranked]]:
+def further_columns(results: Results) -> dict[str, dict[str, Ranked]]:
     """Returns further columns of the ranking: column -> method -> mean.
 
     The columns are shares of the queries with a match: R@1; near misses, which
@@ -89,7 +89,7 @@ def beside(results: Results) -> dict[str, dict[str, Ranked]]:
     }
 
 
-def _headline(
+def _ranking_sentence(
     ranked: Sequence[Ranked],
     num_pairs: int,
     p_values: Iterable[Mapping[tuple[str, str], float]],

@@ -385,7 +385,7 @@ def _content(
         "report": report,
         "tables": tables,
         "ranked": ranked,
-        "beside": conclusions.beside(report.results),
+        "beside": conclusions.further_columns(report.results),
         "styles": styles(in_table_order(one.method for one in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(

@@ -191,7 +191,7 @@ class DaskWorkers:
             pure=False,
         )
         self._futures[name] = future
-        future.add_done_callback(lambda future: self._end(name, future))
+        future.add_done_callback(lambda future: self._report_end(name, future))
 
     def stop(self) -> None:
         futures = list(self._futures.values())
@@ -202,7 +202,7 @@ class DaskWorkers:
     def _address(self) -> str:
         return self._client.scheduler.address
 
-    def _end(self, name: str, future: Future) -> None:
+    def _report_end(self, name: str, future: Future) -> None:
         if self._futures.pop(name, None) is None:
             return
         error: Exception | None = None

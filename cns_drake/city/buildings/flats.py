@@ -201,7 +201,9 @@ class WalkUp(Building):
         self.ledge = self.pick((0.0, 0.08))
         self.hood = self.pick((0.0, 0.08))
         self.cornice = self.uniform(0.15, 0.45, 2)
-        self.roof_items = self.some_of("stair_house vents tank skylight", 1, 5)
+        self.roof_items = self.draw_roof_items(
+            "stair_house vents tank skylight", 1, 5
+        )
 
     def build(self) -> None:
         """Adds all parts of the walk-up flats.

@@ -216,7 +216,9 @@ class SportsHall(Building):
         )
         # Whether the gables are glazed.
         self.glazed = self.chance(0.6)
-        self.roof_items = self.some_of("air_handler vents ac_unit", 1, 4)
+        self.roof_items = self.draw_roof_items(
+            "air_handler vents ac_unit", 1, 4
+        )
 
     def build(self) -> None:
         """Adds all parts of the sports hall, with the entrance in front.

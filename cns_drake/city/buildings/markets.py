@@ -38,7 +38,9 @@ class ShopStrip(Building):
         self.canopy_reach = self.uniform(0.9, 1.3, 2)
         # Difference between parapets.
         self.steps = self.uniform(0.3, 0.6, 2)
-        self.roof_items = self.some_of("ac_unit ac_unit vents skylight", 1, 5)
+        self.roof_items = self.draw_roof_items(
+            "ac_unit ac_unit vents skylight", 1, 5
+        )
 
     def build(self) -> None:
         """Adds all parts of the shops, side by side along the front.
@@ -265,7 +267,7 @@ class Supermarket(Building):
         self.dock_depth = 4.5 if site.width > 32.0 and self.chance(0.8) else 0.0
         # Roofs for trolleys, in front.
         self.shelters = self.whole(0, 3)
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "air_handler air_handler cooling_tower skylight skylight skylight "
             "ac_unit vents",
             4,

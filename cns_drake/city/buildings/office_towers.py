@@ -45,7 +45,7 @@ class BandedTower(Building):
         self.recess = self.uniform(0.2, 0.4, 2)
         # Distance between upright fins; 0 for none.
         self.fins = self.pick((0.0, 5.0, 7.0))
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "lift_house cooling_tower air_handler ac_unit mast", 2, 6
         )
 
@@ -210,7 +210,7 @@ class GridTower(Building):
         self.waist = self.uniform(0.45, 0.65) if self.height > 55.0 else 0.0
         # Height of the screen around the roof.
         self.crown = self.uniform(2.4, 4.5, 2)
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "lift_house cooling_tower air_handler cooling_tower mast ac_unit",
             3,
             7,

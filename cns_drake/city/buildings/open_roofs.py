@@ -47,7 +47,7 @@ class GasStation(Building):
         self.wash = site.width > 26.0 and self.chance(0.7)
         # Whether the car wash and the sign are on the left.
         self.mirrored = self.chance(0.5)
-        self.roof_items = self.some_of("ac_unit vents ac_unit", 1, 4)
+        self.roof_items = self.draw_roof_items("ac_unit vents ac_unit", 1, 4)
 
     def build(self) -> None:
         """Adds all parts of the gas station: a shop behind a canopy with pumps.

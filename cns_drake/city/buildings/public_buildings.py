@@ -55,7 +55,7 @@ class School(Building):
         self.mullions = self.whole(1, 3)
         # Width of the glazed hall.
         self.entrance = self.uniform(4.5, 6.5, 1)
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "air_handler vents skylight skylight vents", 2, 6
         )
 

@@ -93,7 +93,7 @@ def _add_unit(
     Ground in front of the house stays free for the stoop. The names of its own
     visuals start with `part`.
     """
-    wing, storeys = _unit_box(p, area, blind)
+    wing, storeys = _wing_and_storeys(p, area, blind)
     openings = Openings(p, wing)
     step = (wing.wall_top - 0.25 - p.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
@@ -118,7 +118,7 @@ def _add_unit(
     return wing
 
 
-def _unit_box(
+def _wing_and_storeys(
     p: _HouseInARow, area: massing.Area, blind: frozenset[int]
 ) -> tuple[Wing, int]:
     """Returns the wing of a house, and its storeys above `p.floor`."""
@@ -418,7 +418,7 @@ class ShopHouse(_HouseInARow):
         self.oriels = self.whole(0, 3)
         # How far the band above the shops sticks out.
         self.course = self.uniform(0.08, 0.2, 2)
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "stair_house vents ac_unit skylight", 1, 5
         )
 
@@ -430,7 +430,7 @@ class ShopHouse(_HouseInARow):
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         area = (left, y0 + self.stoop, right, y1 - 0.35)
-        wing, storeys = _unit_box(self, area, blind)
+        wing, storeys = _wing_and_storeys(self, area, blind)
         openings = Openings(self, wing)
         ground = self.floor
         room = wing.wall_top - 0.25 - ground

@@ -164,7 +164,9 @@ class BalconyFlats(Building):
         self.rail = self.uniform(0.9, 1.1, 2)
         # `slit` (a strip of glass) or `tower` (stands out in front).
         self.stair = self.pick(("slit", "tower"))
-        self.roof_items = self.some_of("stair_house tank mast vents dish", 1, 6)
+        self.roof_items = self.draw_roof_items(
+            "stair_house tank mast vents dish", 1, 6
+        )
 
     def build(self) -> None:
         """Adds all parts of the slab block, which lies along the front.
@@ -384,7 +386,7 @@ class GalleryFlats(Building):
         # Part of the galleries' bays with a screen.
         self.panels = self.uniform(0.15, 0.5)
         self.ground = self.uniform(3.0, 3.6, 2)
-        self.roof_items = self.some_of("vents tank mast dish", 2, 5)
+        self.roof_items = self.draw_roof_items("vents tank mast dish", 2, 5)
 
     def build(self) -> None:
         """Adds all parts of the gallery block, whose longer sides lie along x.

@@ -330,7 +330,7 @@ class Office(Building):
         self.penthouse_inset = self.uniform(2.2, 4.0, 1)
         self.parapet = self.uniform(0.6, 1.2, 2)
         self.awnings = self.uniform(0.0, 0.7)
-        self.roof_items = self.some_of(
+        self.roof_items = self.draw_roof_items(
             "air_handler lift_house ac_unit ac_unit vents dish", 3, 7
         )
 
@@ -438,7 +438,9 @@ class CornerStore(Building):
         self.cornice = self.uniform(0.15, 0.4, 2)
         # Part of the shop windows with an awning.
         self.awnings = self.uniform(0.2, 0.9)
-        self.roof_items = self.some_of("stair_house ac_unit vents", 1, 4)
+        self.roof_items = self.draw_roof_items(
+            "stair_house ac_unit vents", 1, 4
+        )
 
     def build(self) -> None:
         """Adds all parts of the corner store.

@@ -215,12 +215,13 @@ class Assembly(Dice):
     _colours: dict[str, Finish] = field(default_factory=dict)
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
 
-    def some_of(self, words: str, low: int, high: int) -> list[str]:
-        """Returns the first words of a text, a random number of them.
+    def draw_roof_items(self, kinds: str, low: int, high: int) -> list[str]:
+        """Returns the kinds of a random number of objects on the roof.
 
-        The number of words is at least `low` and less than `high`.
+        They are the first of `kinds`, which spaces separate. Their number is at
+        least `low` and less than `high`.
         """
-        return words.split()[: self.whole(low, high)]
+        return kinds.split()[: self.whole(low, high)]
 
     def add(
         self,

@@ -44,7 +44,7 @@ from cns_drake.imports.foreign_city import (
     random_generator,
     to_mesh,
 )
-from cns_drake.imports.ground import Ground, bottom_of
+from cns_drake.imports.ground import Ground, ground_structures
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.labels import MAX_INSTANCE
 
@@ -517,7 +517,7 @@ def dress_city(
     ]
     if drives:
         added += grounds.lane_marks(streets, drives)
-    bottom = bottom_of(kept, ground)
+    bottom = ground_structures(kept, ground)
     everything = [*kept, *added]
     things = dress_streets(
         everything, city.things, streets, drives, ground, bottom, seed

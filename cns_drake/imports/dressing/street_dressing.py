@@ -305,7 +305,12 @@ class StreetRoom:
         self._names.add(name)
         structure = replace(structure, name=name, xyz=(x, y, z))
         self.found.structures.append(
-            Imported(structure, title_of(kind), None, _footing(footprint, z))
+            Imported(
+                structure,
+                title_of(kind),
+                None,
+                _bounding_triangles(footprint, z),
+            )
         )
         if kind == "lamp_post":
             self.lamps.append((x, y))
@@ -323,7 +328,7 @@ def title_of(kind: str) -> str:
     return kind.replace("_", " ").capitalize()
 
 
-def _footing(footprint: BaseGeometry, z: float) -> np.ndarray:
+def _bounding_triangles(footprint: BaseGeometry, z: float) -> np.ndarray:
     """Returns the bounding box of a footprint as triangles (2, 3, 3) [m]."""
     x0, y0, x1, y1 = footprint.bounds
     a, b, c, d = ((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))

@@ -23,7 +23,7 @@ from cns_drake.imports.dressing.grounds import (
 )
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.ground import bottom_of, ground_of
+from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.openstreetmap.city import import_openstreetmap, object_of
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.staged_city import stage_city
@@ -63,7 +63,7 @@ def dressed(city, seed=0):
         city.streets,
         [drive_of(city)],
         ground,
-        bottom_of(city.structures, ground),
+        ground_structures(city.structures, ground),
         seed,
     )
 
@@ -138,7 +138,7 @@ def test_things_stand_on_the_ground_below_them(tmp_path):
         osm.node(x + 6, -4.5, amenity="waste_basket")
     city = read(osm, tmp_path)
     ground = [one.structure for one in city.structures if one.is_ground]
-    ground += bottom_of(city.structures, ground_of(city.structures))
+    ground += ground_structures(city.structures, ground_of(city.structures))
     walks = [o.structure for o in city.structures if o.kind == "Sidewalk"]
     check_things_stand_on_the_ground(
         [
@@ -279,7 +279,7 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
     monkeypatch.setattr(dressed_city, "MAX_INSTANCE", len(result.city.kept))
     with pytest.raises(InputError, match="more than instance ids"):
         dress_city(staged, again, [drive_of(again)], ground, 0)
-    (bottom,) = bottom_of(staged.kept, ground)
+    (bottom,) = ground_structures(staged.kept, ground)
     (seen,) = result.bottom
     # Four houses of 500 m^2 in 180 m by 44 m.
     assert seen.model.parts[0].rgb == paved(bottom).model.parts[0].rgb

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
-from evaluation.report.conclusions import beside, ranked_methods
+from evaluation.report.conclusions import further_columns, ranked_methods
 from evaluation.report.page import route_picture, write_page
 from evaluation.report.page_data import browser_data
 from evaluation.report.result_tables import (
@@ -220,7 +220,7 @@ def test_answers_that_are_only_too_far_stand_beside_the_ranking():
     ]
     means = {
         name: {method: one.value for method, one in found.items()}
-        for name, found in beside(Results.of(rows)).items()
+        for name, found in further_columns(Results.of(rows)).items()
     }
     assert means == {
         "R@1": {"btc": pytest.approx(0.6)},
