@@ -4,6 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cns_drake.city.buildings.house_heights import (
+    ROOF_M,
+    STOREY_M,
+    storeys_for,
+    wall_top_for,
+)
 from cns_drake.city.facades import (
     Band,
     Building,
@@ -14,52 +20,12 @@ from cns_drake.city.facades import (
     bays,
     details,
     massing,
-    wings,
+    wing_roofs,
+    wing_walls,
 )
 
-STOREY_M = 2.65
-ROOF_M = 0.2
 # Windows of the sides are further apart than those of the front [m].
 _SIDE_PITCH_M = 3.8
-
-
-def storeys_for(
-    height: float, floor: float, span: float, pitch_deg: float
-) -> int:
-    """Returns how many storeys (1 to 4) suit a house with a pitched roof.
-
-    The roof fills the height between the topmost storey and the ridge. The
-    number of storeys makes the pitch of this roof as close to `pitch_deg` as
-    possible.
-
-    Args:
-        height: height of the ridge [m].
-        floor: height of the ground floor [m].
-        span: width of the roof across the ridge [m].
-        pitch_deg: wanted pitch of the roof [deg].
-    """
-    wanted = wings.ridge_rise(span, pitch_deg)
-    room = height - ROOF_M - floor - 0.15
-    counts = [n for n in (1, 2, 3, 4) if room - n * STOREY_M > 0.1 * span]
-    return min(counts or [1], key=lambda n: abs(room - n * STOREY_M - wanted))
-
-
-def wall_top_for(
-    height: float, floor: float, span: float, storeys: int
-) -> float:
-    """Returns the height of the top of the walls of a house [m].
-
-    The walls are as high as the storeys need, but lower if the roof would
-    otherwise be too low.
-
-    Args:
-        height: height of the ridge [m].
-        floor: height of the ground floor [m].
-        span: width of the roof across the ridge [m].
-        storeys: number of storeys, as from `storeys_for`.
-    """
-    wanted = floor + storeys * STOREY_M + 0.15
-    return min(wanted, height - ROOF_M - 0.08 * span)
 
 
 class _FamilyHouse(Building):
@@ -94,8 +60,8 @@ def _close_box(p: _FamilyHouse, wing: Wing, openings: Openings) -> None:
     openings.add_casings((0,), p.casing)
     bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
     low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, wings.GLASS_M)
-    openings.enclose((wings.GLASS_M,), bands, attic=attic)
+    attic = wing_roofs.attic_window(0.9, low, low + 1.0, wing_walls.GLASS_M)
+    openings.enclose((wing_walls.GLASS_M,), bands, attic=attic)
 
 
 def _garage_wing(
@@ -119,8 +85,8 @@ def _add_garage(p: _FamilyHouse, garage: Wing) -> None:
     openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
     openings.add_garage_door(0, length / 2, min(length - 0.7, 4.9))
-    openings.row((1, 3), 1.0, 3.4, [wings.sash(0.9, 0.0, 1.1, 2.0)])
-    openings.enclose((wings.GLASS_M,))
+    openings.row((1, 3), 1.0, 3.4, [wing_walls.sash(0.9, 0.0, 1.1, 2.0)])
+    openings.enclose((wing_walls.GLASS_M,))
 
 
 # Kept free around the walls, for eaves and chimneys [m].
@@ -241,7 +207,7 @@ def _add_main(p: DetachedHouse) -> None:
     _add_porch(p, (a, b))
     _close_box(p, p.main, openings)
     if p.roof in ("gable", "gambrel"):
-        wings.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
+        wing_roofs.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
 
 
 def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
@@ -403,7 +369,7 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     door = a + 0.3 * (b - a)
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
-        pane = wings.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
+        pane = wing_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.put(0, x, p.picture + 0.7, pane)
     openings.add_door(0, door, p.floor, lights=0.3)
     _close_box(p, main, openings)

@@ -4,8 +4,11 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.buildings import family_houses
-from cns_drake.city.buildings.family_houses import ROOF_M
+from cns_drake.city.buildings.house_heights import (
+    ROOF_M,
+    storeys_for,
+    wall_top_for,
+)
 from cns_drake.city.facades import (
     Band,
     Building,
@@ -22,7 +25,8 @@ from cns_drake.city.facades import (
     massing,
     roofs,
     tiers,
-    wings,
+    wing_roofs,
+    wing_walls,
 )
 from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
@@ -383,13 +387,9 @@ class GardenFlats(Building):
         bounds = np.linspace(left, right, count + 1)
         front = y0 + self.veranda_reach + 0.4
         deep = min(y1 - _MARGIN - front - self.stagger, 13.0)
-        storeys = family_houses.storeys_for(
-            self.height, _FLOOR, deep, self.pitch_deg
-        )
+        storeys = storeys_for(self.height, _FLOOR, deep, self.pitch_deg)
         storeys = max(2, storeys)
-        wall_top = family_houses.wall_top_for(
-            self.height, _FLOOR, deep, storeys
-        )
+        wall_top = wall_top_for(self.height, _FLOOR, deep, storeys)
         boxes = []
         for k in range(count):
             y = front + self.stagger * (k % 2)
@@ -419,7 +419,7 @@ def _add_house(
         )  # fmt: skip
     wall = wing.wall(0)
     middle = wall.length / 2
-    glass = wings.GLASS_M
+    glass = wing_walls.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
@@ -433,7 +433,7 @@ def _add_house(
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
     low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, glass, 2)
+    attic = wing_roofs.attic_window(0.9, low, low + 1.0, glass, 2)
     openings.enclose((glass,), bands, attic=attic)
     if not wing.roof.along_y:
         x, y = wing.x0 + 0.3 * wall.length, wing.center[1]

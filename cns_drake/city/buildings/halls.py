@@ -16,7 +16,7 @@ from cns_drake.city.facades import (
     massing,
     roofs,
     walls,
-    wings,
+    wing_roofs,
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -92,7 +92,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
         for edge in (0,) if wing.roof.along_y else (3, 0):
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
-    attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
+    attic = wing_roofs.attic_window(1.0, low, low + 1.3, _RECESS)
     openings.enclose((_RECESS,), (walls.Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)

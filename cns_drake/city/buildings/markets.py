@@ -14,7 +14,7 @@ from cns_drake.city.facades import (
     equip_roof,
     massing,
     roofs,
-    wings,
+    wing_walls,
 )
 
 # Kept free in front for canopies [m].
@@ -93,9 +93,9 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     openings.add_shops(0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
-    back = [bays.gate(2.0, 2.2, 0.2), wings.sash(1.0, 0.0, 1.6, 2.3)]
+    back = [bays.gate(2.0, 2.2, 0.2), wing_walls.sash(1.0, 0.0, 1.6, 2.3)]
     openings.row((2,), 0.5, 3.6, back, 0.7)
-    glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
+    glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
     openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
         z = p.ground - 0.95

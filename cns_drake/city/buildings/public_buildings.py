@@ -15,7 +15,7 @@ from cns_drake.city.facades import (
     massing,
     roofs,
     tiers,
-    wings,
+    wing_roofs,
 )
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -268,7 +268,7 @@ def _nave(p: Chapel, width: float, length: float) -> Wing:
     if p.belfry == "side":
         x = _CHAPEL_MARGIN if p.mirrored else width - _CHAPEL_MARGIN - wide
     ahead = 0.6 * p.tower + _CHAPEL_MARGIN if p.belfry == "front" else 2.4
-    rise = min(wings.ridge_rise(wide, p.pitch_deg), 0.42 * p.height)
+    rise = min(wing_roofs.ridge_rise(wide, p.pitch_deg), 0.42 * p.height)
     share = 0.8 if p.belfry == "cote" else 0.62
     top = min(share * p.height, rise + 7.5)
     wall_top = max(top - rise - _THICK, 0.35 * top)
@@ -304,7 +304,7 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
         elif not any(w.y0 < nave.y0 for w in boxes[1:]):
             openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
     low = high + 0.2 * (nave.top - high)
-    rose = wings.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
+    rose = wing_roofs.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
     openings.enclose((_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
 
 

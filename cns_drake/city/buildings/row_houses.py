@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from cns_drake.city.buildings.house_heights import ROOF_M
 from cns_drake.city.facades import (
     Assembly,
     Band,
@@ -20,11 +21,11 @@ from cns_drake.city.facades import (
     equip_roof,
     massing,
     roofs,
-    wings,
+    wing_roofs,
+    wing_walls,
 )
 from cns_drake.city.geometry.mesh import Mesh
 
-_ROOF_M = 0.2
 # Party walls rise this far above a roof whose ridge follows the street [m].
 _FIREWALL_M = 0.25
 
@@ -111,7 +112,7 @@ def _add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    openings.add_walls((wings.GLASS_M,), bands)
+    openings.add_walls((wing_walls.GLASS_M,), bands)
     _add_roof(p, wing)
     if p.chimney:
         _add_stack(p, wing, f"{part}chimney")
@@ -133,17 +134,17 @@ def _wing_and_storeys(
         top -= 0.4
     elif not across:
         top -= _FIREWALL_M
-    room = top - p.floor - _ROOF_M - 0.25
+    room = top - p.floor - ROOF_M - 0.25
     storeys = max(1, round((room - rise) / p.storey))
     if p.roof == "flat":
         wall_top = top - rise
     else:
         wanted = p.floor + storeys * p.storey + 0.25
-        least = top - _ROOF_M - 0.75 * span
-        wall_top = min(max(wanted, least), top - _ROOF_M - 0.1 * span)
+        least = top - ROOF_M - 0.75 * span
+        wall_top = min(max(wanted, least), top - ROOF_M - 0.1 * span)
     kind = "gable" if across else p.roof
     eaves, verge = 0.0 if across else 0.35, 0.0 if p.roof == "stepped" else 0.3
-    roof = Roof(kind, across, eaves, verge, _ROOF_M, parapet=0.45)
+    roof = Roof(kind, across, eaves, verge, ROOF_M, parapet=0.45)
     return Wing.at((x0, y0, x1, y1), wall_top, top, roof, blind), storeys
 
 
@@ -203,8 +204,8 @@ def _add_bay(
 def _add_roof(p: _HouseInARow, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or stepped gables."""
     low = wing.wall_top + 0.45
-    attic = wings.attic_window(0.8, low, low + 1.1, wings.GLASS_M)
-    wings.add_roof(p, wing, None if p.roof == "stepped" else attic)
+    attic = wing_roofs.attic_window(0.8, low, low + 1.1, wing_walls.GLASS_M)
+    wing_roofs.add_roof(p, wing, None if p.roof == "stepped" else attic)
     if p.roof == "stepped":
         for edge in (0, 2):
             p.add_to("walls", *_stepped_gable(wing, wing.wall(edge)))
@@ -214,7 +215,7 @@ def _add_roof(p: _HouseInARow, wing: Wing) -> None:
         for x in (wing.x0, wing.x1 - 0.3):
             firewall = roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
             p.add_to("walls", firewall)
-        wings.add_dormers(p, wing, 0.0, wing.width, p.dormers, p.dormer)
+        wing_roofs.add_dormers(p, wing, 0.0, wing.width, p.dormers, p.dormer)
 
 
 def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
@@ -240,7 +241,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     for edge in (0, 2):
         wall = wing.wall(edge)
         for u in spots:
-            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wings.GLASS_M)
+            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wing_walls.GLASS_M)
             frame = details.casings([pane], (pane.depth,), "frame", 0.12)
             glass = details.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
@@ -319,8 +320,8 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     area = (x0, main.y1 - 0.06, x0 + width, back)
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
     openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
-    openings.row((1, 2, 3), 0.9, 2.6, [wings.sash(1.1, 0.1, 0.9, 2.1)])
-    openings.enclose((wings.GLASS_M,))
+    openings.row((1, 2, 3), 0.9, 2.6, [wing_walls.sash(1.1, 0.1, 0.9, 2.1)])
+    openings.enclose((wing_walls.GLASS_M,))
 
 
 _DOORS = ("accent", "trim", "roof")
@@ -450,7 +451,7 @@ class ShopHouse(_HouseInARow):
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
             bands.append(Band(z, wing.wall_top, -0.25))
-        glass = (wings.GLASS_M, *wings.SHOP_GLASS_M)
+        glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
         openings.add_walls(glass, bands)
         _add_roof(self, wing)
         if self.roof == "flat":
@@ -472,7 +473,7 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     if door:
         x = 0.9 if left else length - 0.9
         openings.add_door(0, x, 0.0, height=2.3)
-    back = [wings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+    back = [wing_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.row((2,), 0.5, 4.5, back, 0.8)
 
 

@@ -14,7 +14,8 @@ from cns_drake.city.facades.walls import (
     lifted,
     single_wall,
 )
-from cns_drake.city.facades.wings import Openings, Roof, Wing, free_stretches
+from cns_drake.city.facades.wing_walls import Openings
+from cns_drake.city.facades.wings import Roof, Wing, free_stretches
 
 __all__ = [
     "Assembly",

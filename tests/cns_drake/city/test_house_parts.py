@@ -2,17 +2,13 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.buildings import family_houses
-from cns_drake.city.facades import bays, massing, wings
+from cns_drake.city.buildings import house_heights
+from cns_drake.city.facades import bays, massing, wing_roofs
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.facades.walls import Arch, Patch
-from cns_drake.city.facades.wings import (
-    Openings,
-    Roof,
-    Wing,
-    add_roof,
-    free_stretches,
-)
+from cns_drake.city.facades.wing_roofs import add_roof
+from cns_drake.city.facades.wing_walls import Openings
+from cns_drake.city.facades.wings import Roof, Wing, free_stretches
 from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import box_mesh
 
@@ -98,7 +94,7 @@ def test_a_mirrored_wing():
 def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
         house = assembly("d", walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
-        wings.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
+        wing_roofs.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
         meshes = house.finish(GROUND).meshes
         corners = np.vstack([m.vertices for m in meshes.values()])
         assert corners[:, 2].max() < 9.0
@@ -114,16 +110,16 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
 def test_no_dormer_on_a_flat_slope():
     wing = Wing.at((0, 0, 20, 16), 6.0, 8.0, Roof())
     house = assembly("d", walls=(1, 1, 1))
-    wings.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
+    wing_roofs.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
     assert house.finish(GROUND).parts == ()
 
 
 @pytest.mark.parametrize(("height", "storeys"), [(5.0, 1), (9.0, 2), (12.5, 3)])
 def test_storeys_leave_the_roof_its_pitch(height, storeys):
     # A span of 8 m at 35 degrees rises by 2.8 m; a storey is 2.65 m high.
-    assert family_houses.storeys_for(height, 0.3, 8.0, 35.0) == storeys
-    top = family_houses.wall_top_for(height, 0.3, 8.0, storeys)
-    assert top <= height - family_houses.ROOF_M - 0.08 * 8.0 + 1e-9
+    assert house_heights.storeys_for(height, 0.3, 8.0, 35.0) == storeys
+    top = house_heights.wall_top_for(height, 0.3, 8.0, storeys)
+    assert top <= height - house_heights.ROOF_M - 0.08 * 8.0 + 1e-9
 
 
 def test_each_material_becomes_one_part():
