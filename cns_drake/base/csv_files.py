@@ -8,12 +8,11 @@ import re
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text, write_text
-from cns_drake.base.number_rows import other_separator, to_number
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.number_text import other_separator
+from cns_drake.base.repetitions import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]")
-_WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
 
 
 def csv_text(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
@@ -113,32 +112,3 @@ def read_records(
                 f"{path}: line {line}: {len(row)} cells instead of {len(names)}"
             )
     return [(line, dict(zip(names, row, strict=True))) for line, row in rows]
-
-
-def whole_number(text: str, where: object) -> int:
-    """Returns the whole number that a cell or an argument holds.
-
-    Raises:
-        InputError: the text is not a whole number, or has more than 18 digits.
-            The message begins with `where`.
-    """
-    if not _WHOLE.fullmatch(text):
-        raise InputError(
-            f"{where}: {text[:40]!r} is no whole number of up to 18 digits"
-        )
-    return int(text)
-
-
-def number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number in a cell, of absolute value `largest` or less.
-
-    Raises:
-        InputError: the text is not a number, or its absolute value exceeds
-            `largest`. The message begins with `where`.
-    """
-    value = to_number(text)
-    if not abs(value) <= largest:
-        raise InputError(
-            f"{where}: {text[:40]!r} is no number up to {largest:g}"
-        )
-    return value

@@ -5,7 +5,7 @@ import json
 import re
 from typing import Any
 
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 
 # The deepest nesting; real data stay far below it.
 _DEEPEST = 50

@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.number_rows import to_number
+from cns_drake.base.number_text import to_number
 
 _MOST_BYTES = 256 * 2**20
 _MOST_ELEMENTS = 1_000_000

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base import commands
-from cns_drake.base.csv_files import whole_number
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.listing import natural_key
+from cns_drake.base.number_text import whole_number
 from cns_drake.base.terminal import next_command, note, show
 from cns_drake.imports.options import (
     REPORT_NAME,

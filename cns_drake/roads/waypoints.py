@@ -11,8 +11,8 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
-from cns_drake.base.number_rows import to_number
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.number_text import to_number
+from cns_drake.base.repetitions import repeated
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners

@@ -19,7 +19,7 @@ import numpy as np
 
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 
 _LIMIT_BYTES = 1 << 28
 # File name extensions of glTF.

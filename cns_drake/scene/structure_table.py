@@ -9,9 +9,9 @@ import re
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records, whole_number
+from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from cns_drake.base.number_rows import to_number
+from cns_drake.base.number_text import to_number, whole_number
 from cns_drake.scene.labels import MAX_INSTANCE, Labels
 from cns_drake.scene.materials import (
     MATERIALS,

@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import Field
 
 from cns_drake.ageing.rates import LAST_YEAR
-from cns_drake.base.csv_files import read_records, whole_number
+from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import natural_key
+from cns_drake.base.number_text import whole_number
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import Route, draw_route
 from cns_drake.scenarios.losses import Losses, lost_structures

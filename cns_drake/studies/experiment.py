@@ -40,10 +40,11 @@ from cns_drake.base.errors import (
     validated,
     value_errors,
 )
-from cns_drake.base.value_lists import is_spread, repeated, spread
+from cns_drake.base.repetitions import repeated
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
+from cns_drake.studies.spread_values import expand_spread, is_spread
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 from evaluation.results.table import FROZEN_REDRAW
 
@@ -75,7 +76,7 @@ Case = dict[str, dict[str, Any]]
 
 
 def _in_a_tuple(value: Any) -> Any:
-    value = spread(value, whole=True)
+    value = expand_spread(value, whole=True)
     value = [value] if isinstance(value, str | int | dict) else value
     if isinstance(value, list):
         # A map to make has a name.
@@ -293,7 +294,7 @@ class Experiment(Section):
         redraw = self.both.get("redraw")
         found: Any = []
         if isinstance(redraw, Mapping):
-            found = spread(redraw.get("frozen", []))
+            found = expand_spread(redraw.get("frozen", []))
         return found if isinstance(found, list) else [found]
 
     @property
@@ -630,7 +631,7 @@ def _leaves(
         path = ".".join(place)
         if is_spread(value):
             try:
-                yield path, _Values(spread(value))
+                yield path, _Values(expand_spread(value))
             except ValueError as error:
                 raise ValueError(f"{path}: {error}") from None
             continue

@@ -24,7 +24,7 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import encode_bin
 from cns_drake.base.progress import track
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.simulation.simulated_drive import SimulationSource

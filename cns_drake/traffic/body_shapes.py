@@ -8,7 +8,7 @@ from pydrake.geometry import Box, Capsule, Cylinder, Mesh, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.city.furniture.parked_cars import PAINTS, TRIM, WHITE
-from cns_drake.city.geometry.mesh import FOLDER
+from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
 from cns_drake.traffic.vehicle_kinds import VehicleKind
 
 Rgb = tuple[float, float, float]
@@ -59,7 +59,7 @@ class Limb(NamedTuple):
 
 
 def _mesh(name: str, mesh: str, rgb: Rgb) -> BodyShape:
-    shape = Mesh(str(FOLDER / f"{mesh}.obj"))
+    shape = Mesh(str(OBJECT_MESHES / f"{mesh}.obj"))
     return BodyShape(name, shape, RigidTransform(), rgb)
 
 

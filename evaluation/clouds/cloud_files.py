@@ -15,10 +15,10 @@ from cns_drake.base import points as point_arrays
 from cns_drake.base.compiled import compiled
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import check_regular, user_errors
-from cns_drake.base.number_rows import is_number, parse_rows
+from cns_drake.base.number_text import is_number, parse_rows
 from cns_drake.base.points import check_range, store
 from cns_drake.base.poses import FARTHEST
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 from evaluation.clouds.bin_columns import find_layout
 
 # Room for some tens of numbers with some tens of characters each.

@@ -40,7 +40,7 @@ from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.listing import listed
-from cns_drake.base.number_rows import parse_rows
+from cns_drake.base.number_text import parse_rows
 from evaluation.drives.scan_files import BinDrive, first_there, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,

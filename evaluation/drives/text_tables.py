@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
-from cns_drake.base.number_rows import is_number, parse_rows, pick_columns
+from cns_drake.base.number_text import is_number, parse_rows, pick_columns
 from evaluation.drives.table_headers import find_columns, split_header
 
 _NS_PER_S = 1_000_000_000

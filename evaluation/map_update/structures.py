@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.csv_files import read_records, whole_number, write_csv
+from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.files import is_there
+from cns_drake.base.number_text import whole_number
 from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
 
 

@@ -13,9 +13,10 @@ from pathlib import Path
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from cns_drake.base.csv_files import number_within, read_records
+from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
+from cns_drake.base.number_text import number_within
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
 from evaluation.results.drawing import METHOD_STYLES, plain, save
 from evaluation.results.table import Row, made_by

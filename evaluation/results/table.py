@@ -25,8 +25,8 @@ import numpy as np
 from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes, write_text
+from cns_drake.base.repetitions import repeated
 from cns_drake.base.terminal import note
-from cns_drake.base.value_lists import repeated
 from cns_drake.base.version import __version__
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.protocol import PROTOCOL_NAMES, RetrievalProtocol

@@ -10,7 +10,7 @@ from pathlib import Path
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.jobs.fingerprint import script_digest
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 from evaluation.methods import (
     Method,
     MethodConfig,

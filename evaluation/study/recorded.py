@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.listing import natural_key
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 from evaluation.recognition.description import Role
 from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
-from cns_drake.city.geometry.mesh import FOLDER
+from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
@@ -51,7 +51,7 @@ def _numbers(values):
 
 def mesh_shape(name, scale=(1, 1, 1)):
     return (
-        f"<mesh><uri>{FOLDER / name}.obj</uri>"
+        f"<mesh><uri>{OBJECT_MESHES / name}.obj</uri>"
         f"<scale>{_numbers(scale)}</scale></mesh>"
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.geometry import Mesh, merge_meshes
-from cns_drake.city.geometry.polygons import cut_ears
+from cns_drake.city.geometry.triangulation import cut_ears
 
 Point = tuple[float, float]
 Corners = list[np.ndarray]

@@ -15,7 +15,7 @@ import yaml
 from cns_drake.base.csv_files import csv_text, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes, user_errors, write_text
-from cns_drake.base.number_rows import to_number
+from cns_drake.base.number_text import to_number
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.generation.city_structures import City, make_city, meshes_of

@@ -1,22 +1,16 @@
 """Meshes, polygons, and structures made of meshes."""
 
-from cns_drake.city.geometry.mesh import (
-    FOLDER,
-    Mesh,
-    merge_meshes,
-    object_mesh,
-    read_mesh,
-)
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes, read_mesh
+from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
+from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygons import (
     HeightMap,
-    Occupancy,
     hull_of,
     placed,
     polygons_of,
     snap,
     surface_mesh,
     tiles,
-    triangulate,
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import (
@@ -42,6 +36,7 @@ from cns_drake.city.geometry.structures import (
     post,
     triple,
 )
+from cns_drake.city.geometry.triangulation import triangulate
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,
     from_above,
@@ -53,7 +48,7 @@ from cns_drake.city.geometry.upper_sides import (
 )
 
 __all__ = [
-    "FOLDER",
+    "OBJECT_MESHES",
     "BoxShape",
     "Builder",
     "CylinderShape",

@@ -58,9 +58,7 @@ class Mesh:
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
         """Returns the mesh with the same faces, but vertices (N, 3) [m]."""
-        mesh = Mesh(vertices, self.faces)
-        mesh.__dict__["_corners"] = self._corners
-        return mesh
+        return Mesh(vertices, self.faces)
 
     def moved(
         self, translation: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0
@@ -123,18 +121,6 @@ def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     faces = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4),
              (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))  # fmt: skip
     return Mesh(corners * half + np.asarray(center), faces)
-
-
-FOLDER = Path(__file__).parents[1] / "object_meshes"
-
-
-def object_mesh(name: str) -> Mesh:
-    """Returns a mesh of the folder `object_meshes`, by its name.
-
-    Raises:
-        FileNotFoundError: there is no such mesh.
-    """
-    return read_mesh(FOLDER / f"{name}.obj")
 
 
 @cache

@@ -12,7 +12,8 @@ from shapely.affinity import translate
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, object_mesh
+from cns_drake.city.geometry.mesh import Mesh, box_mesh
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
 from cns_drake.scene.materials import MATERIALS, OF_CLASSES
 from cns_drake.scene.structure_table import kind_in_name

@@ -15,7 +15,7 @@ from pydantic import (
 
 from cns_drake.base.errors import validated
 from cns_drake.base.input_models import InputModel
-from cns_drake.base.value_lists import repeated
+from cns_drake.base.repetitions import repeated
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.road import MeshStem
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.city.furniture.fences import RUN_KINDS
-from cns_drake.city.geometry.mesh import object_mesh
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 

@@ -6,14 +6,15 @@ import pytest
 from shapely.geometry import MultiPoint
 
 from cns_drake.city.furniture.fences import RUN_KINDS
-from cns_drake.city.geometry.mesh import FOLDER, Mesh, object_mesh
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
 from cns_drake.city.geometry.structures import MeshShape, part_mesh
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
 from cns_drake.scene.semantics import CLASS_IDS
 
 SEEDS = range(6)
-MESHES = sorted(path.stem for path in FOLDER.glob("*.obj"))
+MESHES = sorted(path.stem for path in OBJECT_MESHES.glob("*.obj"))
 MOST_VISUALS = {
     **dict.fromkeys(SPECIES, 2),
     "lamp_post": 5,
@@ -116,7 +117,7 @@ def test_meshes_obey_the_mesh_contract(name):
 
 @pytest.mark.parametrize("name", MESHES)
 def test_meshes_are_as_written(name):
-    vertices, faces = parse_obj((FOLDER / f"{name}.obj").read_text())
+    vertices, faces = parse_obj((OBJECT_MESHES / f"{name}.obj").read_text())
     mesh = object_mesh(name)
     np.testing.assert_array_equal(mesh.vertices, vertices)
     assert list(map(tuple, faces)) == list(mesh.faces)
@@ -129,7 +130,7 @@ def test_few_visuals(name):
 
 
 def test_budget_of_all_meshes():
-    sizes = [(FOLDER / f"{name}.obj").stat().st_size for name in MESHES]
+    sizes = [(OBJECT_MESHES / f"{name}.obj").stat().st_size for name in MESHES]
     assert max(sizes) <= 80_000
     assert sum(sizes) <= 3_500_000
 

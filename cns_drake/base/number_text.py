@@ -1,11 +1,15 @@
-"""Rows of numbers that are written as text."""
+"""Numbers that are written as text, alone or in rows."""
 
 from collections.abc import Iterable, Sequence
 import math
+import re
 import warnings
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+
+_WHOLE = re.compile(r"[-+]?[0-9]{1,18}")
 # Separator of columns -> its name.
 _SEPARATORS = {
     ";": "semicolons",
@@ -137,3 +141,32 @@ def is_number(word: str) -> bool:
 def to_number(text: str) -> float:
     """Returns the number that a text is, or else NaN."""
     return float(text) if is_number(text) else math.nan
+
+
+def whole_number(text: str, where: object) -> int:
+    """Returns the whole number that a cell or an argument holds.
+
+    Raises:
+        InputError: the text is not a whole number, or has more than 18 digits.
+            The message begins with `where`.
+    """
+    if not _WHOLE.fullmatch(text):
+        raise InputError(
+            f"{where}: {text[:40]!r} is no whole number of up to 18 digits"
+        )
+    return int(text)
+
+
+def number_within(text: str, largest: float, where: object) -> float:
+    """Returns the number in a cell, of absolute value `largest` or less.
+
+    Raises:
+        InputError: the text is not a number, or its absolute value exceeds
+            `largest`. The message begins with `where`.
+    """
+    value = to_number(text)
+    if not abs(value) <= largest:
+        raise InputError(
+            f"{where}: {text[:40]!r} is no number up to {largest:g}"
+        )
+    return value

@@ -1,9 +1,9 @@
-"""Lists of values that input files may write shorter, or twice."""
+"""Evenly spaced values, against NumPy's."""
 
 import numpy as np
 import pytest
 
-from cns_drake.base.value_lists import repeated, spread
+from cns_drake.studies.spread_values import expand_spread
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from cns_drake.base.value_lists import repeated, spread
     ],
 )
 def test_numbers_are_spread_evenly(first, last, count, kind):
-    found = spread({"from": first, "to": last, "count": count})
+    found = expand_spread({"from": first, "to": last, "count": count})
     assert {type(one) for one in found} == {kind}
     line = np.linspace(first, last, count)
     np.testing.assert_allclose(found, line, rtol=0, atol=0.5001e-4)
@@ -30,7 +30,7 @@ def test_numbers_are_spread_evenly(first, last, count, kind):
     "value", [[1, 2], 3, "a", {}, {"from": 1, "to": 2}, None]
 )
 def test_other_values_stay(value):
-    assert spread(value) is value
+    assert expand_spread(value) is value
 
 
 @pytest.mark.parametrize(
@@ -38,26 +38,16 @@ def test_other_values_stay(value):
     [(0, 1, 1), (0, 1, 10_001), (0, 1, 2.0), (True, 2, 2), (0, "1", 2)]
     + [(0, float(end), 3) for end in ("inf", "nan")],
 )
-def test_what_cannot_be_spread(value):
+def test_what_cannot_be_expand_spread(value):
     with pytest.raises(ValueError, match="from and to are numbers, count from"):
-        spread(dict(zip(("from", "to", "count"), value, strict=True)))
+        expand_spread(dict(zip(("from", "to", "count"), value, strict=True)))
 
 
 @pytest.mark.parametrize("ends", [(0, 1), (0.0, 2), (1, 2.5)])
 def test_seeds_are_whole(ends):
     value = {"from": ends[0], "to": ends[1], "count": 3}
-    assert len(spread(value)) == 3
+    assert len(expand_spread(value)) == 3
     with pytest.raises(
         ValueError, match=r"3 numbers from .* are not all whole"
     ):
-        spread(value, whole=True)
-
-
-def test_what_is_there_twice():
-    assert repeated(iter("abcab")) == ["a", "b"]
-    assert repeated([1, True, 1.0, "1"]) == [1, 1]
-    assert repeated([{"a": 1, "b": 2}, [1], {"b": 2, "a": 1}, [1, 1]]) == [
-        {"b": 2, "a": 1}
-    ]
-    # Linear in their number: a comparison of all pairs would take minutes.
-    assert repeated(range(100_000)) == []
+        expand_spread(value, whole=True)

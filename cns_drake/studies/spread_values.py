@@ -1,11 +1,8 @@
-"""Lists of values in input files: evenly spaced values, and repetitions."""
+"""Evenly spaced values, which experiments write as {from, to, count}."""
 
-from collections.abc import Hashable, Iterable, Mapping
-import json
+from collections.abc import Mapping
 import math
-from typing import Any, TypeVar
-
-_T = TypeVar("_T")
+from typing import Any
 
 _SPREAD = {"from", "to", "count"}
 _MOST_SPREAD = 10_000
@@ -16,7 +13,7 @@ def is_spread(value: object) -> bool:
     return isinstance(value, Mapping) and set(value) == _SPREAD
 
 
-def spread(value: Any, *, whole: bool = False) -> Any:
+def expand_spread(value: Any, *, whole: bool = False) -> Any:
     """Turns {from, to, count} into a list of evenly spaced numbers.
 
     Other values are returned unchanged. The numbers are rounded to four decimal
@@ -56,17 +53,3 @@ def spread(value: Any, *, whole: bool = False) -> Any:
         )
     width = (last - first) / (count - 1)
     return [round(first + k * width, 4) for k in range(count)]
-
-
-def repeated(values: Iterable[_T]) -> list[_T]:
-    """Returns each value that equals an earlier one, in order."""
-    seen: dict[Hashable, _T] = {}
-    found = []
-    for value in values:
-        key: Hashable = value
-        if isinstance(value, dict | list):
-            key = json.dumps(value, sort_keys=True, default=str)
-        if key in seen:
-            found.append(seen[key])
-        seen.setdefault(key, value)
-    return found
