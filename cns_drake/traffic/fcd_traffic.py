@@ -17,10 +17,11 @@ from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
+from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_plan import EgoPath, Tracks, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
-from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, gait_rate
+from cns_drake.traffic.walkers import gait_rate
 
 # Greatest deviation of times from even spacing, because of rounding in the file
 # [s].

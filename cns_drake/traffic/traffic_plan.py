@@ -21,6 +21,7 @@ from cns_drake.traffic import vehicles as motion
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.right_of_way import grant_ways
+from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.streets import STEP, EgoBox, Streets, make_streets
 from cns_drake.traffic.vehicle_kinds import (
     KINDS,
@@ -29,7 +30,7 @@ from cns_drake.traffic.vehicle_kinds import (
     draw_kinds,
 )
 from cns_drake.traffic.vehicles import CURRENT, SIGHT, Traffic, find_ahead
-from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
+from cns_drake.traffic.walkers import Crowd
 
 # Distance between the places at which the ego car's lane is determined [m].
 _STEP = 1.0

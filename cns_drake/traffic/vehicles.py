@@ -14,6 +14,7 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import arcsin, arctan2
 from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.streets import (
     MERGE,
     SPLIT,
@@ -795,19 +796,3 @@ def choose_way(traffic: Traffic, i: int) -> None:
         if filled < least:
             least = filled
             car.path[CURRENT + 1], car.path[CURRENT + 2] = way, beyond
-
-
-@compiled
-def uniform(seed: int, who: int, draw: int) -> float:
-    """Returns the `draw`-th random number of a road user, from 0 to 1.
-
-    The number is the result of SplitMix64's finalizer (Steele, Lea, Flood,
-    OOPSLA 2014) for the seed, the number `who` of the road user, and `draw`.
-    """
-    z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15)
-    z += np.uint64(who) * np.uint64(0xD1B54A32D192ED03)
-    z += np.uint64(draw) * np.uint64(0x8CB92BA72F3D8DD7)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return float(z >> np.uint64(11)) / 9007199254740992.0

@@ -1,67 +1,32 @@
-"""Moves pedestrians along walkways by the social force model.
+"""Places pedestrians on walkways, and plans which ways they take.
 
-Pedestrians approach their desired speed, and keep away from each other and from
-the edges of their walkway: Helbing, Molnar, "Social force model for pedestrian
-dynamics", Phys. Rev. E 51 (1995).
+`cns_drake.traffic.social_force` moves them.
 """
 
 from collections.abc import Sequence
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_graph import SPACING, Walkway, length_of
-from cns_drake.traffic.overlaps import boxes_overlap
+from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.right_of_way import WALK_GROUP
+from cns_drake.traffic.social_force import (
+    APART,
+    AT_NODE,
+    PATH,
+    STANDING_SPEED,
+    WALKER,
+    Paths,
+    move_walkers,
+    social_forces,
+)
 from cns_drake.traffic.streets import STEP
-from cns_drake.traffic.vehicles import uniform
 
 # Mean of the model's wanted speed [m/s].
 _MEAN_SPEED = 1.34
 # Standard deviation of the wanted speed [m/s].
 _SPEED_SPREAD = 0.26
-# Relaxation time [s].
-_RELAXATION = 0.5
-# Repulsion by another pedestrian whose box is touched [m/s^2].
-_REPULSION = 7.0
-# In this distance, the repulsion by a pedestrian falls by the factor e [m].
-_REPULSION_RANGE = 0.3
-# Repulsion by an edge that is touched [m/s^2].
-_EDGE_REPULSION = 10.0
-# In this distance, the repulsion by an edge falls by the factor e [m].
-_EDGE_RANGE = 0.2
-# Greatest speed as a multiple of the wanted speed.
-_HURRY = 1.3
-# Least distance between two pedestrians' middles [m].
-_APART = 0.95
-# Radius within which pedestrians are neighbours [m].
-_NEAR = 4.0
-# Length of a pedestrian's box, which contains swinging limbs [m].
-WALKER_LENGTH = 0.84
-# Width of the box [m].
-WALKER_WIDTH = 0.6
-# Least space between boxes [m].
-_BOX_GAP = 0.15
-# A pedestrian steps aside for another one ahead with at most this acceleration
-# [m/s^2].
-_STEP_ASIDE = 4.0
-# A pedestrian does not step aside for one that is at least this far to the side
-# [m].
-_PASSING_DISTANCE = 0.85
-# Part of the repulsion by pedestrians that turns to the right.
-_TO_THE_RIGHT = 0.3
-# A pedestrian aims at a point of the walkway this many points ahead.
-_AHEAD = int(2.0 / SPACING)
-# A pedestrian turns to its direction of motion at this rate [rad/s].
-_TURN_RATE = 2.5
-# A pedestrian that is at most this fast stands [m/s].
-_STANDING_SPEED = 0.2
-# Distance of a waiting pedestrian from the crossing [m].
-_AT_NODE = 1.0
-# Greatest acceleration, in any direction [m/s^2].
-_STRONGEST = 2.5
 # A pedestrian that was blocked for this time turns back [s].
 _PATIENCE = 4.0
 # A waiting pedestrian turns back within this distance of one that does so [m].
@@ -82,52 +47,6 @@ _COMPANIONS = 0.2
 _BEHIND = 3
 # Number of random places that are tried for a pedestrian.
 _TRIES = 200
-
-_WALKER = np.dtype(
-    [
-        ("xy", float, 2),  # [m]
-        ("velocity", float, 2),  # [m/s]
-        ("yaw", float),  # Heading [rad].
-        ("phase", float),  # Place in the gait [rad].
-        ("path", int),  # Number of the walkway, in walking direction.
-        ("at", int),  # Row of the point that the pedestrian has reached.
-        ("speed", float),  # Wanted [m/s].
-        ("aside", float),  # Offset to the right, as a share of half the width.
-        ("next_path", int),  # -1 if not drawn yet.
-        ("stuck", float),  # Time for which the pedestrian has been blocked [s].
-        ("group", int),  # Number of the pedestrian whom it follows.
-        ("draws", int),  # Number of random numbers drawn.
-    ]
-)
-# A walkway in one direction as a record; the number of the opposite one is its
-# own ^ 1.
-_PATH = np.dtype(
-    [
-        ("first", int),  # Row of its first point.
-        ("num_points", int),
-        ("crossing", int),  # Number of the crossing, -1 for none.
-        ("node", int),  # The place where it ends.
-    ]
-)
-
-
-class Paths(NamedTuple):
-    """W walkways in both directions, as arrays.
-
-    Attributes:
-        paths: (2 W,) records of the walkways, once in each direction.
-        points: (M, 3) points in walking direction [m].
-        tangents: (M, 2) unit vectors from each point to the next. The vector of
-            a path's last point is that of the point before.
-        limits: (M, 2) least and greatest offset to the right [m].
-        narrow: (M,) bool, where pedestrians must face along their path to fit.
-    """
-
-    paths: np.ndarray
-    points: np.ndarray
-    tangents: np.ndarray
-    limits: np.ndarray
-    narrow: np.ndarray
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
@@ -197,8 +116,8 @@ class Crowd:
         for i in np.flatnonzero(self._follow_paths()).tolist():
             is_waiting[i] = not self._go_on(i, t, seed, waited)
         crossings["waits"][~waited] = np.inf
-        force = _forces(self._paths, walkers, is_waiting)
-        _move(self._paths, walkers, force)
+        force = social_forces(self._paths, walkers, is_waiting)
+        move_walkers(self._paths, walkers, force)
         self._note_crossers()
         x, y = walkers["velocity"].T
         speed = np.sqrt(x * x + y * y)
@@ -206,7 +125,7 @@ class Crowd:
         paths = self._paths.paths[walkers["path"]]
         # Others may push a pedestrian back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
-        gets_on = x * along[:, 0] + y * along[:, 1] > _STANDING_SPEED
+        gets_on = x * along[:, 0] + y * along[:, 1] > STANDING_SPEED
         is_stuck = ~gets_on & ~is_waiting
         walkers["stuck"] = np.where(is_stuck, walkers["stuck"] + STEP, 0.0)
         back = walkers["stuck"] > _PATIENCE
@@ -256,7 +175,7 @@ class Crowd:
                 break
             walkers["at"] += passed
         last = paths["first"] + paths["num_points"] - 1
-        is_near = ahead(last) < _AT_NODE
+        is_near = ahead(last) < AT_NODE
         return is_near & (walkers["at"] >= paths["num_points"] - 3)
 
     def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
@@ -342,7 +261,7 @@ class Crowd:
 
 def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     """Returns the paths along walkways."""
-    paths = np.zeros(2 * len(walkways), _PATH)
+    paths = np.zeros(2 * len(walkways), PATH)
     count = np.repeat([len(way.points) for way in walkways], 2)
     paths["num_points"] = count
     paths["first"] = np.cumsum(count) - count
@@ -381,7 +300,7 @@ def _place_walkers(
         aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
         aside = (aside if forward else -aside) / np.hypot(x, y)
         xy = line[at, :2] + aside * np.array([y, -x])
-        is_free = all(np.hypot(*(xy - row[2])) > 1.4 * _APART for row in rows)
+        is_free = all(np.hypot(*(xy - row[2])) > 1.4 * APART for row in rows)
         if is_free:
             yaw = math.atan2(y, x)
             rows.append((2 * way + 1 - forward, at, xy, yaw, group))
@@ -398,7 +317,7 @@ def _place_walkers(
             break
         if rng.uniform() < _COMPANIONS and len(rows) < count and at >= _BEHIND:
             place(way, forward, at - _BEHIND, len(rows) - 1)
-    walkers = np.zeros(len(rows), _WALKER)
+    walkers = np.zeros(len(rows), WALKER)
     names = ("path", "at", "xy", "yaw", "group")
     for name, values in zip(names, zip(*rows, strict=True), strict=False):
         walkers[name] = values
@@ -412,210 +331,3 @@ def _place_walkers(
         walkers[name] = walkers[name][walkers["group"]]
     walkers["next_path"] = -1
     return walkers
-
-
-@compiled
-def _forces(
-    paths: Paths, walkers: np.ndarray, is_waiting: np.ndarray
-) -> np.ndarray:
-    """Returns the forces (N, 2) on all pedestrians, as accelerations [m/s^2].
-
-    `is_waiting` (N,) says which pedestrians wait for a crossing.
-    """
-    force = np.zeros((len(walkers), 2))
-    for i in range(len(walkers)):
-        one = walkers[i]
-        path = paths.paths[walkers[i].path]
-        here = path.first + one.at
-        low, high = paths.limits[here]
-        right = (paths.tangents[here, 1], -paths.tangents[here, 0])
-        force[i] -= one.velocity / _RELAXATION
-        if is_waiting[i]:
-            # In a narrow gap, the edges would push it back and forth.
-            continue
-        target = path.first + min(one.at + _AHEAD, path.num_points - 1)
-        left, most = paths.limits[target]
-        aside = 0.5 * (left + most + one.aside * (most - left))
-        x = paths.points[target, 0] + aside * right[0] - one.xy[0]
-        y = paths.points[target, 1] + aside * right[1] - one.xy[1]
-        wanted = one.speed / max(np.sqrt(x * x + y * y), 1e-6)
-        force[i, 0] += wanted * x / _RELAXATION
-        force[i, 1] += wanted * y / _RELAXATION
-        across = -(
-            (paths.points[here, 0] - one.xy[0]) * right[0]
-            + (paths.points[here, 1] - one.xy[1]) * right[1]
-        )
-        for side in (-1.0, 1.0):
-            room = high - across if side > 0.0 else across - low
-            push = (
-                side * _EDGE_REPULSION * np.exp(-max(room, 0.0) / _EDGE_RANGE)
-            )
-            force[i, 0] -= push * right[0]
-            force[i, 1] -= push * right[1]
-    for i in range(len(walkers)):
-        for j in range(i):
-            x = walkers[i].xy[0] - walkers[j].xy[0]
-            y = walkers[i].xy[1] - walkers[j].xy[1]
-            square = x * x + y * y
-            if square >= _NEAR**2:
-                continue
-            distance = max(np.sqrt(square), 1e-3)
-            push = _REPULSION * np.exp(
-                -max(distance - _APART, 0.0) / _REPULSION_RANGE
-            )
-            # Slightly to the right; otherwise two pedestrians who meet head-on
-            # would stop.
-            push_x = push * (x - _TO_THE_RIGHT * y) / distance
-            push_y = push * (y + _TO_THE_RIGHT * x) / distance
-            force[i, 0] += push_x
-            force[i, 1] += push_y
-            force[j, 0] -= push_x
-            force[j, 1] -= push_y
-            for k, sign in ((i, -1.0), (j, 1.0)):
-                # The other pedestrian's place in the pedestrian's own frame.
-                c, s = np.cos(walkers[k].yaw), np.sin(walkers[k].yaw)
-                ahead = sign * x * c + sign * y * s
-                aside = sign * y * c - sign * x * s
-                if ahead <= 0.0 or abs(aside) >= _PASSING_DISTANCE:
-                    continue
-                push = _STEP_ASIDE * (1.0 - distance / _NEAR)
-                push *= 1.0 - abs(aside) / _PASSING_DISTANCE
-                # Away from the other one; to the right if that one is straight
-                # ahead.
-                side = -1.0 if aside >= -0.05 else 1.0
-                force[k, 0] -= side * push * s
-                force[k, 1] += side * push * c
-    return force
-
-
-@compiled
-def _move(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
-    """Moves pedestrians, as far as paths are free, by forces (N, 2) [m/s^2].
-
-    A pedestrian takes a step if it can then stop on its path, away from the
-    places where all others can stop. Otherwise it brakes; the place where it
-    stops has been free since the previous step.
-    """
-    for i in range(len(walkers)):
-        one = walkers[i]
-        x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
-        rest_x, rest_y = _stop(x, y, vx, vy)
-        off = _distance_off(paths, one, rest_x, rest_y)
-        change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
-        for attempt in range(3):
-            if attempt == 1:
-                # Try only the lateral part of the step, and slightly back.
-                c, s = np.cos(one.yaw), np.sin(one.yaw)
-                aside = change_y * c - change_x * s
-                back = vx * c + vy * s + 0.5 * abs(aside)
-                change_x = -aside * s - back * c
-                change_y = aside * c - back * s
-            elif attempt == 2:
-                change_x, change_y = -vx, -vy
-            part = np.sqrt(change_x * change_x + change_y * change_y)
-            part = min(1.0, _STRONGEST * STEP / max(part, 1e-9))
-            new_vx, new_vy = vx + part * change_x, vy + part * change_y
-            speed = np.sqrt(new_vx * new_vx + new_vy * new_vy)
-            part = min(1.0, _HURRY * one.speed / max(speed, 1e-9))
-            new_vx, new_vy = part * new_vx, part * new_vy
-            new_x = x + 0.5 * (vx + new_vx) * STEP
-            new_y = y + 0.5 * (vy + new_vy) * STEP
-            if attempt == 2 and speed == 0.0:
-                new_x, new_y = rest_x, rest_y
-            stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
-            yaw = one.yaw
-            row = _nearest(paths, one, new_x, new_y)
-            tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
-            if paths.narrow[row] or speed > _STANDING_SPEED:
-                turn = np.arctan2(new_vy, new_vx) - yaw
-                if paths.narrow[row]:
-                    # Facing along the path, forwards or backwards.
-                    ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
-                    turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
-                turn = (turn + np.pi) % (2 * np.pi) - np.pi
-                yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
-            if attempt < 2 and (
-                _distance_off(paths, one, stop_x, stop_y) > off + 1e-9
-            ):
-                continue
-            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
-                one.yaw = yaw
-                break
-            yaw = one.yaw
-            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
-                break
-        one.xy[0], one.xy[1] = new_x, new_y
-        one.velocity[0], one.velocity[1] = new_vx, new_vy
-
-
-@compiled
-def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
-    """Returns x and y at which a pedestrian stops if it brakes now.
-
-    (x, y) is its place, and (vx, vy) its velocity.
-    """
-    time = np.sqrt(vx * vx + vy * vy) / (2.0 * _STRONGEST)
-    return x + vx * time, y + vy * time
-
-
-@compiled
-def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
-    """Returns the row of the point of a path that is nearest to a place."""
-    path, points = paths.paths[walker.path], paths.points
-    best = np.inf
-    nearest = path.first
-    for at in range(max(walker.at - 3, 0), min(walker.at + 4, path.num_points)):
-        row = path.first + at
-        dx, dy = x - points[row, 0], y - points[row, 1]
-        distance = dx * dx + dy * dy
-        if distance < best:
-            best, nearest = distance, row
-    return nearest
-
-
-@compiled
-def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
-    """Returns the distance from a place to a pedestrian's path [m]."""
-    path, points = paths.paths[walker.path], paths.points
-    row = _nearest(paths, walker, x, y)
-    nearest = row - path.first
-    low, high = paths.limits[row]
-    tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
-    dx, dy = x - points[row, 0], y - points[row, 1]
-    along, across = dx * tx + dy * ty, dx * ty - dy * tx
-    beyond = max(across - high, low - across, 0.0)
-    half = 0.5 * (high - low)
-    if nearest == path.num_points - 1:
-        return np.hypot(beyond, max(along, 0.0))
-    if nearest == 0:
-        return np.hypot(beyond, max(-_AT_NODE - half - along, 0.0))
-    return beyond
-
-
-@compiled
-def _is_free(
-    walkers: np.ndarray,
-    i: int,
-    place: tuple[float, float],
-    stop: tuple[float, float],
-    yaw: float,
-) -> bool:
-    """Returns whether the i-th pedestrian's box would be free, now and later.
-
-    The box would be at `place` with a heading and, if the pedestrian braked,
-    then at `stop`.
-    """
-    half = (WALKER_LENGTH / 2 + _BOX_GAP / 2, WALKER_WIDTH / 2 + _BOX_GAP / 2)
-    for j in range(len(walkers)):
-        other = walkers[j]
-        x, y = other.xy[0], other.xy[1]
-        if j == i or (x - place[0]) ** 2 + (y - place[1]) ** 2 > _NEAR**2:
-            continue
-        a, b = (place[0], place[1], yaw), (x, y, other.yaw)
-        if boxes_overlap(a, b, half, half):
-            return False
-        x, y = _stop(x, y, other.velocity[0], other.velocity[1])
-        a, b = (stop[0], stop[1], yaw), (x, y, other.yaw)
-        if boxes_overlap(a, b, half, half):
-            return False
-    return True

@@ -7,9 +7,10 @@ import pytest
 import shapely
 
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway, make_crossing
+from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.streets import STEP
 from cns_drake.traffic.vehicles import make_crossings
-from cns_drake.traffic.walkers import WALKER_LENGTH, WALKER_WIDTH, Crowd
+from cns_drake.traffic.walkers import Crowd
 
 # Where all walkways begin [m].
 ORIGIN = np.array([4.0, -2.0])
