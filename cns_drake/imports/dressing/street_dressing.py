@@ -30,7 +30,7 @@ from cns_drake.city.geometry import (
 from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick
-from cns_drake.imports.dressing.grounds import HALF_STREET
+from cns_drake.imports.dressing.paving import HALF_STREET
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import joined
 from cns_drake.imports.foreign_city import (

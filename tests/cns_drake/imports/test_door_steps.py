@@ -6,7 +6,8 @@ import pytest
 
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
-from cns_drake.imports.dressing.dressed_city import dress_buildings, dress_city
+from cns_drake.imports.dressing.dressed_buildings import dress_buildings
+from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap

@@ -4,7 +4,7 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.imports.dressing.grounds import lane_marks
+from cns_drake.imports.dressing.lane_marks import lane_marks
 from cns_drake.imports.dressing.street_dressing import may_park_on
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import Street

@@ -16,11 +16,7 @@ from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.dressing import dressed_city
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.dressing.grounds import (
-    missing_sidewalks,
-    paved,
-    with_kerb,
-)
+from cns_drake.imports.dressing.paving import missing_sidewalks, with_kerb
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of, ground_structures
@@ -282,7 +278,10 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
     (bottom,) = ground_structures(staged.kept, ground)
     (seen,) = result.bottom
     # Four houses of 500 m^2 in 180 m by 44 m.
-    assert seen.model.parts[0].rgb == paved(bottom).model.parts[0].rgb
+    assert (
+        seen.model.parts[0].rgb
+        == dressed_city.in_paving_colour(bottom).model.parts[0].rgb
+    )
     assert seen.model.parts[0].rgb != bottom.model.parts[0].rgb
 
 

@@ -1,0 +1,327 @@
+"""Dresses imported buildings: adds details to their walls and roofs."""
+
+from collections import Counter, defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiLineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.geometry import (
+    MeshShape,
+    Model,
+    UpperSides,
+    looks_up,
+    turned_up,
+)
+from cns_drake.imports.dressing import facade_pieces
+from cns_drake.imports.dressing.drive_views import DriveViews
+from cns_drake.imports.dressing.facade_pieces import FacadePlan
+from cns_drake.imports.dressing.styles import Style, make_style
+from cns_drake.imports.dressing.wall_panels import (
+    Panel,
+    find_panels,
+    is_upright,
+)
+from cns_drake.imports.drives.search import WaypointRoute
+from cns_drake.imports.faces import joined
+from cns_drake.imports.foreign_city import (
+    Imported,
+    Street,
+    random_generator,
+    to_mesh,
+)
+from cns_drake.imports.ground import Ground
+
+# A building whose feet are farther from the ground than this was sunk into it
+# [m].
+_LET_IN = 2.0
+
+
+@dataclass(frozen=True)
+class BareBuilding:
+    """An imported building, split into surfaces that details can be added to.
+
+    Attributes:
+        one: the building.
+        walls: triangles (M, 3, 3) of the walls [m].
+        roof: triangles (M, 3, 3) of the roof [m].
+        rest: triangles (M, 3, 3) of all other surfaces [m].
+        base: height of the lowest floor in W [m].
+        style: appearance of the building.
+        is_flat: whether the roof is flat.
+        rng: random generator for the details.
+    """
+
+    one: Imported
+    walls: np.ndarray
+    roof: np.ndarray
+    rest: np.ndarray
+    base: float
+    style: Style
+    is_flat: bool
+    rng: np.random.Generator
+
+
+def split_buildings(
+    buildings: Sequence[Imported], ground: Ground, seed: int
+) -> list[BareBuilding]:
+    """Returns buildings, split into walls, roof and other surfaces.
+
+    A variant of a building, such as a lower one in an earlier stage, has the
+    style of the original.
+
+    Args:
+        buildings: the buildings.
+        ground: the ground on which they stand.
+        seed: seed of the random styles.
+    """
+    found = []
+    styles: dict[str, Style] = {}
+    for one in sorted(buildings, key=lambda one: one.original != ""):
+        some = _split_building(one, ground, seed, styles.get(one.original))
+        styles[one.draw_name] = some.style
+        found.append(some)
+    return found
+
+
+def _split_building(
+    one: Imported, ground: Ground, seed: int, known: Style | None = None
+) -> BareBuilding:
+    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
+    for part in one.structure.model.parts:
+        if isinstance(part.shape, MeshShape):
+            mesh = one.structure.model.meshes[part.shape.mesh]
+            surfaces[part.name] = mesh.vertices[mesh.triangles()]
+    body = surfaces["body"]
+    upright, up = is_upright(body), looks_up(body)
+    roof = np.concatenate([surfaces["roof"], body[up]])
+    walls, rest = body[upright], body[~upright & ~up]
+    corners = one.triangles.reshape(-1, 3)
+    foot = float(corners[:, 2].min())
+    below = float(ground.height(corners[:, :2]).min())
+    base = foot if abs(foot - below) < _LET_IN else below
+    width, depth = np.ptp(corners[:, :2], axis=0)
+    top = walls if len(walls) else one.triangles
+    height = max(1.0, float(top[:, :, 2].max()) - base)
+    is_flat = bool(len(roof)) and facade_pieces.is_flat_roof(roof)
+    rng = random_generator(seed, "dressing", one.draw_name)
+    area = 0.8 * float(width * depth)
+    style = make_style(one.tags, one.year, area, height, is_flat, rng)
+    if known is not None:
+        storeys = max(1, round(height / known.storey))
+        style = replace(known, storey=height / storeys)
+    return BareBuilding(one, walls, roof, rest, base, style, is_flat, rng)
+
+
+# Walls farther than this from all drives get no windows [m].
+_WALLS_WITHIN = 60.0
+# Roofs farther than this from all drives get no equipment [m].
+_ROOFS_WITHIN = 100.0
+# About this many triangles are used for openings, first on the nearest walls.
+_MOST_TRIANGLES = 1_100_000
+# About this many triangles are needed per 9 m^2 of a wall, for its openings.
+_TRIANGLES_OF_OPENING = 30
+# About this many triangles are needed per wall in addition.
+_TRIANGLES_OF_WALL = 40
+# Shops are on walls at most this far from a street [m].
+_SHOPS_WITHIN = 16.0
+# From this level of detail on, a model has its own roof.
+_LOD_WITH_ROOF = 2.2
+# From this level of detail on, a model has its own windows.
+_LOD_WITH_WINDOWS = 3.0
+_NO_TRIANGLES = np.zeros((0, 3, 3))
+
+
+@dataclass(frozen=True)
+class DressedBuildings:
+    """The buildings of a city with details, and counts of the details.
+
+    Attributes:
+        buildings: original building -> building with details.
+        at_random: kind of detail -> number of random details.
+        by_file: kind of appearance, such as a colour -> number of buildings for
+            which the file determines it.
+    """
+
+    buildings: Mapping[Imported, Imported]
+    at_random: Counter[str]
+    by_file: Counter[str]
+
+
+def dress_buildings(
+    structures: Sequence[Imported],
+    drives: Sequence[WaypointRoute],
+    streets: Sequence[Street],
+    ground: Ground,
+    seed: int,
+    always: Collection[Imported] | None = None,
+    paving: np.ndarray = _NO_TRIANGLES,
+) -> DressedBuildings:
+    """Returns the buildings of a city with windows, doors and shops.
+
+    A building looks the same in each stage and each import, because its random
+    numbers depend only on the seed and its name. Only walls near a drive get
+    windows. Doors and shops face streets.
+
+    Args:
+        structures: the structures of the city, of which the buildings get
+            details.
+        drives: the drives, near which there is more detail.
+        streets: the streets that doors and shops face.
+        ground: the ground on which buildings stand.
+        seed: seed of all random draws.
+        always: structures that exist in all stages; None if all do. A wall gets
+            no details if buildings that exist in all stages occlude it from the
+            drives.
+        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
+            doors stand [m].
+    """
+    buildings = [one for one in structures if one.kind.startswith("Building")]
+    bare = split_buildings(buildings, ground, seed)
+    walls: Mapping[int, list[FacadePlan]] = {}
+    if drives and bare:
+        lasting = set(buildings if always is None else always)
+        hiding = [b.triangles for b in buildings if b in lasting]
+        views = DriveViews(drives, ground, joined(hiding))
+        upper = UpperSides(turned_up(paving))
+        walls = _plan_facades(bare, drives, streets, ground, views, upper)
+    paths = MultiLineString([drive.path for drive in drives])
+    at_random: Counter[str] = Counter()
+    by_file: Counter[str] = Counter()
+    dressed = {}
+    for number, some in enumerate(bare):
+        model, counts = _dress_building(
+            some, walls.get(number, ()), paths, seed
+        )
+        at_random += counts
+        by_file.update(some.style.by_tag)
+        structure = replace(some.one.structure, model=model)
+        dressed[some.one] = replace(some.one, structure=structure)
+    return DressedBuildings(dressed, at_random, by_file)
+
+
+def _dress_building(
+    some: BareBuilding,
+    plans: Sequence[FacadePlan],
+    paths: BaseGeometry,
+    seed: int,
+) -> tuple[Model, Counter[str]]:
+    """Returns the model of a dressed building, and counts of random details."""
+    structure, style = some.one.structure, some.style
+    footprint = structure.model.footprint
+    out = Assembly(Site(Polygon(), structure.name), some.rng)
+    out.paint(
+        body=style.wall,
+        doors=style.door,
+        frames=style.frame,
+        glass=style.glass,
+        roof=style.roof,
+        sign=style.sign,
+        trim=style.trim,
+    )
+    planned = {one.tobytes() for plan in plans for one in plan.panel.triangles}
+    bare = [one for one in some.walls if one.tobytes() not in planned]
+    walls = np.array(bare).reshape(-1, 3, 3)
+    out.add_to("body", to_mesh(walls), to_mesh(some.rest))
+    out.add_to("roof", to_mesh(some.roof))
+    counts: Counter[str] = Counter()
+    for plan in plans:
+        # The name must not depend on the map's origin.
+        panel = plan.panel
+        heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
+        wall = f"wall {panel.length:.1f} {heading:.0f}"
+        rng = random_generator(seed, wall, some.one.draw_name)
+        counts += facade_pieces.add_facade(out, plan, rng)
+    has_own_roof = some.one.lod >= _LOD_WITH_ROOF or not len(some.roof)
+    if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
+        facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
+    counts["roof equipment and chimneys"] = len(out.parts)
+    return out.finish(footprint), counts
+
+
+def _plan_facades(
+    bare: Sequence[BareBuilding],
+    drives: Sequence[WaypointRoute],
+    streets: Sequence[Street],
+    ground: Ground,
+    views: DriveViews,
+    paving: UpperSides,
+) -> dict[int, list[FacadePlan]]:
+    """Returns number of a building -> plans of its walls to dress."""
+    walls = [
+        some.walls if some.one.lod < _LOD_WITH_WINDOWS else np.zeros((0, 3, 3))
+        for some in bare
+    ]
+    panels, to_drive = _visible_panels(walls, views)
+    if not panels:
+        return {}
+    before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
+    heights = ground.height(before[:, :2])
+    plans = [
+        facade_pieces.plan_facade(
+            panel,
+            bare[panel.building].style,
+            bare[panel.building].base,
+            float(height),
+            float(distance),
+        )
+        for panel, height, distance in zip(
+            panels, heights, to_drive, strict=True
+        )
+    ]
+    solids = [some.one.triangles for some in bare]
+    upper = UpperSides(np.concatenate(solids))
+    probes = [plan.probes() for plan in plans]
+    hidden = upper.hides(np.concatenate(probes))
+    ends = np.cumsum([len(some) for some in probes])[:-1]
+    plans = [
+        plan.without(some)
+        for plan, some in zip(plans, np.split(hidden, ends), strict=True)
+    ]
+    lines = [street.line for street in streets]
+    ways = MultiLineString([*lines, *(drive.path for drive in drives)])
+    to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for k, plan in enumerate(plans):
+        groups[plan.panel.building].append(k)
+    for members in groups.values():
+        possible = [k for k in members if plans[k].on_street]
+        # The wall with the building's door.
+        front = min(possible, key=lambda k: (to_way[k], k), default=None)
+        for k in members:
+            plan = plans[k]
+            if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
+                plan = facade_pieces.with_shops(plan, paving)
+            if k == front:
+                plan = facade_pieces.with_doors(plan, paving)
+            plans[k] = plan
+    return {
+        number: [plans[k] for k in members]
+        for number, members in groups.items()
+    }
+
+
+def _visible_panels(
+    walls: Sequence[np.ndarray], views: DriveViews
+) -> tuple[list[Panel], np.ndarray]:
+    """Returns the plane walls visible from drives, and their distances [m].
+
+    The nearest walls come first, as many as the limit of triangles allows.
+    `walls` has the vertical triangles (M, 3, 3) of each building [m].
+    """
+    panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
+    panels = [panel for panel in panels if panel.is_plane]
+    distances = views.distances(panels, _WALLS_WITHIN)
+    order = np.argsort(distances, kind="stable")
+    order = order[distances[order] <= _WALLS_WITHIN]
+    cost = [
+        _TRIANGLES_OF_WALL
+        + _TRIANGLES_OF_OPENING * panel.length * panel.height / 9.0
+        for panel in (panels[k] for k in order)
+    ]
+    order = order[np.cumsum(cost) <= _MOST_TRIANGLES]
+    return [panels[k] for k in order], distances[order]
