@@ -51,7 +51,8 @@ from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.lidar.config import WeatherConfig
-from evaluation.map_update.sessions import Label, read_session
+from evaluation.map_update.labels import Label
+from evaluation.map_update.sessions import read_session
 from evaluation.methods.layered_overlap import (
     LayeredOverlap,
     LayeredOverlapConfig,

@@ -408,7 +408,7 @@ def _write_maps(
     with uninterrupted():
         from cns_drake.base.files import check_new_folder
         from cns_drake.studies.map_truth import open_labelled, write_truth
-        from evaluation.map_update.sessions import Label
+        from evaluation.map_update.labels import Label
 
     check_new_folder(output)
     first, second = open_labelled(a), open_labelled(b)
@@ -451,7 +451,8 @@ def _write_sessions(
         from cns_drake.base.drives.drive import check_same_world
         from cns_drake.base.files import draft_folder
         from evaluation.drives import open_drive
-        from evaluation.map_update.sessions import SIDES, write_session
+        from evaluation.map_update.labels import SIDES
+        from evaluation.map_update.sessions import write_session
 
     drives = [
         open_drive(Path(path), values["lidar"], values["columns"])

@@ -42,19 +42,15 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    describe_scenario,
-    load_scenario,
-)
+from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.exact_overlap import Sight, sights
 from evaluation.drives.sampling import sample_frames
+from evaluation.map_update.labels import SIDES, Label
 from evaluation.map_update.sessions import (
-    SIDES,
     SPACING,
-    Label,
     Pair,
     Session,
     write_labels,
@@ -268,7 +264,7 @@ def label_points(
 ) -> np.ndarray:
     """Returns the exact label of each point of a drive's map, (N,) uint8.
 
-    The labels are values of `evaluation.map_update.sessions.Label`. They state
+    The labels are values of `evaluation.map_update.labels.Label`. They state
     whether the other drive observes the point and, if so, whether the world of
     the other drive has a surface there.
 

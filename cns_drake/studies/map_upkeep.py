@@ -18,19 +18,12 @@ from cns_drake.studies.map_truth import (
     simulate_labelled,
 )
 from evaluation.map_update.baselines import run_baseline
+from evaluation.map_update.labels import Label
 from evaluation.map_update.scores import Labels, nearest
-from evaluation.map_update.sessions import Label, Pair, write_session
-from evaluation.map_update.upkeep import (
-    TRUTH,
-    Updates,
-    UpkeptDrive,
-    UpkeptMap,
-)
+from evaluation.map_update.sessions import Pair, write_session
+from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptDrive, UpkeptMap
 from evaluation.study.parts import Part
-from evaluation.study.sources import (
-    DriveSource,
-    RecordingSource,
-)
+from evaluation.study.sources import DriveSource, RecordingSource
 
 # Distance driven between two scans of a map, as in the task `map` [m].
 _SPACING = 5.0

@@ -29,8 +29,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames
+from evaluation.map_update.labels import SIDES
 from evaluation.map_update.scores import Labels, nearest
-from evaluation.map_update.sessions import SIDES, Pair, Session
+from evaluation.map_update.sessions import Pair, Session
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 
 # Threshold of the baseline `distance` [m].
@@ -100,7 +101,7 @@ def by_distance(mine: Session, theirs: Session) -> np.ndarray:
 
     A point is kept if the other map has a point within 0.5 m. Otherwise it is
     gone (older map) or new (newer map); see
-    `evaluation.map_update.sessions.Label`.
+    `evaluation.map_update.labels.Label`.
 
     Args:
         mine: the map with N points, and its drive.
@@ -122,7 +123,7 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
         theirs: the other drive, with its map and scans.
 
     Returns:
-        (N,) uint8, values of `evaluation.map_update.sessions.Label`.
+        (N,) uint8, values of `evaluation.map_update.labels.Label`.
     """
     unobserved, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
@@ -215,7 +216,7 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     A point is gone (older map) or new (newer map) if the M3C2 distance of the
     two maps there exceeds its level of detection and 0.1 m. Otherwise it is
     kept, or unobserved if a map lacks points to measure this distance. See
-    `evaluation.map_update.sessions.Label`.
+    `evaluation.map_update.labels.Label`.
 
     Args:
         mine: the map with N points, and its drive.

@@ -32,7 +32,8 @@ from scipy.spatial import KDTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from evaluation.map_update.sessions import SIDES, Label, Pair
+from evaluation.map_update.labels import SIDES, Label
+from evaluation.map_update.sessions import Pair
 from evaluation.map_update.structures import verdicts
 
 _CLASSES = {

@@ -9,7 +9,8 @@ import numpy as np
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.files import is_there
 from cns_drake.base.number_text import whole_number
-from evaluation.map_update.sessions import MOVES, SIDES, Label, Pair
+from evaluation.map_update.labels import MOVES, SIDES, Label
+from evaluation.map_update.sessions import Pair
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def verdicts(
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
         labels: (N,) label of each point, see
-            `evaluation.map_update.sessions.Label`.
+            `evaluation.map_update.labels.Label`.
         side: `A` if the map is the older one, `B` if it is the newer one.
 
     Returns:

@@ -91,6 +91,7 @@ def split_buildings(
 def _split_building(
     one: Imported, ground: Ground, seed: int, known: Style | None = None
 ) -> BareBuilding:
+    """Returns a building, split; `known` is the style of its original."""
     surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
     for part in one.structure.model.parts:
         if isinstance(part.shape, MeshShape):
