@@ -15,7 +15,6 @@ import csv
 import hashlib
 import io
 import itertools
-import math
 from pathlib import Path
 import re
 import subprocess
@@ -32,7 +31,6 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.signal import welch
 from scipy.spatial import cKDTree
-from scipy.special import stdtrit
 import yaml
 
 from cns_drake import Scenario, load_scenario, make_station
@@ -430,10 +428,10 @@ def upkeep(
         finding: title of the picture.
     """
     with open(ROOT / "docs/notes/upkeep.csv", newline="") as stream:
-        rows = [
-            row
-            for row in csv.DictReader(stream)
-            if row["experiment"] == experiment
+        lines = [
+            line
+            for line in csv.DictReader(stream)
+            if line["experiment"] == experiment
         ]
     figure = Figure(
         figsize=(_WIDTH, 2.2 + 0.7 * len(conditions)), layout="constrained"
@@ -441,26 +439,26 @@ def upkeep(
     shown: set[str] = set()
     grid = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (name, wanted) in zip(grid, panels.items(), strict=True):
-        found: dict[tuple[str, str], list[float]] = {}
-        for row in rows:
-            if wanted.items() <= row.items():
-                place = row["condition"], row["method"]
-                found.setdefault(place, []).append(float(row["value"]))
-        here = [one for one in METHOD_STYLES if any(one == m for _, m in found)]
+        of_condition: dict[str, list[Row]] = {}
+        for line in lines:
+            if wanted.items() <= line.items():
+                row = _realisation(line)
+                of_condition.setdefault(line["condition"], []).append(row)
+        found = {
+            condition: summaries.ranking(rows)[0]
+            for condition, rows in of_condition.items()
+        }
+        measured = {one.method for some in found.values() for one in some}
+        here = [one for one in METHOD_STYLES if one in measured]
         shown.update(here)
-        for (condition, method), values in found.items():
-            colour = METHOD_STYLES[method][0]
-            y = list(conditions).index(condition)
-            y += 0.7 * ((here.index(method) + 0.5) / len(here) - 0.5)
-            mean = float(np.mean(values))
-            margin = float(
-                stdtrit(len(values) - 1, 0.975)
-                * np.std(values, ddof=1)
-                / math.sqrt(len(values))
-            )
-            ends = np.clip([mean - margin, mean + margin], 0.0, 1.0)
-            axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
-            axes.plot(mean, y, color=colour, marker="o", ms=5)
+        for condition, some in found.items():
+            for one in some:
+                colour = METHOD_STYLES[one.method][0]
+                y = list(conditions).index(condition)
+                y += 0.7 * ((here.index(one.method) + 0.5) / len(here) - 0.5)
+                ends = one.interval.low, one.interval.high
+                axes.plot(ends, [y, y], color=colour, lw=3, alpha=0.45)
+                axes.plot(one.value, y, color=colour, marker="o", ms=5)
         axes.set(xlim=(-0.03, 1.03), ylim=(len(conditions) - 0.5, -0.5))
         axes.set_xticks((0.0, 0.5, 1.0), ("0", "0.5", "1"))
         axes.set_yticks(range(len(conditions)), list(conditions.values()))
@@ -479,6 +477,27 @@ def upkeep(
         loc="outside lower center", ncols=3, frameon=False,
     )  # fmt: skip
     figure.savefig(path, dpi=_DPI)
+
+
+def _realisation(line: Mapping[str, str]) -> Row:
+    """Returns a line of `upkeep.csv` as a row whose city is its realisation.
+
+    Realisations of cities are the units of a ranking's intervals.
+    """
+    return Row(
+        experiment=line["experiment"],
+        map=f"{line['map']} {line['seed']}",
+        database="",
+        query=line["query"],
+        seed=int(line["seed"]),
+        factors={},
+        task=line["task"],
+        method=line["method"],
+        gate=line["gate"] == "1",
+        protocol="",
+        metric=line["metric"],
+        value=float(line["value"]),
+    )
 
 
 def ladder(path: Path) -> None:

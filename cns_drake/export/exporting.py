@@ -12,7 +12,7 @@ from pathlib import Path
 import shutil
 
 from cns_drake.base import files
-from cns_drake.base.drives.deskewing import deskew
+from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing, track
@@ -119,13 +119,7 @@ def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:
     """Yields notes about how a drive is read and written."""
     if layout.scan_files is None:
         return
-    for note in drive.notes:
-        if drive.distortion_note == note:
-            note = (
-                f"{drive.name}: taken while the LiDAR moved; the motion is"
-                " taken out, and points are written as at the scan's stamp"
-            )
-        yield note
+    yield from deskewed_notes(drive)
     scan = drive.scan(0)
     if (
         layout.has_labels  # Only KITTI's has them.
@@ -189,11 +183,7 @@ def _write_drive(
         for frame, stamp_ns in enumerate(
             track(stamps_ns, "writing scans", len(stamps_ns), "scans")
         ):
-            scan = (
-                drive.scan(frame)
-                if drive.distortion_note is None
-                else deskew(drive, frame)
-            )
+            scan = deskewed_scan(drive, frame)
             with value_errors(f"{drive.name}: scan {frame}"):
                 made = layout.scan_files(drive, frame, stamp_ns, scan)
             for name, content in made.items():

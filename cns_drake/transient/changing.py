@@ -24,10 +24,7 @@ from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient import putting_up
-from cns_drake.transient.ground_surface import (
-    GROUND_CLASSES,
-    GroundSurface,
-)
+from cns_drake.transient.ground_surface import GROUND_CLASSES, GroundSurface
 from cns_drake.transient.height_limit import limit_heights
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.scene_editing import (

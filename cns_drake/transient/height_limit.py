@@ -7,14 +7,11 @@ from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.math import RigidTransform
 from shapely.geometry import box
 
-from cns_drake.city.geometry import FOLDER, Mesh, MeshShape, Model, Part
+from cns_drake.city.geometry import OBJECT_MESHES, Mesh, MeshShape, Model, Part
 from cns_drake.city.growth.lowering import STOREY, lowered, top_of
 from cns_drake.scene.surfaces import tessellate
 from cns_drake.transient.scene_editing import SceneEditing, Surroundings, draws
-from cns_drake.transient.world_structures import (
-    LoadedPart,
-    LoadedStructure,
-)
+from cns_drake.transient.world_structures import LoadedPart, LoadedStructure
 
 _CAUSE = "height_limit"
 
@@ -98,7 +95,7 @@ def _file_of(part: LoadedPart, editing: SceneEditing) -> str:
     shape = editing.shape(part)
     if isinstance(shape, DrakeMesh) and shape.source().is_path():
         name = Path(shape.source().path()).stem
-        if (FOLDER / f"{name}.obj").is_file():
+        if (OBJECT_MESHES / f"{name}.obj").is_file():
             return name
     return ""
 

@@ -16,20 +16,14 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import product
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry import FOLDER, Mesh, structures
+from cns_drake.city.geometry import OBJECT_MESHES, Mesh, structures
 from cns_drake.scene.labels import MAX_INSTANCE
-from cns_drake.scene.structure_table import (
-    StructureEntry,
-    StructureTable,
-)
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.obstacles import Obstacles
-from cns_drake.transient.world_structures import (
-    LoadedPart,
-    LoadedStructure,
-)
+from cns_drake.transient.world_structures import LoadedPart, LoadedStructure
 
 # Snow farther from the drive than this would hardly be visible to a LiDAR [m].
 _NEAR = 120.0
@@ -579,7 +573,7 @@ def _model_shape(
         return geometry.Cylinder(shape.radius, shape.length)
     if isinstance(shape, structures.SphereShape):
         return geometry.Sphere(shape.radius)
-    shared = FOLDER / f"{shape.mesh}.obj"
+    shared = OBJECT_MESHES / f"{shape.mesh}.obj"
     if shared.is_file():
         return geometry.Mesh(str(shared), shape.scale)
     mesh = meshes[shape.mesh]

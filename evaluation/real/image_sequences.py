@@ -17,9 +17,8 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from cns_drake.base.drives.deskewing import deskew
+from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
 from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, user_errors
 from cns_drake.base.jobs.file_digests import file_digests
@@ -173,19 +172,13 @@ def write_images(drive: Drive, folder: Path, on_note: OnNote) -> None:
     Raises:
         InputError: a scan cannot be read, or the folder cannot be written.
     """
-    moved = drive.distortion_note if isinstance(drive, McapDrive) else None
-    for text in drive.notes:
-        if text == moved:
-            text = (
-                f"{drive.name}: taken while the LiDAR moved; the motion is"
-                " taken out"
-            )
-        on_note(text)
+    for note in deskewed_notes(drive):
+        on_note(note)
     with draft_folder(folder) as draft, user_errors(folder):
         (draft / _IMAGES).mkdir(parents=True)
         number = len(drive)
         for frame in track(range(number), "making images", number, "images"):
-            scan = deskew(drive, frame) if moved else drive.scan(frame)
+            scan = deskewed_scan(drive, frame)
             image = Image.fromarray(count_image(xyz(scan)))
             image.save(draft / _IMAGES / f"{frame:06d}.png")
         rows = drive.X_WS[:, :3].reshape(-1, 12).tolist()

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 
 # Number of poses before and after a scan from which its motion is interpolated.
@@ -15,6 +16,35 @@ _REACH = 4
 # Largest ratio between the duration of a scan and the time between scans. The
 # two are about equal; in a wrong unit of time they differ by a factor of 1,000.
 _MOST_OFF = 300.0
+
+
+def _known_distortion(drive: Drive) -> str | None:
+    """Returns the note on a drive's motion distortion; None if none is known.
+
+    Only a simulated recording states whether its scans are distorted.
+    """
+    return drive.distortion_note if isinstance(drive, McapDrive) else None
+
+
+def deskewed_notes(drive: Drive) -> list[str]:
+    """Returns the notes on a drive whose scans `deskewed_scan` reads."""
+    known = _known_distortion(drive)
+    taken_out = (
+        f"{drive.name}: taken while the LiDAR moved; the motion is taken out,"
+        " and all points are as at the scan's stamp"
+    )
+    return [taken_out if note == known else note for note in drive.notes]
+
+
+def deskewed_scan(drive: Drive, index: int) -> np.ndarray:
+    """Returns a scan, without its motion distortion if that is known.
+
+    Raises:
+        InputError: see `deskew`.
+    """
+    if _known_distortion(drive) is None:
+        return drive.scan(index)
+    return deskew(drive, index)
 
 
 def deskew(drive: Drive, index: int) -> np.ndarray:
