@@ -92,6 +92,7 @@ from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
 from evaluation.study.tasks.task import (
+    OPENING_COST,
     Jobs,
     NamedDrive,
     Pair,
@@ -111,8 +112,8 @@ TASKS: Mapping[str, type[Task]] = {
         SeenTask,
     )
 }
-# Expected time to update a map by one drive [s].
-_UPKEEP_COST = 40.0
+# Expected time to update a map by a usual drive, once it is open [s].
+_UPKEEP_COST = 60.0
 # Fields of a database of several recordings.
 _OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")
 # Tables that earlier versions wrote.
@@ -638,7 +639,7 @@ class Study:
             job_name(part),
             MakePart(part, update_maps, (sources, maintain)),
             tuple(need for one in drives for need in one.needs),
-            sum(_UPKEEP_COST * one.share for one in drives),
+            sum(OPENING_COST + _UPKEEP_COST * one.share for one in drives),
         )
         self._upkeep[job.name] = job
         return [

@@ -101,6 +101,8 @@ class Report:
             city).
         recognitions: place recognition of all pairs without their controls, and
             of drives compared with themselves.
+        sessions: place recognition in databases of several drives through one
+            stage, each database beside that of the first of its drives.
         differences: AUC differences between methods.
         evidence: (database, query) -> evidence on why the best-scoring place
             of a query is wrong.
@@ -121,6 +123,7 @@ class Report:
     changes: list[ChangeResult] = field(default_factory=list)
     pairs: list[conclusions.Controlled] = field(default_factory=list)
     recognitions: list[PlaceOutcome] = field(default_factory=list)
+    sessions: list[PlaceOutcome] = field(default_factory=list)
     differences: Sequence[result_tables.MethodDifference] = ()
     evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
     tracks: dict[str, result_tables.DriveTrack] = field(default_factory=dict)
@@ -371,6 +374,7 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
                 [*results, *report.repeated], report.reference
             )
         ],
+        "sessions": [result_tables.sessions_table(report.sessions)],
     }
 
 

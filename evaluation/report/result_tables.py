@@ -452,6 +452,21 @@ def pose_table(results: Sequence[PlaceOutcome]) -> Table:
     )
 
 
+def sessions_table(results: Sequence[PlaceOutcome]) -> Table:
+    """Returns a table of databases of several drives, for print."""
+    return Table.of(
+        by_pair_and_method(results),
+        {
+            **_SHOWN,
+            "places": lambda r: len(r.place_frames),
+            "AUC": lambda r: r.by_mode["all"].auc,
+            "strict": lambda r: r.by_mode["all"].auc_strict,
+            "R@1": lambda r: r.by_mode["all"].recall_at_1,
+        },
+        CAPTIONS["sessions"],
+    )
+
+
 def pose_error_numbers(results: Sequence[PlaceOutcome]) -> Table:
     """Returns a table of the errors of estimated poses, for `poses.csv`."""
     return Table.of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -227,10 +227,11 @@ class StagesReport:
             self.protocol.to_text(),
         ]
         results, _ = self.engine.write_tables()
+        single = {one.name for one in self.recordings}
         shown = (
             row
             for row in results.rows
-            if row.database != row.query
+            if row.database in single - {row.query}
             and (row.task == "change" or row.gate == self.protocol.gate)
         )
         report.results = Results(results.factors, tuple(shown))
@@ -294,6 +295,8 @@ class _CityReport:
                 with_itself=with_itself,
             )
         )
+        self._sessions = list(self._pairs_of_sessions())
+        measured += self._sessions
         self._measured = {
             (*one.names, one.factors[STAGE]): one for one in measured
         }
@@ -333,6 +336,25 @@ class _CityReport:
     def _own(self, pair: Recordings, stage: str = OWN) -> Pair | None:
         """Returns a pair as it is measured, or (stage `last`) its control."""
         return self._measured.get((pair[0].name, pair[1].name, stage))
+
+    def _pairs_of_sessions(self) -> Iterator[Pair]:
+        """Yields a pair for each earlier stage with several drives.
+
+        The database of the pair consists of the places of all these drives.
+        The query is the drive through the last stage.
+        """
+        for first, _ in self._city.change_pairs():
+            drives = self._city.sessions(first.stage)
+            if len(drives) == 1:
+                continue
+            condition = RecordedCondition(
+                {STAGE: OWN}, OWN, False, self._study.protocol, drives
+            )
+            names = "+".join(one.name for one in drives)
+            for pair in recorded_comparisons(
+                self._city, [condition], _SEED, lambda text: None
+            ):
+                yield replace(pair, names=(names, pair.query.name))
 
     def _further(self) -> dict[str, tuple[Further, ...]]:
         """Returns drive -> its descriptors that second runs need."""
@@ -440,6 +462,28 @@ class _CityReport:
                 report.tracks[name] = result_tables.DriveTrack(
                     drive.stamps_ns, drive.X_WS
                 )
+        for together in self._sessions:
+            number = 1 + len(together.beside)
+            first = next(
+                one
+                for one, _ in self._city.change_pairs()
+                if one.name == together.database.name
+            )
+            pair = first, self._city.last
+            own = self._own(pair)
+            assert own is not None
+            report.sessions += self._outcomes(pair, own.parts["place"])
+            report.sessions += [
+                replace(
+                    one,
+                    pair=(
+                        city.name,
+                        f"{first.stage} ({number} drives)",
+                        one.pair[2],
+                    ),
+                )
+                for one in self._outcomes(pair, together.parts["place"])
+            ]
         if compared:
             stem = self._files.figures / figures.curves_stem(city)
             draw_pr_curves(city.name, compared, stem)

@@ -4,7 +4,7 @@ import numpy as np
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 
-ROUTES = {"a": {"lanes": [1]}, "b": {"lanes": [2]}}
+ROUTES = {"a": {"lanes": [1]}, "b": {"lanes": [2]}, "c": {"lanes": [2, 1]}}
 
 
 def make_town(stage):

@@ -27,7 +27,7 @@ class ChangeTask(Task):
             positive(value, where)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        if pair.closes_loops:
+        if pair.closes_loops or pair.is_composed:
             return ()
         needs: list[str] = []
         maps = tuple(

@@ -113,9 +113,12 @@ class LocaliseTask(Task):
         spacing = self.settings["spacing"] or pair.protocol.query_spacing
         drives = pair.database, *pair.beside
         database = pair.database.source
+        openings = 2
         if pair.is_composed:
             sources = tuple(one.source for one in drives)
             database = JoinedSource(sources, pair.keep)
+            # A joined drive opens its drives for their poses, then for scans.
+            openings = 1 + 2 * len(drives)
         arguments = (
             database,
             pair.query.source,
@@ -127,7 +130,7 @@ class LocaliseTask(Task):
             self.settings["odometry_drift"],
             jobs.processes,
         )
-        cost = OPENING_COST + _QUERIES_COST * pair.query.share
+        cost = openings * OPENING_COST + _QUERIES_COST * pair.query.share
         cost += sum(_MAP_COST * one.share for one in drives)
         needs = [need for one in (*drives, pair.query) for need in one.needs]
         found = jobs.add(part, measure_localisation, arguments, needs, cost)

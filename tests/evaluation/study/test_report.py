@@ -555,6 +555,42 @@ def test_drives_that_never_meet(tmp_path):
 
 
 @pytest.mark.usefixtures("unrendered_figures")
+def test_several_drives_of_a_stage_are_a_database(tmp_path, few_methods):
+    """A control, which follows the route of another stage, is none of them."""
+    for name, stage, route in (
+        ("town_01", "01", "a"),
+        ("town_01_again", "01", "c"),
+        ("town_01_control", "01", "b"),
+        ("town_02", "02", "b"),
+    ):
+        drive(tmp_path / "in" / name, stage, route, city="town")
+    path = studies.report(tmp_path / "in", tmp_path / "out")
+    rows = read_csv(path.with_name("results.csv"))
+    databases = {row["database"] for row in rows if row["query"] == "town_02"}
+    assert databases == {"town_01", "town_01+town_01_again"}
+    found = {
+        (row["database"], row["metric"]): float(row["value"])
+        for row in rows
+        if (row["query"], row["method"]) == ("town_02", few_methods[0])
+        and (row["task"], row["gate"]) == ("place", "0")
+        and row["both.stage"] == "own"
+    }
+    alone, together = ("town_01", "town_01+town_01_again")
+    assert found[together, "with_match"] >= found[alone, "with_match"]
+    assert (together, "kept") not in found
+    for name in ("report.md", "report.html"):
+        text = path.with_name(name).read_text()
+        assert "Several drives in a database" in text
+        assert "01 (2 drives) → 02" in text
+    # The other tables and the ranking compare single drives.
+    pairs = {
+        row["DB → query"]
+        for row in read_csv(path.with_name("place_recognition.csv"))
+    }
+    assert pairs == {"01 → 02", "02 → 01"}
+
+
+@pytest.mark.usefixtures("unrendered_figures")
 def test_loops_are_in_the_table_of_results(tmp_path, few_methods):
     """A drive beside itself has its rows, which the ranking leaves out."""
     protocol = RetrievalProtocol(exclude_recent=0.04, radius=15.0)

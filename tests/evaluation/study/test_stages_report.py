@@ -21,7 +21,7 @@ FAMILY = [
     info("metropolis_02", "02", "b", needs=("metropolis_02",)),
     info("metropolis_04", "04", "c", needs=("metropolis_04",)),
     info("metropolis_01_stage_04", "04", "a"),
-    # The drive is through a stage, but on a route without a pair.
+    # A second drive through a stage, on a route of its own.
     info("metropolis_walk", "02", "d"),
 ]
 
@@ -34,6 +34,7 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
         "features of metropolis_02": ("metropolis_02",),
         "features of metropolis_04": ("metropolis_04",),
         "features of metropolis_01_stage_04": (),
+        "features of metropolis_walk": (),
     }
     roles = {name: sorted(job.step.roles) for name, job in features.items()}
     assert roles == {
@@ -41,6 +42,7 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
         "features of metropolis_02": ["places"],
         "features of metropolis_04": ["queries"],
         "features of metropolis_01_stage_04": ["places"],
+        "features of metropolis_walk": ["places"],
     }
     assert not any(tmp_path.iterdir())
 
@@ -76,9 +78,19 @@ def test_pairs_wait_for_their_features(tmp_path):
     own = job_of(jobs, "place", "metropolis_01", "metropolis_04")
     explained = jobs["explain metropolis_01 > metropolis_04"]
     assert explained.needs == (own.name,)
-    # Four features, one city, two changes; two pairs and a control, each with
-    # its change; two pairs are explained.
-    assert len(jobs) == 4 + 1 + 2 + 2 * 3 + 2
+    # Five features, one city, two changes; two pairs and a control, each with
+    # its change; the two drives of stage 02; two pairs are explained.
+    assert len(jobs) == 5 + 1 + 2 + 2 * 3 + 1 + 2
+    (together,) = (
+        one
+        for one in jobs.values()
+        if "features of metropolis_walk" in one.needs
+    )
+    assert together.needs == (
+        "features of metropolis_02",
+        "features of metropolis_04",
+        "features of metropolis_walk",
+    )
 
 
 def job_of(jobs, task, database, query):
