@@ -16,8 +16,8 @@ _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 def leave_out_folder(search_path: list[str]) -> None:
     """Removes the current folder from a search path for modules.
 
-    `python -m` puts the current folder there. If it contains this package, it
-    is not removed.
+    `python -m` adds the current folder to the search path. A current folder
+    that contains this package is not removed.
 
     Args:
         search_path: `sys.path`, which is changed in place.

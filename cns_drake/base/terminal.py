@@ -309,7 +309,7 @@ def resumable() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as error:
-        told = "What is finished is kept; the same command goes on from there."
+        told = "Finished work is kept. To continue, run the same command again."
         # Work that goes on may be a part of other such work.
         if told not in error.args:
             note(told)

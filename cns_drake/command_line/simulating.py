@@ -35,8 +35,9 @@ DriveNames = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="NAME",
-        help="Names of shipped drives, or scenario files; by default all "
-        "shipped drives, or none with --vary.",
+        help="Names of shipped drives, or scenario files. If you name none, "
+        "all shipped drives are recorded, or with --vary only the drives of "
+        "the experiment.",
     ),
 ]
 Fog = Annotated[

@@ -96,8 +96,8 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
         profile: speeds of the drive along the path.
 
     Returns:
-        (N,) path parameters [m], as `make_time_scaling` takes them: one for
-        each `KNOT_PERIOD`. The first few and the last few are equal, because
+        (N,) path parameters [m], one for each `KNOT_PERIOD`, for
+        `make_time_scaling`. The first few and the last few are equal, because
         the drive starts and ends at rest.
     """
     u, speed, _ = profile

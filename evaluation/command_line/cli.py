@@ -565,7 +565,7 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     if report.control is not None and report.control_names is not None:
         names = " <-> ".join(report.control_names)
         value = number(report.control.symmetric)
-        yield "TCR_sym of the routes alone", f"{value}  ({names})"
+        yield "TCR_sym of only the routes", f"{value}  ({names})"
 
 
 def _recognition_rows(

@@ -231,16 +231,19 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
 
     yield "method", values["method"]
     yield "map <- query", f"{values['map']} <- {values['query']}"
-    yield ("start", f"{values['start']:g} m, {values['start_turn_deg']:g} deg")
+    yield (
+        "initial guess",
+        f"{values['start']:g} m, {values['start_turn_deg']:g} deg",
+    )
     if "within_03m" in values:
-        yield "way in the map", f"{values['way']:.0f} m"
+        yield "path in the map", f"{values['way']:.0f} m"
         yield "  within 0.3 m", text("within_03m")
         yield (
             "  lost",
             f"{text('lost_per_km')} a kilometre ({values['lost']} times,"
             f" {values['lost_for_good']} for good)",
         )
-        yield "  found again after", f"{text('back_after_median')} m"
+        yield "  recovered after", f"{text('back_after_median')} m"
     yield (
         "scans",
         f"{values['queries']}, {values['without_pose']} without a pose",
@@ -259,13 +262,13 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
         ", ".join(text(f"{one}_median") for one in ("along", "across", "up")),
     )
     yield (
-        "AUROC of the own score",
+        "AUROC of the estimator's score",
         f"{text('auroc_own_score')}  (fit {text('auroc_fit')}, residual"
         f" {text('auroc_residual')}, Hessian {text('auroc_hessian')})",
     )
     yield (
-        "wrong, but believed",
-        f"{text('confident_wrong')} of all, {text('confident_of_wrong')} of"
-        " the wrong",
+        "wrong, but confident",
+        f"{text('confident_wrong')} of all results,"
+        f" {text('confident_of_wrong')} of the wrong ones",
     )
-    yield "scan without a map", text("unmapped_mean")
+    yield "share of a scan that the map lacks", text("unmapped_mean")

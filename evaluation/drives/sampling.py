@@ -1,7 +1,8 @@
 """Places along a drive, and the clouds seen there.
 
 - Places are d metres apart along the path: a frame is a place if it is the
-  first frame after a multiple of d. The first frame of a drive is a place.
+  first frame at or beyond a multiple of d. The first frame of a drive is a
+  place.
 - Points are limited to a range, 100 m in the paper. The range of a point is the
   greatest absolute value of its x, y and z in the frame of the sensor.
 """

@@ -53,9 +53,10 @@ class ScanContextConfig(MethodConfig):
 
     Attributes:
         variant: kind of context (descriptor): polar or Cartesian (cart). The
-            augmented kinds add copies of each place to the database: for
-            `augmented-polar`, as seen from `lateral_shift` to the left and to
-            the right; for `augmented-cart`, as seen by a car in the opposite
+            augmented kinds add copies of each place to the database:
+            `augmented-polar` adds two copies, as seen from positions at the
+            distance `lateral_shift` to the left and to the right;
+            `augmented-cart` adds one copy, as seen by a car in the opposite
             direction. The default is the one that [T] calls A-PC.
         voxel_size: side of the voxels to which each cloud is first downsampled
             [m]; [T] 0.5.

@@ -85,7 +85,8 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
 def image_table(scan: np.ndarray) -> np.ndarray:
     """Returns the bird's-eye image of a scan as columns of points.
 
-    From the columns of an image, the result is the same columns.
+    A scan that was itself made from such an image gives the same columns of
+    points again.
 
     Args:
         scan: as for `scan_table`.

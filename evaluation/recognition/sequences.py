@@ -22,11 +22,11 @@ def along_the_way(
     """Returns scores (Q, D) that are averaged along the path.
 
     The new score of query q and place p is the mean of their own score and of
-    scores of earlier queries. For two drives in the same direction, an earlier
-    query contributes its score for the place at the distance d before p, where
-    d is the distance from the earlier query to q. For two drives in opposite
-    directions, the place at the distance d after p is used instead. The new
-    score is the better of the two means. Distances are along the paths.
+    one score of each earlier query. Let d be the distance from an earlier query
+    to q. If both drives go in the same direction, the earlier query contributes
+    its score for the place at the distance d before p; if the drives go in
+    opposite directions, its score for the place at the distance d after p. The
+    new score is the better of these two means. Distances are along the paths.
 
     An earlier query is left out of the mean if it has no candidates, or if the
     database's path ends within the distance d from p. If an earlier query has

@@ -120,7 +120,7 @@ class Engine:
         told = forecast(jobs, cluster, least=_LONG)
         if told is not None:
             self.on_note(
-                f"{told}; the same command goes on after an interruption"
+                f"{told}; after an interruption, run the same command again"
             )
         run_jobs(jobs, cluster)
         doing("writing the tables and the page")

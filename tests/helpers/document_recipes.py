@@ -248,7 +248,7 @@ RECIPES = {
         ".venv/bin/cns-eval tcr output/metropolis_01",
         changes=(_FIRST, _LAST, ("stage_04", "stage_02")),
         after=("own city",),
-        prints=("TCR_sym of the routes alone", "AUC"),
+        prints=("TCR_sym of only the routes", "AUC"),
     ),
     "odometry": Recipe(
         "base: metropolis_04\nimu:",

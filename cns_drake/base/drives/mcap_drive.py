@@ -56,8 +56,9 @@ class McapDrive(Drive):
 
     Opening reads the file's index; reading a scan reads one chunk. The first
     use of stamps or poses reads the chunks that hold odometry. If the file does
-    not state that the log times are the stamps, it also reads all clouds. In
-    recordings of cns-drake, each chunk holds one topic, and the file states it.
+    not state that log times equal stamps, the first use of stamps also reads
+    all clouds. Recordings of cns-drake contain this statement, and each of
+    their chunks holds one topic.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):

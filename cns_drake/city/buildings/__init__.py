@@ -2,8 +2,8 @@
 
 An archetype is a kind of building. `archetypes.yaml` contains the limits of
 size and the colours of each archetype, and a subclass of `Building` draws and
-builds it. To add an archetype, write both, and add the class to `BUILDERS`.
-`sample` returns one building:
+builds it. To add an archetype, write an entry of `archetypes.yaml` and a
+subclass, and add the subclass to `BUILDERS`. `sample` returns one building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")

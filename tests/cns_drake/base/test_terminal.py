@@ -93,7 +93,7 @@ def test_an_interrupt_says_what_goes_on(capsys):
         terminal.resumable(),
     ):
         raise KeyboardInterrupt
-    assert capsys.readouterr().err.count("the same command goes on") == 1
+    assert capsys.readouterr().err.count("run the same command again") == 1
 
 
 @pytest.mark.parametrize("columns", [60, 120, 200])

@@ -98,7 +98,7 @@ def test_a_long_study_says_so_before_its_parts_are_there(
         protocol={"base": "recorded", "query_spacing": 5},
     )
     measure(wanted, tmp_path, on_note=notes.append)
-    assert any("the same command goes on" in note for note in notes)
+    assert any("run the same command again" in note for note in notes)
 
 
 def contents(folder):
