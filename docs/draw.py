@@ -696,17 +696,20 @@ def drives(path: Path, city: str) -> None:
     draw_drives({s.name.replace("_", " "): s for s in found}, path)
 
 
-def towns(path: Path, files: Sequence[str], options: str = "") -> None:
-    """Draws imported files from the air, side by side."""
+def towns(
+    path: Path, files: Sequence[str], names: Sequence[str], options: str = ""
+) -> None:
+    """Draws imported files from the air in clear air, side by side."""
     pictures = []
-    for file in files:
+    for file, name in zip(files, names, strict=True):
         with tempfile.TemporaryDirectory() as draft:
             folder = _imported(file, options, draft)
             drive = load_scenario(folder.drives()[-1])
             scene = StageScene(drive.world_file)
             view = air_view(SimpleNamespace(trajectory=plan_drive(drive)))
-            pictures.append(scene.photograph(view, *_TILE))
-    _tile([pictures], path)
+            picture = scene.photograph(view, 640, 480, haze_length=np.inf)
+            pictures.append(_named(picture, name, 20 * len(files)))
+    _tile([pictures], path, 640)
 
 
 def quarter(path: Path, file: str, time: float, options: str = "") -> None:
@@ -916,11 +919,11 @@ def _set_view(axes: Axes, middle: np.ndarray, span: float) -> None:
     axes.set_yticks([])
 
 
-def _named(picture: np.ndarray, name: str) -> np.ndarray:
-    """Returns a picture with its name in the corner."""
+def _named(picture: np.ndarray, name: str, size: int = 26) -> np.ndarray:
+    """Returns a picture with its name in the corner, `size` pixels high."""
     image = Image.fromarray(picture)
     ImageDraw.Draw(image).text(
-        (14, 8), name, INK, ImageFont.load_default(26),
+        (14, 8), name, INK, ImageFont.load_default(size),
         stroke_width=3, stroke_fill="white",
     )  # fmt: skip
     return np.asarray(image)

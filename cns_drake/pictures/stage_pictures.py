@@ -65,7 +65,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         InputError: a world cannot be loaded, or the picture cannot be written.
     """
     figure = Figure(
-        figsize=(2 * 6.4, len(stages) * 3.6 + 0.3), layout="constrained"
+        figsize=(3.2 * len(stages), 2 * 1.8 + 0.3), layout="constrained"
     )
     axes = figure.subplots(2, len(stages), squeeze=False)
     for column, (title, world) in enumerate(stages.items()):
@@ -74,7 +74,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         axes[0, column].set_title(title)
         pixels, distances = _scan_seen_by(scene, view)
         axes[1, column].scatter(
-            *pixels.T, c=distances, s=1.5, cmap="viridis_r", vmin=0, vmax=100,
+            *pixels.T, c=distances, s=0.4, cmap="viridis_r", vmin=0, vmax=100,
             linewidths=0, rasterized=True,
         )  # fmt: skip
         axes[1, column].set_xlim(0, _WIDTH)
@@ -83,7 +83,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     for axis in axes.flat:
         axis.set_xticks([])
         axis.set_yticks([])
-    _save(figure, path, dpi=110)
+    _save(figure, path, dpi=220)
 
 
 def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:

@@ -237,8 +237,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: see `score`.
             database: part of a database, made by `build_database`.
-            number: number of entries of `shortlist` that are compared, from the
-                first entry on.
+            number: how many entries of `shortlist` to compare, from its first.
         """
         raise NotImplementedError
 

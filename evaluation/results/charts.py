@@ -126,8 +126,9 @@ class Drawn:
     Attributes:
         message: sentence that says what the chart shows.
         figure: the drawing.
-        legend: name -> colour, line style (empty if the drawing has no line of
-            it) and marker; empty if the names stand in the drawing.
+        legend: name -> colour, line style (empty if no line has this name) and
+            marker; the mapping is empty if the drawing itself contains the
+            names.
     """
 
     message: str

@@ -245,8 +245,8 @@ class StreetPlan(_Model):
         tree_gaps: share of the trees that are left out at random.
         lamp: name of the object to use as street lamp.
         lamp_spacing: distance between neighbouring lamps [m].
-        furniture: weight of each other object, such as a bench, by name, in the
-            random choice.
+        furniture: weight of each object besides trees and lamps, such as a
+            bench, by name, in the random choice.
         furniture_spacing: smallest and largest distance between neighbouring
             pieces of furniture [m].
     """

@@ -225,9 +225,9 @@ class WayOpenings:
     ) -> BaseGeometry:
         """Returns the areas of the ways that lead through a barrier, in W.
 
-        A way leads through the barrier at a node that both have. Both openings
-        and ways that cross the barrier without a common node are counted in
-        `faults`. `course` is the line of the barrier in W [m].
+        A way leads through the barrier if way and barrier have a common node.
+        `faults` counts the openings, and also the ways that cross the barrier
+        without a common node. `course` is the line of the barrier in W [m].
         """
         on_it = self._crossings(barrier, shapely.get_coordinates(course))
         edges = {frozenset(pair) for pair in pairwise(barrier.nodes)}
