@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
+from cns_drake.base.drives.drive import check_same_world
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
@@ -342,11 +343,18 @@ class _CityReport:
 
         The database of the pair consists of the places of all these drives.
         The query is the drive through the last stage.
+
+        Raises:
+            InputError: two of these drives are in different worlds.
         """
         for first, _ in self._city.change_pairs():
             drives = self._city.sessions(first.stage)
             if len(drives) == 1:
                 continue
+            # Recordings that do not exist yet are of one map.
+            recorded = [one for one in drives if not one.needs]
+            for one in recorded[1:]:
+                check_same_world(recorded[0].source(), one.source())
             condition = RecordedCondition(
                 {STAGE: OWN}, OWN, False, self._study.protocol, drives
             )

@@ -590,6 +590,25 @@ def test_several_drives_of_a_stage_are_a_database(tmp_path, few_methods):
     assert pairs == {"01 → 02", "02 → 01"}
 
 
+def test_drives_of_a_stage_in_two_worlds_are_refused(tmp_path):
+    scans = [make_scan(np.array([[5.0, 0.0, 1.0], [9.0, 2.0, 2.0]]))]
+    for name, world in (
+        ("town_01", "map"),
+        ("town_01_again", "elsewhere"),
+        ("town_02", "map"),
+    ):
+        said = {"map": "town", "stage": name[5:7]}
+        write_recording(
+            tmp_path / "in" / name,
+            scans,
+            [yaw_pose(0.0, 0.0, 0.0, 0.0)],
+            world_frame=world,
+            attachments={"scenario.json": said},
+        )
+    with pytest.raises(InputError, match=r"^town_01_again: poses in frame"):
+        write_report(tmp_path / "in", tmp_path / "out", Cluster(1))
+
+
 @pytest.mark.usefixtures("unrendered_figures")
 def test_loops_are_in_the_table_of_results(tmp_path, few_methods):
     """A drive beside itself has its rows, which the ranking leaves out."""
