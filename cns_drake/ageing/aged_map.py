@@ -124,7 +124,7 @@ def age_map(
         )
     doing("looking for lots")
     city = AgeingCity(
-        world, rates, seed, shapely.union_all([*map(_swept, ways)])
+        world, rates, seed, shapely.union_all([*map(_swept_area, ways)])
     )
     # Today is the first stage.
     others = [year for year in wanted if year != 0]
@@ -159,7 +159,7 @@ def age_map(
             stages,
             {stage: number for stage, (number, _) in writing.sizes.items()},
             counts,
-            _changed(city),
+            _changed_places(city),
             ways[-1],
         )
         # Frees memory that the pictures need.
@@ -168,7 +168,7 @@ def age_map(
     return aged
 
 
-def _swept(trajectory: Trajectory) -> BaseGeometry:
+def _swept_area(trajectory: Trajectory) -> BaseGeometry:
     """Returns the area that the car covers on a drive, in W [m]."""
     number = max(2, int(trajectory.length / _SPACING))
     times = np.linspace(0.0, trajectory.duration, number)
@@ -429,7 +429,7 @@ def _write_drives(
         MapFolder(draft).drive(stage).write_text(text, "utf-8")
 
 
-def _changed(city: AgeingCity) -> np.ndarray:
+def _changed_places(city: AgeingCity) -> np.ndarray:
     """Returns the places (N, 3) of new buildings and additions [m]."""
     places = [
         one.xyz

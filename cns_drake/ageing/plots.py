@@ -325,7 +325,7 @@ def storey_on(
     w, d = x1 - x0, y1 - y0
     if min(w, d) < 5.0:
         return None
-    rgb = _colour(rng)
+    rgb = _draw_colour(rng)
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
     model = assemble(
         block("wall", (w, d, 3.2), (*middle, z + 1.5), rgb=rgb),
@@ -377,7 +377,7 @@ def annex_to(
         if not is_free(area):
             continue
         y += d / 2
-        rgb = _colour(rng)
+        rgb = _draw_colour(rng)
         model = assemble(
             block("wall", (w, d, 3.6), (x, y, 1.2), rgb=rgb),
             block(
@@ -460,7 +460,7 @@ def renewed(
         assert part.rgb is not None
         mesh = model.meshes.get(getattr(part.shape, "mesh", ""))
         sizes[part.rgb] += 12 if mesh is None else mesh.num_triangles
-    old, new = max(sizes, key=lambda rgb: sizes[rgb]), _colour(rng)
+    old, new = max(sizes, key=lambda rgb: sizes[rgb]), _draw_colour(rng)
     parts = [
         replace(p, rgb=new, material=None) if p.rgb == old else p
         for p in model.parts
@@ -531,5 +531,5 @@ def structure_triangles(structure: Structure) -> np.ndarray:
     return np.stack([c * x - s * y, s * x + c * y, z], -1) + structure.xyz
 
 
-def _colour(rng: np.random.Generator) -> Rgb:
+def _draw_colour(rng: np.random.Generator) -> Rgb:
     return _COLOURS[int(rng.integers(len(_COLOURS)))]

@@ -26,7 +26,7 @@ def to_jpeg(
             to this size, in place. None for no limit.
     """
     if picture.mode in ("I", "F") or picture.mode.startswith("I;16"):
-        picture = _contrasted(picture)
+        picture = _to_8_bits(picture)
     if longest is not None:
         picture.thumbnail((longest, longest))
     stream = io.BytesIO()
@@ -34,7 +34,7 @@ def to_jpeg(
     return stream.getvalue()
 
 
-def _contrasted(picture: Image) -> Image:
+def _to_8_bits(picture: Image) -> Image:
     """Returns a picture of large numbers as one of 8 bits."""
     from PIL import Image
 

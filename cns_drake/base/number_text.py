@@ -53,7 +53,9 @@ def parse_rows(
                 comments=None,
             )
     except (ValueError, Warning) as error:
-        raise ValueError(_fault(lines, dtype, separator, first)) from error
+        raise ValueError(
+            _first_fault(lines, dtype, separator, first)
+        ) from error
 
 
 def pick_columns(
@@ -86,7 +88,7 @@ def pick_columns(
     return picked
 
 
-def _fault(
+def _first_fault(
     lines: Iterable[str | bytes],
     dtype: np.dtype,
     separator: str | None,

@@ -117,7 +117,7 @@ def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
             node = parser.get_single_node()
             if node is None:
                 return None
-            _check(node, {})
+            _count_nodes(node, {})
             return parser.construct_document(node)
         finally:
             parser.dispose()
@@ -150,7 +150,7 @@ def _check_depth(text: str | bytes, loader: type) -> None:
             raise ValueError(f"line {line}: nested more than {_DEEPEST} deep")
 
 
-def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
+def _count_nodes(node: yaml.Node, sizes: dict[int, int]) -> int:
     """Returns the number of nodes of a tree when aliases are resolved."""
     line = node.start_mark.line + 1
     if isinstance(node, yaml.ScalarNode):
@@ -176,7 +176,7 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
     if isinstance(node, yaml.MappingNode):
         _check_keys(node)
         children = [part for pair in node.value for part in pair]
-    size = 1 + sum(_check(child, sizes) for child in children)
+    size = 1 + sum(_count_nodes(child, sizes) for child in children)
     if size > _MOST_NODES:
         raise ValueError(
             f"line {line}: stands for more than {_MOST_NODES} values"

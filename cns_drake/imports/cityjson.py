@@ -99,7 +99,7 @@ class ReferenceSystem:
         order of the system's definition. The result is True for a system
         without an area of use, since nothing speaks against the place.
         """
-        system = _horizontal(self.name)
+        system = _horizontal_system(self.name)
         if system.area_of_use is None:
             return True
         longitude, latitude = _degrees(system, first, second)
@@ -111,7 +111,7 @@ class ReferenceSystem:
         )
 
 
-def _horizontal(name: str) -> pyproj.CRS:
+def _horizontal_system(name: str) -> pyproj.CRS:
     """Returns the system of the first two coordinates.
 
     A system that is composed of codes, such as EPSG:31468+5783, has no area of
@@ -370,7 +370,7 @@ def _check_lengths(name: str, place: np.ndarray, path: Path) -> None:
     first, second, _ = np.linalg.solve(defined.matrix, place).tolist()
     if not defined.has_place(first, second):
         return
-    system = _horizontal(name)
+    system = _horizontal_system(name)
     degrees = _degrees(system, first, second)
     factors = pyproj.Proj(system).get_factors(*degrees)
     extremes = factors.tissot_semimajor, factors.tissot_semiminor
@@ -525,7 +525,7 @@ def _check_order(city: CityFile) -> None:
     """
     if city.system.name and not city.order_is_open:
         return
-    votes = list(itertools.islice(_outward(city), _MOST_VOTES))
+    votes = list(itertools.islice(_look_outwards(city), _MOST_VOTES))
     if not votes:
         if city.system.is_north_first:
             kind = "order of axes that no face shows, taken as defined"
@@ -542,7 +542,7 @@ def _check_order(city: CityFile) -> None:
             )
 
 
-def _outward(city: CityFile) -> Iterator[bool]:
+def _look_outwards(city: CityFile) -> Iterator[bool]:
     """Yields whether the faces of each geometry look outwards.
 
     Solids tell this by their volume. Roofs, floors and terrains tell it by the

@@ -42,7 +42,7 @@ def face_triangles(
     repeated at its end. Faces that are repaired or left out are counted in
     `faults`, with `name` as the name of the object.
     """
-    rings = [_cleaned(ring, name, faults) for ring in rings]
+    rings = [_without_repetitions(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
@@ -68,10 +68,12 @@ def face_triangles(
         corners = outer[_CORNERS_OF_FOUR]
         if (long_normals(corners) @ normal > 0.0).all():
             return corners[[1, 3]]
-    return _filled(normal, rings, name, faults)
+    return _triangulate_along(normal, rings, name, faults)
 
 
-def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
+def _without_repetitions(
+    ring: np.ndarray, name: str, faults: ImportFaults
+) -> np.ndarray:
     """Returns a ring without repeated corners."""
     if len(ring) == 0:
         return ring
@@ -84,7 +86,7 @@ def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
     return ring
 
 
-def _filled(
+def _triangulate_along(
     normal: np.ndarray,
     rings: Sequence[np.ndarray],
     name: str,
@@ -321,16 +323,16 @@ def _samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
         for k in range(3)
     )
     lines = np.maximum(np.ceil(lengths.max(axis=1) / spacing).astype(int), 1)
-    owner, u = _parts(lines)
+    owner, u = _part_ends(lines)
     steps = u * lengths.min(axis=1)[owner] / spacing
-    line, v = _parts(np.maximum(np.ceil(steps).astype(int), 1))
+    line, v = _part_ends(np.maximum(np.ceil(steps).astype(int), 1))
     owner = owner[line]
     u = u[line][:, None]
     v = v[:, None]
     return a[owner] + u * ((1.0 - v) * (b - a)[owner] + v * (c - a)[owner])
 
 
-def _parts(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _part_ends(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns the ends of equal parts into which things are divided.
 
     Thing k has counts[k] parts. The ends are two arrays: the number of the

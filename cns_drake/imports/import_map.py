@@ -60,7 +60,7 @@ def import_city(
         InputError: if the file or the options cannot be used, or the folder
             exists or cannot be written.
     """
-    _check(source, output, options)
+    _check_options(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
     doing(f"reading {source}")
     if source.suffix == ".xodr":
@@ -145,7 +145,7 @@ def import_city(
     return report
 
 
-def _check(source: Path, output: Path, options: ImportOptions) -> None:
+def _check_options(source: Path, output: Path, options: ImportOptions) -> None:
     """Checks the options before the file is read.
 
     Raises:

@@ -46,7 +46,7 @@ _LEAST_HEIGHT = 7.0
 _HEIGHTS = (0.4, 0.7)
 
 
-def _near(
+def _are_near(
     things: np.ndarray, ways: BaseGeometry, distance: float
 ) -> np.ndarray:
     """Returns (M,) which things have a bounding box near the ways.
@@ -58,12 +58,14 @@ def _near(
     return np.asarray(shapely.dwithin(boxes, ways, distance))
 
 
-def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
+def _crop_terrain(
+    one: Imported, ways: BaseGeometry, distance: float
+) -> Imported:
     """Returns the part of a terrain near the ways, otherwise unchanged."""
     meshes = {}
     for name, mesh in one.structure.model.meshes.items():
         faces = mesh.triangles()
-        near = faces[_near(mesh.vertices[faces], ways, distance)]
+        near = faces[_are_near(mesh.vertices[faces], ways, distance)]
         used, index = np.unique(near, return_inverse=True)
         corners = map(tuple, index.reshape(-1, 3).tolist())
         meshes[name] = Mesh(mesh.vertices[used], tuple(corners))
@@ -77,7 +79,7 @@ def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
     structure = replace(
         one.structure, model=replace(model, parts=parts, meshes=filled)
     )
-    near = _near(one.triangles, ways, distance)
+    near = _are_near(one.triangles, ways, distance)
     return replace(one, structure=structure, triangles=one.triangles[near])
 
 
@@ -161,12 +163,12 @@ class StagedCity:
         cut: dict[Imported, Imported | None] = {}
         for one in self.kept:
             corners = one.triangles.reshape(-1, 3)
-            if not _near(corners[None], ways, distance)[0]:
+            if not _are_near(corners[None], ways, distance)[0]:
                 name = one.structure.name
                 faults.add("structure far from the drives, left out", name)
                 cut[one] = None
             elif one.kind == "TINRelief":
-                cut[one] = _cropped(one, ways, distance)
+                cut[one] = _crop_terrain(one, ways, distance)
         near = self.replaced(cut)
         if not near.kept:
             raise InputError(
@@ -212,7 +214,7 @@ def stage_city(
     Raises:
         InputError: if all stages together have no structure, or too many.
     """
-    found = _together(city)
+    found = _without_outliers(city)
     if not found:
         raise InputError(f"{source}: no object has a surface")
     standing = {
@@ -301,7 +303,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
     return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
 
-def _together(city: ForeignCity) -> list[Imported]:
+def _without_outliers(city: ForeignCity) -> list[Imported]:
     """Returns the structures of a city without those far from its middle."""
     if not city.structures:
         return []
@@ -367,7 +369,7 @@ def grow(
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]
-    chosen = _drawn(buildings, round(part * len(buildings)), seed)
+    chosen = _choose_buildings(buildings, round(part * len(buildings)), seed)
     taken = {one.structure.name for one in city.kept}
     missing: list[str] = []
     lower: dict[str, float] = {}
@@ -382,7 +384,7 @@ def grow(
             low, high = _HEIGHTS
             share = low + (high - low) * random_share(seed, "height", name)
             lower[name] = round(share, 2)
-            variants[one] = _lowered(one, lower[name], taken)
+            variants[one] = _lowered_building(one, lower[name], taken)
         else:
             missing.append(name)
             variants[one] = None
@@ -412,12 +414,12 @@ def grow(
     return grown, changes
 
 
-def _drawn(
+def _choose_buildings(
     buildings: Sequence[Imported], number: int, seed: int
 ) -> list[Imported]:
     """Returns `number` random buildings, about half of them block by block."""
     blocks: dict[int, list[Imported]] = {}
-    for block, one in zip(_blocks(buildings), buildings, strict=True):
+    for block, one in zip(_block_numbers(buildings), buildings, strict=True):
         blocks.setdefault(block, []).append(one)
 
     def lot_of_block(members: list[Imported]) -> float:
@@ -437,7 +439,7 @@ def _drawn(
     return chosen + singles[: number - len(chosen)]
 
 
-def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
+def _block_numbers(buildings: Sequence[Imported]) -> np.ndarray:
     """Returns (N,) the number of the block to which each building belongs."""
     if not buildings:
         return np.zeros(0, dtype=int)
@@ -451,7 +453,7 @@ def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
     return np.asarray(block)
 
 
-def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
+def _lowered_building(one: Imported, share: float, taken: set[str]) -> Imported:
     """Returns a building cut to a share of its height, with a new name."""
     suffix = "_lower"
     while f"{one.structure.name}{suffix}" in taken:

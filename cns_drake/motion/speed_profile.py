@@ -107,7 +107,7 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
     # With REACH knots of rest at both ends, the spline is at rest there, too.
     knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * path_geometry.REACH
     drive_times = (np.arange(knots + 1) - path_geometry.REACH) * KNOT_PERIOD
-    return _drive(drive_times, times, u, speed)
+    return _positions_at(drive_times, times, u, speed)
 
 
 def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
@@ -140,7 +140,7 @@ def _reachable(
     return squared
 
 
-def _drive(
+def _positions_at(
     wanted: np.ndarray, times: np.ndarray, u: np.ndarray, speed: np.ndarray
 ) -> np.ndarray:
     """Returns positions at wanted times; the drive rests before and after."""

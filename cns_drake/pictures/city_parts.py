@@ -109,13 +109,13 @@ def compare_parts(
             continue
         height, height_there = _top(parts), _top(other[name])
         if height > height_there + _HEIGHT_TOLERANCE:
-            below, above = _split(parts, height_there)
+            below, above = _split_at_height(parts, height_there)
             difference.common.extend(below)
             difference.additional.extend(above)
             continue
         difference.common.extend(parts)
         if height_there > height + _HEIGHT_TOLERANCE:
-            difference.lower.extend(_split(other[name], height)[1])
+            difference.lower.extend(_split_at_height(other[name], height)[1])
     for name, parts in other.items():
         if name not in own:
             difference.absent.extend(parts)
@@ -126,7 +126,7 @@ def _top(parts: Sequence[Part]) -> float:
     return max(part.top() for part in parts)
 
 
-def _split(
+def _split_at_height(
     parts: Sequence[Part], height: float
 ) -> tuple[list[Part], list[Part]]:
     """Returns the parts below a height, and the parts above it [m].

@@ -154,7 +154,7 @@ def make_drive_page(
         shown: the stage, and the other stage with which it is compared, if any.
         title: title of the page.
     """
-    with _quiet():
+    with _without_port_message():
         meshcat = geometry.Meshcat(MeshcatParams(host="127.0.0.1", port=0))
     changes = _draw_city(meshcat, world, shown.other)
     if len(drive.X_WBs) > 1:
@@ -429,7 +429,7 @@ def _path(world: World, drive: DriveRecord, frame_id: FrameId) -> str:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def _without_port_message() -> Iterator[None]:
     """Stops Drake from printing the address of a port that is not for users."""
     logger = logging.getLogger("drake")
     level = logger.level

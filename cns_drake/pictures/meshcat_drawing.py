@@ -164,7 +164,7 @@ def draw_points(meshcat: Meshcat, path: str, p_WRset: np.ndarray) -> None:
     """
     cloud = PointCloud(len(p_WRset), Fields(BaseField.kXYZs | BaseField.kRGBs))
     cloud.mutable_xyzs()[:] = _on_grid(p_WRset).T
-    rgb = _linear(height_rgb(p_WRset[:, 2]))
+    rgb = _linear_light(height_rgb(p_WRset[:, 2]))
     cloud.mutable_rgbs()[:] = np.round(255.0 * rgb).T
     meshcat.SetObject(path, cloud, point_size=_POINT_PIXELS)
     meshcat.SetProperty(path, "color", _WHITE)
@@ -243,13 +243,13 @@ def _draw_mesh(
     if isinstance(colours, Rgba):
         meshcat.SetTriangleMesh(path, vertices, triangles, colours)
         return
-    rgb = _columns(_linear(colours))
+    rgb = _columns(_linear_light(colours))
     meshcat.SetTriangleColorMesh(path, vertices, triangles, rgb)
     # Drake's default, light grey, would darken the colours.
     meshcat.SetProperty(path, "color", _WHITE)
 
 
-def _linear(srgb: np.ndarray) -> np.ndarray:
+def _linear_light(srgb: np.ndarray) -> np.ndarray:
     """Returns colours of vertices and points in linear light, for the page.
 
     Only the colour of a whole object is taken as sRGB.

@@ -164,7 +164,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         ]
         is_cone = isinstance(surface, CylinderSurface)
         segments = cones if is_cone else capsules
-        segments += [(index, piece) for piece in _cut(ends, surface)]
+        segments += [(index, piece) for piece in _cut_shape(ends, surface)]
         if is_cone:
             # Embree closes cones as well, but rounding of the axis tilts the
             # ends of flat ones; discs do not tilt.
@@ -193,7 +193,7 @@ def _owners(shapes: Iterable[tuple]) -> np.ndarray:
     return np.array([owner for owner, *_ in shapes], np.int32)
 
 
-def _cut(
+def _cut_shape(
     ends: Sequence[ArrayLike], surface: CylinderSurface | CapsuleSurface
 ) -> list[np.ndarray]:
     """Cuts a long shape; returns the ends (2, 4) of each piece.

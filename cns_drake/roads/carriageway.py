@@ -106,7 +106,7 @@ def junction_area(
     the junction's radius; the roads outside the junction are cut off. At a dead
     end, the area is a disc around the end of the road.
     """
-    stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
+    stubs = [_arm_centreline(roads[arm.road], arm) for arm in junction.arms]
     parts = [
         line.buffer(arm.half_width, cap_style="flat")
         for line, arm in zip(stubs, junction.arms, strict=True)
@@ -141,7 +141,7 @@ def junction_area(
     return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
 
 
-def _stub(road: Road, arm: Arm) -> LineString:
+def _arm_centreline(road: Road, arm: Arm) -> LineString:
     """Returns an arm's centreline, from the junction to beyond its setback."""
     reach = arm.setback + _OVERLAP
     stations = np.linspace(0.0, reach, int(np.ceil(reach)) + 1)
@@ -169,8 +169,10 @@ def make_areas(
             bays[name, "left"] = _band(road, edge, far, _BAY_CLEARANCE)
     wide = [r for r in roads.values() if 0 < r.median < r.length]
     medians = unary_union([_median(road) for road in wide])
-    without_bays = _join([*lanes.values(), *junction_areas.values()])
-    carriageway = _join([without_bays, *bays.values()])
+    without_bays = _union_without_slits(
+        [*lanes.values(), *junction_areas.values()]
+    )
+    carriageway = _union_without_slits([without_bays, *bays.values()])
     walks = [
         lanes[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
         for name, road in roads.items()
@@ -179,7 +181,7 @@ def make_areas(
         arms = [r for r in roads.values() if name in (r.start, r.end)]
         width = min(road.sidewalk for road in arms)
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
-    outline = _simplified(_join(walks))
+    outline = _simplified(_union_without_slits(walks))
     return Areas(
         carriageway=_multi(carriageway.difference(medians)),
         lane_area=_multi(without_bays.difference(medians)),
@@ -218,7 +220,7 @@ def _simplified(area: BaseGeometry) -> BaseGeometry:
         ) from error
 
 
-def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
+def _union_without_slits(parts: Iterable[BaseGeometry]) -> BaseGeometry:
     """Returns the union of areas, with the slits between neighbours closed."""
     grown = unary_union(
         [part.buffer(_SEAM, join_style="mitre") for part in parts]

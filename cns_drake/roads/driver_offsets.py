@@ -90,13 +90,13 @@ def depart(
     if lane_changes:
         points = _change_lanes(path, obstacles, lane_changes, lane_rng)
     if wander:
-        low, high = _room(points, obstacles)
-        offset = _wander(low, high, wander, wander_length, wander_rng)
-        points = _moved(points, points, offset)
+        low, high = _offset_bounds(points, obstacles)
+        offset = _draw_offsets(low, high, wander, wander_length, wander_rng)
+        points = _points_beside(points, points, offset)
     return sample_lane_path(points, path.speed_limits, spacing, source)
 
 
-def _moved(
+def _points_beside(
     points: np.ndarray, line: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
     """Returns points (N, 3), moved to the left of a line (N, 3) by offsets."""
@@ -154,7 +154,7 @@ def _change_lanes(
             ) - smooth_step(np.clip((s - end) / _RAMP + 0.5, 0.0, 1.0))
             sign = 1.0 if side == 0 else -1.0
             aside = sign * share * path.beside[:, side]
-            moved = _moved(points, path.points, aside)
+            moved = _points_beside(points, path.points, aside)
             if _is_free(moved[run][::_CHECKED], np.zeros(1), obstacles).all():
                 points = moved
                 done = end + half
@@ -177,7 +177,7 @@ def _stretch(beside: np.ndarray, place: int) -> slice:
     )
 
 
-def _room(
+def _offset_bounds(
     points: np.ndarray, obstacles: STRtree
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and greatest offsets (N,) to the left of a path [m].
@@ -206,14 +206,14 @@ def _room(
     return low.repeat(_CHECKED)[:num], high.repeat(_CHECKED)[:num]
 
 
-def _wander(
+def _draw_offsets(
     low: np.ndarray,
     high: np.ndarray,
     spread: float,
     length: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Returns random offsets (N,) within the bounds from `_room` [m].
+    """Returns random offsets (N,) within the bounds from `_offset_bounds` [m].
 
     The mean of the process is at least two standard deviations away from both
     bounds or, if these are too close together, in their middle.

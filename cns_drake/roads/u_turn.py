@@ -126,7 +126,7 @@ def find_loop(
     needed = np.inf
     widest = 0.0
     for centre in centres:
-        begin = float(centre) - _ahead(lanes_at(float(centre))[1])
+        begin = float(centre) - _centre_distance(lanes_at(float(centre))[1])
         (x, y, heading), width = lanes_at(begin)
         points = _loop(np.array([x, y]), heading, width)
         swept = swept_area(points)
@@ -135,7 +135,11 @@ def find_loop(
         # From the middle of the loop to both sides.
         left = np.array([-math.sin(heading), math.cos(heading)])
         along = np.array([left[1], -left[0]])
-        middle = np.array([x, y]) + _ahead(width) * along + width / 2 * left
+        middle = (
+            np.array([x, y])
+            + _centre_distance(width) * along
+            + width / 2 * left
+        )
         sideways = (shapely.get_coordinates(swept) - middle) @ left
         needed = min(needed, 2 * np.abs(sideways).max())
         place = Point(middle)
@@ -149,7 +153,7 @@ def find_loop(
     )
 
 
-def _ahead(width: float) -> float:
+def _centre_distance(width: float) -> float:
     """Returns the distance from a loop's beginning to its centre [m]."""
     radius = max(LOOP_RADIUS, width / 2)
     return float(np.sqrt(4 * radius**2 - (radius + width / 2) ** 2))
@@ -163,7 +167,7 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
     radius = max(LOOP_RADIUS, width / 2)
     along = np.array([math.cos(heading), math.sin(heading)])
     left = np.array([-along[1], along[0]])
-    centre = start + _ahead(width) * along + width / 2 * left
+    centre = start + _centre_distance(width) * along + width / 2 * left
     corners = loop_corners(
         centre, heading, heading + np.pi, radius, width / 2, width / 2
     )

@@ -79,7 +79,7 @@ class DrivePlan:
                 be used, the route does not fit the roads, or a bend is too
                 tight for the car.
         """
-        return self._on_springs(self._rigid)
+        return self._on_springs(self._rigid_motion)
 
     def trajectory_at(self, positions: np.ndarray) -> Trajectory:
         """Returns the motion of a car that keeps its distance to others.
@@ -88,10 +88,10 @@ class DrivePlan:
             positions: (N,) distances along the path at evenly spaced times [m],
                 see `cns_drake.traffic.traffic_plan.TrafficPlan`.
         """
-        return self._on_springs(self._rigid.with_positions(positions))
+        return self._on_springs(self._rigid_motion.with_positions(positions))
 
     @cached_property
-    def _rigid(self) -> Trajectory:
+    def _rigid_motion(self) -> Trajectory:
         """The motion of a car without springs."""
         scenario = self.scenario
         driver = scenario.driver

@@ -226,7 +226,7 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
-    section = _section(config, LidarSection, ("rate",))
+    section = _checked_fields(config, LidarSection, ("rate",))
     period = LIDAR_PRESETS[section.preset].pattern.period
     if config.rate is not None:
         period = 1.0 / config.rate
@@ -236,7 +236,7 @@ def ApplyLidarConfig(
         section,
         builder,
         scene_graph,
-        *_place(config, builder, plant),
+        *_carrier_frame(config, builder, plant),
         name=config.name,
         seed=config.seed,
         period=period,
@@ -290,11 +290,11 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
-    section = _section(config, ImuSection, ("rate",))
+    section = _checked_fields(config, ImuSection, ("rate",))
     rate = config.rate or section.sample_rate(_RATE)
     imu = add_imu(
         builder,
-        *_place(config, builder, plant),
+        *_carrier_frame(config, builder, plant),
         rate=rate,
         noise=None if section.is_ideal else section.noise(config.seed),
         name=config.name,
@@ -342,9 +342,9 @@ def ApplyOdometryConfig(
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
-    section = _section(config, OdometrySection)
+    section = _checked_fields(config, OdometrySection)
     rate = _checked_rate(config, section.rate)
-    frame, X_PB = _place(config, builder, plant)
+    frame, X_PB = _carrier_frame(config, builder, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
@@ -357,7 +357,7 @@ def ApplyOdometryConfig(
     return sensor
 
 
-def _section(
+def _checked_fields(
     config: Config, kind: type[Section], left_out: tuple[str, ...] = ()
 ) -> Any:
     """Returns the checked fields of a struct, without those left out.
@@ -399,7 +399,7 @@ def _check_timing(config: LidarConfig, period: float) -> None:
             )
 
 
-def _place(
+def _carrier_frame(
     config: Config, builder: DiagramBuilder, plant: MultibodyPlant | None
 ) -> tuple[Frame, RigidTransform]:
     """Returns the frame P that carries a sensor, and X_PB.

@@ -208,7 +208,10 @@ class FilmStage(Step):
         for k, time in enumerate(self.times):
             context.SetTime(time)
             points = np.concatenate(
-                [_scan(diagram, context, name) for name in scenario.lidars]
+                [
+                    _world_points(diagram, context, name)
+                    for name in scenario.lidars
+                ]
             )
             for (name, camera), first in zip(
                 scenario.cameras.items(), self.first, strict=True
@@ -267,9 +270,9 @@ def _picture(
     return pixels
 
 
-def _scan(diagram: Diagram, context: Context, name: str) -> np.ndarray:
+def _world_points(diagram: Diagram, context: Context, name: str) -> np.ndarray:
     """Returns the (N, 3) points of a LiDAR's scan in the world [m]."""
-    scan = diagram.GetOutputPort(f"{name}_scan").Eval(context)
+    scan = diagram.GetOutputPort(f"{name}_world_points").Eval(context)
     lidar = diagram.GetSubsystemByName(name)
     X_WS = lidar.GetOutputPort("X_WS").Eval(lidar.GetMyContextFromRoot(context))
     return (X_WS @ np.stack([scan["x"], scan["y"], scan["z"]])).T

@@ -37,7 +37,7 @@ def scan_world(
     Returns:
         Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.
     """
-    lidar, context = _stand(world, X_WS, pattern, returns)
+    lidar, context = _stationary_lidar(world, X_WS, pattern, returns)
     return lidar.GetOutputPort("scan").Eval(context)
 
 
@@ -52,7 +52,7 @@ def still_scene(
             within a few kilometres of it.
         pattern: directions and ranges of a LiDAR's beams.
     """
-    lidar, context = _stand(world, X_WS, pattern)
+    lidar, context = _stationary_lidar(world, X_WS, pattern)
     return lidar.EvalScene(context)
 
 
@@ -98,7 +98,7 @@ def _encode_npy(scan: np.ndarray) -> bytes:
 _ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}
 
 
-def _stand(
+def _stationary_lidar(
     world: World,
     X_WS: RigidTransform,
     pattern: BeamPattern,

@@ -157,7 +157,7 @@ class SimulatedDrive(Drive):
         return self._lidar.pattern
 
     def scan(self, index: int) -> np.ndarray:
-        return self._lidar.GetOutputPort("scan").Eval(self._at(index))
+        return self._lidar.GetOutputPort("scan").Eval(self._context_at(index))
 
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
         """Returns the world as a scene for ray casting, and the pose X_WS.
@@ -165,10 +165,10 @@ class SimulatedDrive(Drive):
         Both are those at the time stamp of scan `index`; X_WS is the pose of
         the LiDAR. The scene is valid until the next call of `look` or `scan`.
         """
-        scene = self._lidar.EvalScene(self._at(index))
+        scene = self._lidar.EvalScene(self._context_at(index))
         return scene, self.X_WBs[index] @ self.X_BS
 
-    def _at(self, index: int) -> Context:
+    def _context_at(self, index: int) -> Context:
         """Returns the LiDAR's Context at the time of a scan."""
         self._context.SetTime(index * self.period)
         self._X_WBodies[self._base.index()] = self.X_WBs[index]

@@ -23,9 +23,7 @@ from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import combined_digest, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-)
+from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
@@ -287,7 +285,7 @@ class PairMaker:
         for levels in condition.causes:
             for at_level in levels:
                 try:
-                    chosen.append(self._possible(at_level))
+                    chosen.append(self._possible_fields(at_level))
                     break
                 except MissingError as error:
                     fault = error
@@ -305,7 +303,7 @@ class PairMaker:
             side: merged(fields.get("both", {}), fields.get(side, {}))
             for side in ("database", "query")
         }
-        sessions = self._sessions(sides["database"], seed)
+        sessions = self._session_changes(sides["database"], seed)
         # Years of cases may need the rates of all conditions.
         alone = {} if CAUSE in condition.factors else fields
         for side, values in alone.items():
@@ -321,12 +319,12 @@ class PairMaker:
         if SESSIONS in sides["database"]:
             self._check_side("database", sides["database"])
         self._check_side("query", sides["query"])
-        dated = self._database(sessions, sides, condition, seed)
+        dated = self._database_drives(sessions, sides, condition, seed)
         database = [drive for _, _, drive in dated]
-        years = _oldest(sides["database"], sessions)
+        years = _years_aged(sides["database"], sessions)
         age = years, sides["database"].get("rates", 1.0)
-        drive = self._changed("query", sides["query"], age, seed)
-        query = self._named("query", drive, condition.factors, seed)
+        drive = self._with_changes("query", sides["query"], age, seed)
+        query = self._with_unique_name("query", drive, condition.factors, seed)
         changed = {
             name: sides["query"][name]
             for name in _QUERY_FIELDS
@@ -356,12 +354,15 @@ class PairMaker:
             changed,
             tuple(database[1:]),
             keep,
-            self._maintained(sides["database"], len(database)),
+            self._map_updates(sides["database"], len(database)),
             (*(when for when, _, _ in dated), years) if years else (),
-            (*(length for _, length, _ in dated), _length(sides["query"])),
+            (
+                *(length for _, length, _ in dated),
+                _drive_length(sides["query"]),
+            ),
         )
 
-    def _maintained(self, database: Changes, number: int) -> str:
+    def _map_updates(self, database: Changes, number: int) -> str:
         """Returns what updates the maps of a database of some drives.
 
         Raises:
@@ -384,7 +385,7 @@ class PairMaker:
             )
         return str(value)
 
-    def _sessions(
+    def _session_changes(
         self, database: Changes, seed: int
     ) -> dict[str, dict[str, Any]]:
         """Returns place in the file -> changes, for each drive of a database.
@@ -400,7 +401,7 @@ class PairMaker:
             if isinstance(fleet, Mapping):
                 fleet = {"seed": seed, **fleet}
             drives = validated(Fleet, fleet, where).sessions()
-            return self._sessions({**shared, SESSIONS: drives}, seed)
+            return self._session_changes({**shared, SESSIONS: drives}, seed)
         given = shared.pop(SESSIONS, None)
         for name in ("keep", "maintain"):
             shared.pop(name, None)
@@ -434,7 +435,7 @@ class PairMaker:
             found[place] = merged(shared, own)
         return found
 
-    def _database(
+    def _database_drives(
         self,
         sessions: Mapping[str, Changes],
         sides: Mapping[str, Changes],
@@ -443,7 +444,7 @@ class PairMaker:
     ) -> list[tuple[int, float, Scenario]]:
         """Returns the drives of a database, from older to newer.
 
-        Each has the years by which its city has aged, and its `_length`.
+        Each has the years by which its city has aged, and its `_drive_length`.
 
         `years` says how much older a drive is than another one, through whose
         city these years have passed. So the city of the oldest drive is aged by
@@ -461,28 +462,28 @@ class PairMaker:
         """
         query = sides["query"]
         since = query.get("years", 0)
-        oldest = _oldest(sides["database"], sessions)
+        oldest = _years_aged(sides["database"], sessions)
         rates = query.get("rates", 1.0)
         if any(one.get("years", 0) != oldest for one in sessions.values()):
             rates = sides["database"].get("rates", rates)
         stages = list(self.query.folder.stages())
         asked = self._unchanged["query"]
-        stage = self._stage("query", asked, query.get("stage", OWN))
+        stage = self._resolve_stage("query", asked, query.get("stage", OWN))
         last = stages.index(stage) if stage in stages else len(stages)
         found: list[tuple[tuple, str, Scenario]] = []
         for place, changes in sessions.items():
             age = since + oldest - changes.get("years", 0)
             drive = self._unchanged["database"]
-            stage = self._stage(place, drive, changes.get("stage", OWN))
+            stage = self._resolve_stage(place, drive, changes.get("stage", OWN))
             is_later = stages.index(stage) > last if stage in stages else False
             if place != "database" and (age > oldest or is_later):
                 raise InputError(
                     f"{self.source}: {place}: this drive is later than the"
                     " query"
                 )
-            drive = self._changed(place, changes, (age, rates), seed)
+            drive = self._with_changes(place, changes, (age, rates), seed)
             factors = _factors_of(place, condition.factors)
-            drive = self._named("database", drive, factors, seed)
+            drive = self._with_unique_name("database", drive, factors, seed)
             found.append(((age, natural_key(stage)), place, drive))
         # While maps are only noted, drives of all ages are in one map.
         known: dict[object, str] = {}
@@ -494,11 +495,13 @@ class PairMaker:
                 )
         found.sort(key=lambda one: one[0])
         return [
-            (time[0], _length(sessions[place]), drive)
+            (time[0], _drive_length(sessions[place]), drive)
             for time, place, drive in found
         ]
 
-    def _possible(self, fields: Mapping[str, Changes]) -> dict[str, Changes]:
+    def _possible_fields(
+        self, fields: Mapping[str, Changes]
+    ) -> dict[str, Changes]:
         """Returns those fields of a case that are possible on the map.
 
         Raises:
@@ -510,7 +513,9 @@ class PairMaker:
             left = dict(changes)
             try:
                 if (stage := left.get("stage")) is not None:
-                    self._stage(side, self._unchanged["database"], stage)
+                    self._resolve_stage(
+                        side, self._unchanged["database"], stage
+                    )
             except MissingError as error:
                 missing = error
                 del left["stage"]
@@ -569,7 +574,7 @@ class PairMaker:
                     f" {most}"
                 )
 
-    def _changed(
+    def _with_changes(
         self, side: str, changes: Changes, age: tuple[Any, Any], seed: int
     ) -> Scenario:
         """Returns a drive with the changes of a condition.
@@ -609,13 +614,13 @@ class PairMaker:
         if lateral:
             viewpoint = (lateral, 0.0)
         if not is_query and self.same_route:
-            place = self._place(
+            place = self._viewpoint(
                 side, "near" if viewpoint is None else viewpoint
             )
             drive = moved(drive, _AHEAD, *place)
         elif viewpoint is not None:
-            drive = moved(drive, 0.0, *self._place(side, viewpoint))
-        stage = self._stage(side, drive, left.pop("stage", OWN))
+            drive = moved(drive, 0.0, *self._viewpoint(side, viewpoint))
+        stage = self._resolve_stage(side, drive, left.pop("stage", OWN))
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
         if age[0]:
@@ -630,10 +635,10 @@ class PairMaker:
                     f"{self.source}: {side}.redraw: a city drawn anew does not"
                     f" age by {older}.years; give one of them"
                 )
-            drive = self._elsewhere(older, drive, self.age, *age, seed)
+            drive = self._moved_to(older, drive, self.age, *age, seed)
         if "redraw" in left:
             wanted = left.pop("redraw")
-            drive = self._elsewhere(side, drive, self.redraw, wanted)
+            drive = self._moved_to(side, drive, self.redraw, wanted)
         lost = {n: left.pop(n) for n in LOSS_FIELDS if n in left}
         if lost:
             where = f"{self.source}: {side}"
@@ -653,7 +658,7 @@ class PairMaker:
         for name in _SEEDED:
             if isinstance(left.get(name), dict):
                 left[name] = {"seed": seed, **left[name]}
-        self._fit(drive, left)
+        self._fit_traffic(drive, left)
         if left:
             drive = drive.with_fields(left, f"{self.source}: {side}")
             self._check_map(side, drive, left)
@@ -671,7 +676,7 @@ class PairMaker:
         rng = np.random.default_rng(seed)
         return draw_route(self._networks[file], length, rng)
 
-    def _elsewhere(
+    def _moved_to(
         self,
         side: str,
         drive: Scenario,
@@ -685,7 +690,7 @@ class PairMaker:
             raise InputError(f"{self.source}: {side}.{error}") from None
         return drive.replaced(map=folder, stage=stage)
 
-    def _place(self, side: str, viewpoint: Any) -> tuple[float, float]:
+    def _viewpoint(self, side: str, viewpoint: Any) -> tuple[float, float]:
         """Returns offset to the left [m] and heading [deg] of a viewpoint."""
         if isinstance(viewpoint, str) and viewpoint in VIEWPOINTS:
             return VIEWPOINTS[viewpoint]
@@ -700,7 +705,7 @@ class PairMaker:
             f" {', '.join(VIEWPOINTS)} nor [metres to the left, heading in deg]"
         )
 
-    def _stage(self, side: str, drive: Scenario, wanted: Any) -> str:
+    def _resolve_stage(self, side: str, drive: Scenario, wanted: Any) -> str:
         """Returns the stage for a stage's name or for a word such as `last`."""
         own = str(drive.stage)
         last = self._last_stage
@@ -733,7 +738,7 @@ class PairMaker:
             f" {OWN}, {LAST}, {FIRST} or '{EARLIER}1' to '{EARLIER}{_STEPS}'"
         )
 
-    def _fit(self, drive: Scenario, fields: dict[str, Any]) -> None:
+    def _fit_traffic(self, drive: Scenario, fields: dict[str, Any]) -> None:
         """Reduces traffic to what roads hold; drops impossible lane changes."""
         driver, traffic = (
             one if isinstance(one := fields.get(name), Mapping) else {}
@@ -769,7 +774,7 @@ class PairMaker:
                 load_world(world[0], without=drive.without)
             self._loaded.add(world)
 
-    def _named(
+    def _with_unique_name(
         self, side: str, drive: Scenario, factors: Changes, seed: int
     ) -> Scenario:
         """Returns a drive with a name that no other drive has.
@@ -788,7 +793,7 @@ class PairMaker:
                     drive = control_drive(plain, str(drive.stage))
                     name = drive.name
             elif drive != plain:
-                name += f"_{_ending(side, factors, seed)}"
+                name += f"_{_name_suffix(side, factors, seed)}"
             if name in {one.name for one in known.values()}:
                 name += f"_{content[:6]}"
             known[content] = drive.replaced(name=name)
@@ -817,12 +822,12 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
     )
 
 
-def _oldest(database: Changes, sessions: Mapping[str, Changes]) -> int:
+def _years_aged(database: Changes, sessions: Mapping[str, Changes]) -> int:
     """Returns by how many years the city of the query is aged."""
     return max(one.get("years", 0) for one in (database, *sessions.values()))
 
 
-def _length(changes: Changes) -> float:
+def _drive_length(changes: Changes) -> float:
     """Returns about how long a drive is with these changes [m]."""
     route = changes.get("route")
     if isinstance(route, Mapping):
@@ -850,7 +855,7 @@ def _factors_of(place: str, factors: Changes) -> dict[str, Any]:
     return found
 
 
-def _ending(side: str, given: Changes, seed: int) -> str:
+def _name_suffix(side: str, given: Changes, seed: int) -> str:
     """Returns the suffix of the name of a changed drive."""
     factors = dict(given)
     labels = []

@@ -8,14 +8,7 @@ product of all factors.
 
 from __future__ import annotations
 
-from collections.abc import (
-    Callable,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-    Set,
-)
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 import contextlib
 from dataclasses import dataclass, replace
 import itertools
@@ -521,10 +514,10 @@ def conditions(experiment: Experiment) -> list[Condition]:
     if wanted:
         raise ValueError(f"baseline.{next(iter(wanted))}: this is no factor")
     cases = list(_cases(experiment))
-    taken = _changed("", factors.items(), set())
+    taken = _changed_paths("", factors.items(), set())
     for name, case in experiment.cases.items():
         if isinstance(case, dict):
-            _changed(f"cases.{name}.", _leaves(case, ()), taken)
+            _changed_paths(f"cases.{name}.", _leaves(case, ()), taken)
     lengths = [len(values) for values in factors.values()]
     number = 1 + sum(lengths) - len(lengths)
     if experiment.design == "product":
@@ -551,7 +544,7 @@ def conditions(experiment: Experiment) -> list[Condition]:
         named = {CAUSE: cause, LEVEL: level} if experiment.cases else {}
         found.append(
             Condition(
-                {**named, **{n: _shown(one) for n, one in cell.items()}},
+                {**named, **{n: _table_value(one) for n, one in cell.items()}},
                 changes,
                 members,
                 cause == NO_CAUSE
@@ -572,15 +565,15 @@ def _factors(
     fixed: dict[str, Any] = {}
     factors: dict[str, list[Any]] = {}
     for side in _FACTORED:
-        single, varied = _split(getattr(experiment, side), (side,))
+        single, varied = _split_values(getattr(experiment, side), (side,))
         for path, value in single.items():
             if path != FROZEN_REDRAW:
-                _put(fixed, path, value)
+                _set_field(fixed, path, value)
         factors |= {n: some for n, some in varied.items() if n != FROZEN_REDRAW}
     return fixed, factors
 
 
-def _changed(
+def _changed_paths(
     place: str, fields: Iterable[tuple[str, Any]], taken: Set[str]
 ) -> set[str]:
     """Returns the paths that factors change; refuses those that are taken."""
@@ -596,7 +589,7 @@ def _changed(
     return found
 
 
-def _split(
+def _split_values(
     fields: Changes, above: tuple[str, ...]
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
     """Returns path -> value of fixed fields, and path -> values of factors."""
@@ -609,7 +602,7 @@ def _split(
             try:
                 _check_once(list(value))
                 # Nor may two values have one cell in a table.
-                _check_once([str(_shown(one)) for one in value])
+                _check_once([str(_table_value(one)) for one in value])
             except ValueError as error:
                 raise ValueError(f"{path}: {error}") from None
             varied[path] = list(value)
@@ -676,7 +669,7 @@ def _nested(path: str, value: Any) -> Any:
     return value
 
 
-def _put(fields: dict[str, Any], path: str, value: Any) -> None:
+def _set_field(fields: dict[str, Any], path: str, value: Any) -> None:
     """Sets a field to a value, in place: like `merged`, without a copy."""
     *above, name = path.split(".")
     for part in above:
@@ -687,7 +680,7 @@ def _put(fields: dict[str, Any], path: str, value: Any) -> None:
     fields[name] = merged(fields.get(name), value)
 
 
-def _shown(value: Any) -> Any:
+def _table_value(value: Any) -> Any:
     """Returns a factor's value as a table holds it: a number or text."""
     if value is None:
         return "none"
@@ -712,7 +705,7 @@ def _cases(
             f" is {most}"
         )
     for name, most in numbers.items():
-        members = _members(experiment, name)
+        members = _member_fields(experiment, name)
         lengths = [_num_levels(one, f"cases.{name}") for one in members]
         wanted = experiment.levels or range(1, most + 1)
         levels = sorted({min(level, most) for level in wanted})
@@ -743,12 +736,12 @@ def num_levels(experiment: Experiment) -> dict[str, int]:
     for name in experiment.cases:
         if name == NO_CAUSE:
             raise ValueError(f"cases.{name}: the name of what has no cause")
-        members = _members(experiment, name)
+        members = _member_fields(experiment, name)
         found[name] = max(_num_levels(one, f"cases.{name}") for one in members)
     return found
 
 
-def _members(experiment: Experiment, name: str) -> list[Case]:
+def _member_fields(experiment: Experiment, name: str) -> list[Case]:
     """Returns the fields of a case, or those of each case that it combines."""
     case = experiment.cases[name]
     found = []
@@ -771,7 +764,7 @@ def _at_level(case: Case, level: int) -> Case:
     for path, value in _leaves(case, ()):
         if isinstance(value, _Values):
             value = value[min(level, len(value)) - 1]
-        _put(fields, path, value)
+        _set_field(fields, path, value)
     return fields
 
 
@@ -850,7 +843,7 @@ def method_variants(
     found = []
     for name, settings in methods.items():
         place = f"methods.{name}"
-        fixed, varied = _split(settings, (place,))
+        fixed, varied = _split_values(settings, (place,))
         for some in itertools.product(*varied.values()):
             chosen = dict(zip(varied, some, strict=True))
             given = tuple(
@@ -858,7 +851,9 @@ def method_variants(
                 for path, one in {**fixed, **chosen}.items()
             )
             # Fixed ones stand in tables, too: a row says how it was made.
-            columns = {n: _shown(one) for n, one in {**fixed, **chosen}.items()}
+            columns = {
+                n: _table_value(one) for n, one in {**fixed, **chosen}.items()
+            }
             found.append(MethodVariant(name, given, columns))
     return found
 

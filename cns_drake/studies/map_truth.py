@@ -314,7 +314,7 @@ def observed(
             rows = np.concatenate([tiles.left[tile] for tile in near])
             for seen in threads.map(
                 lambda chunk, sight=sight: chunk[
-                    _visible(points[chunk], sight)
+                    _observed_rows(points[chunk], sight)
                 ],
                 list(_chunks(rows)),
             ):
@@ -326,7 +326,7 @@ def observed(
     return result
 
 
-def _visible(points: np.ndarray, sight: Sight) -> np.ndarray:
+def _observed_rows(points: np.ndarray, sight: Sight) -> np.ndarray:
     """Returns the rows of the points (N, 3) in W that are observed."""
     p_WS, R_WS = sight.X_WS.translation(), sight.X_WS.rotation().matrix()
     rows, d_Sset, distances = sight.reached((points - p_WS) @ R_WS)
@@ -481,7 +481,7 @@ def write_page(
         table: the changed structures.
         names: names of the two drives.
     """
-    low, step, shape = _frame(pair)
+    low, step, shape = _picture_frame(pair)
     maps = []
     for session, labels, name in zip(pair, truth, names, strict=True):
         counts = ", ".join(
@@ -509,7 +509,7 @@ def write_page(
     write_text(path, f"{text}\n")
 
 
-def _frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:
+def _picture_frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:
     """Returns corner [m], side of a pixel [m], and pixels (rows, columns)."""
     points = np.concatenate([one.points[:, :2] for one in pair])
     if len(points) == 0:

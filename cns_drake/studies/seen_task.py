@@ -220,14 +220,14 @@ def sight_structures(
     drive = source()
     city = {name: getattr(first.scenario, name) for name in ("map", "stage")}
     back = SimulationSource(source.scenario.replaced(**city))
-    returned = _returned(drive, spacing)
+    returned = _seen_names(drive, spacing)
     before = returned
     if back.scenario != source.scenario:
-        before = _returned(back(), spacing)
+        before = _seen_names(back(), spacing)
     return Sighting(sorted(drive.structures), sorted(returned), sorted(before))
 
 
-def _returned(drive: SimulatedDrive, spacing: float) -> Set[str]:
+def _seen_names(drive: SimulatedDrive, spacing: float) -> Set[str]:
     """Returns the names of the structures of which a drive gets returns."""
     frames = sample_frames(drive.X_WS[:, :3, 3], spacing).tolist()
     numbers: set[int] = set()

@@ -247,11 +247,11 @@ class Study:
         ]
         if fewer:
             self.on_note(f"measured at their last level: {', '.join(fewer)}")
-        drives = list(self._drives(maps))
+        drives = list(self._map_drives(maps))
         doing("looking at all conditions")
         # Errors in the file are found before all slow work.
         for some in drives:
-            for _ in self._simulated(some, made=False):
+            for _ in self._simulated_pairs(some, made=False):
                 pass
         for name in (RESULTS, QUERIES, "index.html"):
             is_there(self.output / name)  # Nothing else may have its name.
@@ -279,7 +279,7 @@ class Study:
         Raises:
             InputError: a map cannot be used, or its drives are recordings.
         """
-        found = list(self._drives(maps))
+        found = list(self._map_drives(maps))
         for some in found:
             if some.city is not None:
                 raise InputError(
@@ -353,7 +353,7 @@ class Study:
             found[choice.key] = choice, columns
         return found
 
-    def _drives(self, maps: Sequence[str]) -> Iterator[_MapPairs]:
+    def _map_drives(self, maps: Sequence[str]) -> Iterator[_MapPairs]:
         """Yields the drives of all maps; makes aged and imported maps."""
         made = {
             one.name: one
@@ -464,9 +464,9 @@ class Study:
         for some in drives:
             found: list[Pair] = []
             if some.city is not None:
-                found += self._recorded(some.city)
+                found += self._recorded_pairs(some.city)
             else:
-                for one, compared in self._simulated(some):
+                for one, compared in self._simulated_pairs(some):
                     found.append(one)
                     if self.experiment.frozen is not None:
                         place = one.map_name, one.factors.get(LEVEL, 0)
@@ -500,7 +500,7 @@ class Study:
         if self.experiment.drives == "same-route":
             database = beside(database)
         return [
-            self._named(one)
+            self._named_drive(one)
             for one in distracting_drives(
                 database,
                 most,
@@ -511,7 +511,7 @@ class Study:
             )
         ]
 
-    def _named(self, drive: Scenario) -> NamedDrive:
+    def _named_drive(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
         if is_recorded(drive, self.output):
             from evaluation.study.sources import RecordingSource
@@ -521,7 +521,7 @@ class Study:
             )
         return NamedDrive(drive.name, SimulationSource(drive))
 
-    def _simulated(
+    def _simulated_pairs(
         self, some: _MapPairs, *, made: bool = True
     ) -> Iterator[tuple[Pair, Compared]]:
         """Yields the pairs of a map in all conditions that it allows.
@@ -585,12 +585,12 @@ class Study:
     def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
         """Returns a pair of drives, which tables show with given fields."""
         *drives, asked = (
-            replace(self._named(drive), length=length)
+            replace(self._named_drive(drive), length=length)
             for drive, length in zip(
                 compared.drives, compared.lengths, strict=True
             )
         )
-        database, *beside = self._maintained(drives, compared.maintain)
+        database, *beside = self._with_upkept_maps(drives, compared.maintain)
         way = database
         if self.experiment.drives == "same-route":
             city = {
@@ -603,7 +603,7 @@ class Study:
             elif drive != query:
                 content = fingerprint(drive.model_dump(mode="json"))[:8]
                 drive = drive.replaced(name=f"{query.name}_way_{content}")
-            way = replace(self._named(drive), length=asked.length)
+            way = replace(self._named_drive(drive), length=asked.length)
         asked_how = {
             "compared": compared.fingerprint(),
             **compared.protocol.to_json(),
@@ -624,7 +624,7 @@ class Study:
             may_repeat=bool(compared.asked or compared.distractors),
         )
 
-    def _maintained(
+    def _with_upkept_maps(
         self, drives: Sequence[NamedDrive], maintain: str
     ) -> Sequence[NamedDrive]:
         """Returns drives whose maps are updated by later ones, with its job."""
@@ -652,7 +652,7 @@ class Study:
             for number, one in enumerate(drives)
         ]
 
-    def _recorded(self, city: MapDrives) -> Iterator[Pair]:
+    def _recorded_pairs(self, city: MapDrives) -> Iterator[Pair]:
         """Yields the pairs of recordings; only their stage can vary."""
         self._check_recordable(city)
         return recorded_comparisons(

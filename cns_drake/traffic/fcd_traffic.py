@@ -122,7 +122,7 @@ def read_fcd(path: Path) -> FcdTrace:
     steps = list(root.all("timestep"))
     with value_errors(path):
         times = np.array([step.number("time") for step in steps])
-        begin, dt = _even(path, times)
+        begin, dt = _sampling_times(path, times)
         vehicles = _objects(steps, "vehicle")
         notes = _leave_out(path, steps)
         persons = _objects(steps, "person")
@@ -185,7 +185,7 @@ def _leave_out(path: Path, steps: list[Element]) -> tuple[str, ...]:
     )
 
 
-def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
+def _sampling_times(path: Path, times: np.ndarray) -> tuple[float, float]:
     """Returns the first of evenly spaced times, and their distance [s].
 
     Raises:
@@ -326,9 +326,9 @@ def play_trace(
         )
     lanes = np.concatenate([piece.points for piece in graph.pieces])
     _check_place(trace, path, lanes)
-    kinds = [_kind(one, seed) for one in trace.vehicles]
+    kinds = [_vehicle_kind(one, seed) for one in trace.vehicles]
     heights = Heights(lanes)
-    heights.zero = _zero(trace, heights)
+    heights.zero = _zero_height(trace, heights)
     pairs = zip(trace.vehicles, kinds, strict=True)
     rows = [_vehicle_rows(*pair, heights) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
@@ -454,7 +454,7 @@ class Heights:
         return np.sum(weight * self._z[near], axis=1) / weight.sum(axis=1)
 
 
-def _zero(trace: FcdTrace, heights: Heights) -> float:
+def _zero_height(trace: FcdTrace, heights: Heights) -> float:
     """Returns the height in the map where a trace has z = 0 [m]."""
     some = [one for one in trace.vehicles if np.isfinite(one.z).all()]
     if not some:
@@ -477,7 +477,7 @@ def _kind_name(one: TracedObject) -> str:
     return text if text in {kind.name for kind in KINDS} else ""
 
 
-def _kind(one: TracedObject, seed: int) -> VehicleKind:
+def _vehicle_kind(one: TracedObject, seed: int) -> VehicleKind:
     """Returns the kind of a vehicle: from its type, or else a random car."""
     name = _kind_name(one)
     for kind in KINDS:

@@ -182,7 +182,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if cars[i].held >= 0:
             last = max(last, cars[i].order)
             rear = rear_on_way(streets, cars[i])
-            _take(streets, taken, cars[i].held, cars[i].large, rear)
+            _mark_excluded(streets, taken, cars[i].held, cars[i].large, rear)
     for c in range(len(crossings)):
         last = max(last, crossings[c].order)
         _take_crossing(traffic, taken, c)
@@ -191,7 +191,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if since[who] == np.inf:
             break
         if who >= num_cars:
-            last = _serve(traffic, who - num_cars, k, last)
+            last = _serve_crossing(traffic, who - num_cars, k, last)
             _take_crossing(traffic, taken, who - num_cars)
             continue
         car = cars[who]
@@ -217,7 +217,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
                 clear = streets.clear[int(is_large), way]
                 blocked |= clear[: len(pieces)] > 0.0
             continue
-        _take(streets, taken, way, is_large, 0.0)
+        _mark_excluded(streets, taken, way, is_large, 0.0)
         last += 1
         car.granted, car.held, car.order = True, way, last
         car.since, car.refused = np.inf, 0.0
@@ -288,7 +288,7 @@ def _duration(distance: float, v: float, a: float, pace: float) -> float:
 
 
 @compiled
-def _serve(traffic: Traffic, c: int, k: int, last: int) -> int:
+def _serve_crossing(traffic: Traffic, c: int, k: int, last: int) -> int:
     """Opens a crossing for pedestrians once earlier vehicles have passed.
 
     `last` is the highest `order` so far; the result is the new one.
@@ -362,7 +362,7 @@ def _stops_within(car: Any) -> float:
 
 
 @compiled
-def _take(
+def _mark_excluded(
     streets: Streets, taken: np.ndarray, place: int, is_large: bool, rear: float
 ) -> None:
     """Marks the ways that a vehicle excludes, given the place of its rear [m].

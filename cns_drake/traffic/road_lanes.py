@@ -79,7 +79,7 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         start, end = _trims_of(ref, trims)
         pieces.append(
             Piece(
-                resampled(_cut(lines[ref], start, end)),
+                resampled(_shortened(lines[ref], start, end)),
                 network.roads[ref.road].speed_limit,
                 False,
                 left=number.get(ref._replace(lane=ref.lane - 1), -1),
@@ -103,9 +103,13 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
             phase = int(across > np.sin(np.pi / 4))
         for way, last in _ways(onward, ref, long):
             length = lane_graph.length_of(lines[ref])
-            parts = [_cut(lines[ref], length - _trims_of(ref, trims)[1], 0)]
+            parts = [
+                _shortened(lines[ref], length - _trims_of(ref, trims)[1], 0)
+            ]
             length = lane_graph.length_of(lines[last])
-            head = _cut(lines[last], 0, length - _trims_of(last, trims)[0])
+            head = _shortened(
+                lines[last], 0, length - _trims_of(last, trims)[0]
+            )
             for one in way:
                 after = head if one.outgoing == last else lines[one.outgoing]
                 parts += [one.points, after]
@@ -142,7 +146,7 @@ def _trims_of(
     return (start, end) if ref.direction == "forward" else (end, start)
 
 
-def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
+def _shortened(line: np.ndarray, start: float, end: float) -> np.ndarray:
     """Returns a line (N, 3) shortened at both ends [m]."""
     along = lane_graph.distances_along(line)
     low, high = start, along[-1] - end
@@ -214,10 +218,10 @@ def _crossings(
 def _crossing_line(road: Road, end: End) -> np.ndarray:
     """Returns the line (2, 3) of a road end's crossing, left end first [m]."""
     offsets = np.array([road.half_width, -road.half_width])
-    return road.evaluate([_station(road, end)] * 2, offsets)[:, :3]
+    return road.evaluate([_crossing_station(road, end)] * 2, offsets)[:, :3]
 
 
-def _station(road: Road, end: End) -> float:
+def _crossing_station(road: Road, end: End) -> float:
     """Returns the station of the crossing at a road's end [m]."""
     if end == "start":
         return road.first_station + _CROSSING_PLACE
@@ -235,21 +239,23 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
         if _is_walked(road):
             for end, side in itertools.product(ENDS, (1, -1)):
                 nodes[road.name, end, side] = len(nodes)
-    places = {key: _place(network.roads[key[0]], *key[1:]) for key in nodes}
+    places = {
+        key: _sidewalk_end(network.roads[key[0]], *key[1:]) for key in nodes
+    }
     found: list[Walkway] = []
     for road in network.roads.values():
         if not _is_walked(road):
             continue
         for side in (1, -1):
-            first, last = (_station(road, end) for end in ENDS)
+            first, last = (_crossing_station(road, end) for end in ENDS)
             stations = np.linspace(first, last, max(2, int(last - first)))
-            line = road.evaluate(stations, side * _offset(road))[:, :3]
+            line = road.evaluate(stations, side * _strip_offset(road))[:, :3]
             line[:, 2] += road.kerb_height
             width = _half_width(_walked_width(road))
             a, b = (nodes[road.name, end, side] for end in ENDS)
             found.append(Walkway(resampled(line), width, a, b))
     for junction in network.junctions.values():
-        found += _corners(network, junction, nodes, places)
+        found += _corner_walkways(network, junction, nodes, places)
     crossed = [
         (road, end, _crossing_line(road, end))
         for road, end in itertools.product(network.roads.values(), ENDS)
@@ -310,7 +316,7 @@ def _walked_width(road: Road) -> float:
     return road.sidewalk - road.parking
 
 
-def _offset(road: Road) -> float:
+def _strip_offset(road: Road) -> float:
     """Returns the distance of the walked strip from the centreline [m].
 
     The strip is on the far side of the sidewalk, away from objects along the
@@ -321,16 +327,18 @@ def _offset(road: Road) -> float:
     )
 
 
-def _place(road: Road, end: End, side: int) -> np.ndarray:
+def _sidewalk_end(road: Road, end: End, side: int) -> np.ndarray:
     """Returns x, y, z of a sidewalk's end, and the heading to the junction."""
-    place = road.evaluate([_station(road, end)], side * _offset(road))[0]
+    place = road.evaluate(
+        [_crossing_station(road, end)], side * _strip_offset(road)
+    )[0]
     place[2] += road.kerb_height
     if end == "start":
         place[3] += np.pi
     return place
 
 
-def _corners(
+def _corner_walkways(
     network: RoadNetwork,
     junction: Junction,
     nodes: dict[tuple[str, End, int], int],

@@ -276,8 +276,8 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
         cars: (...) records of dtype `VEHICLE`.
     """
     half = 0.5 * cars["length"]
-    front = _places(streets, cars, half - cars["front_axle"])
-    rear = _places(streets, cars, half - cars["rear_axle"])
+    front = _points_behind(streets, cars, half - cars["front_axle"])
+    rear = _points_behind(streets, cars, half - cars["rear_axle"])
     x, y, z = (a - b for a, b in zip(front, rear, strict=True))
     length = np.sqrt(x * x + y * y + z * z)
     x, y, z = x / length, y / length, z / length
@@ -288,7 +288,7 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
     return np.stack([*middle, arctan2(y, x), -arcsin(z)], axis=-1)
 
 
-def _places(
+def _points_behind(
     streets: Streets, cars: np.ndarray, back: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """Returns x, y, z at a distance `back` behind each front bumper [m]."""
@@ -346,12 +346,14 @@ def find_occupants(traffic: Traffic, k: int) -> None:
             piece = car.path[column]
             if piece < 0:
                 break
-            free = _enter(traffic, free, piece, i, rear, front, car.v)
+            free = _write_entry(traffic, free, piece, i, rear, front, car.v)
             other = car.left_lane
             if column == CURRENT and other >= 0:
                 there = front * (pieces[other].length / pieces[piece].length)
                 behind = there - car.length
-                free = _enter(traffic, free, other, i, behind, there, car.v)
+                free = _write_entry(
+                    traffic, free, other, i, behind, there, car.v
+                )
             if rear >= 0.0:
                 break
             column -= 1
@@ -364,11 +366,11 @@ def find_occupants(traffic: Traffic, k: int) -> None:
             rear = streets.ego_rear[k, piece]
             front = streets.ego_front[k, piece]
             speed = streets.ego_speed[k, piece]
-            free = _enter(traffic, free, piece, EGO, rear, front, speed)
+            free = _write_entry(traffic, free, piece, EGO, rear, front, speed)
 
 
 @compiled
-def _enter(
+def _write_entry(
     traffic: Traffic,
     number: int,
     piece: int,

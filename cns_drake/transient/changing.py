@@ -327,7 +327,9 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
                 editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
                 changed = True
             else:
-                changed |= _cover(editing, part, ground, depth, is_ground)
+                changed |= _cover_with_snow(
+                    editing, part, ground, depth, is_ground
+                )
         if changed:
             editing.blame(thing.name, _SNOW)
     if ground.carriageway.is_empty:
@@ -350,7 +352,7 @@ def _is_below_road(part: LoadedPart, ground: GroundSurface) -> bool:
     return bool(shapely.intersects(from_above(corners), inner).any())
 
 
-def _cover(
+def _cover_with_snow(
     editing: SceneEditing,
     part: LoadedPart,
     ground: GroundSurface,
@@ -366,10 +368,10 @@ def _cover(
         corners = turned_up(corners)
     corners = corners[unit_normals(corners)[:, 2] > _LEAST_UP]
     if is_ground:
-        corners = _beside(corners, ground)
+        corners = _triangles_beside(corners, ground)
     if len(corners) == 0:
         return False
-    vertices, triangles = _merged(corners)
+    vertices, triangles = _merge_corners(corners)
     triangles = triangles[_is_large(vertices, triangles)]
     if len(triangles) == 0:
         return False
@@ -393,7 +395,7 @@ def _cover(
     return True
 
 
-def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
+def _triangles_beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
     """Returns the triangles beside the carriageway, finer along its edge."""
     corners = corners[shapely.intersects(from_above(corners), ground.near)]
     road = ground.carriageway
@@ -416,7 +418,7 @@ def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
     return np.concatenate(done)
 
 
-def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _merge_corners(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns vertices and triangles; equal corners become one vertex."""
     rounded = np.round(corners.reshape(-1, 3), 4)
     _, first, inverse = np.unique(
@@ -481,7 +483,7 @@ def _lay_banks(
         if np.median(unit_normals(corners)[:, 2]) < 0.0:
             corners = corners[:, ::-1]
         around.editing.add_mesh(
-            "snow_banks", "terrain", *_merged(corners), _LOOK, _SNOW
+            "snow_banks", "terrain", *_merge_corners(corners), _LOOK, _SNOW
         )
 
 

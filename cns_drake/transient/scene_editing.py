@@ -216,7 +216,9 @@ class SceneEditing:
                 part.X_WG.rotation(),
                 p_WS + share * (part.X_WG.translation() - p_WS),
             )
-            self._replace_part(part, X_WG, _scaled(self.shape(part), share))
+            self._replace_part(
+                part, X_WG, _scaled_shape(self.shape(part), share)
+            )
         self.blame(thing.name, cause)
 
     def rebuild(
@@ -580,7 +582,7 @@ def _model_shape(
     return _memory_mesh(mesh.vertices, mesh.triangles(), shape.scale)
 
 
-def _scaled(shape: geometry.Shape, share: float) -> geometry.Shape:
+def _scaled_shape(shape: geometry.Shape, share: float) -> geometry.Shape:
     """Returns a shape scaled about its origin by the factor `share`.
 
     A half space is returned as it is.

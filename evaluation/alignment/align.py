@@ -216,7 +216,7 @@ def align(
     search.grow()
     X_TK, model = _fit(search)
     for _ in range(_ROUNDS):
-        if not search.retry(_doubtful(search, X_TK), X_TK):
+        if not search.retry(_doubtful_keyframes(search, X_TK), X_TK):
             break
         X_TK, model = _fit(search)
     loops = list(search.loops.values())
@@ -346,7 +346,7 @@ def _fit(search: LoopSearch) -> tuple[np.ndarray, str]:
     return fit_bent(loops, X_TL, source, X_TS), "pose graph"
 
 
-def _doubtful(search: LoopSearch, X_TK: np.ndarray) -> np.ndarray:
+def _doubtful_keyframes(search: LoopSearch, X_TK: np.ndarray) -> np.ndarray:
     """Returns the keyframes without a loop that agrees with their poses."""
     loops = list(search.loops.values())
     good = agreeing(loops, search.target.X_WK, X_TK)

@@ -151,7 +151,7 @@ def register(
     return _judge(source, target, X)
 
 
-def _pair(
+def _pair_points(
     source: Surface, target: Surface, X_TS: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Pairs a sample of the points with the nearest ones of the target.
@@ -176,12 +176,12 @@ def _pair(
 
 
 def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
-    sample, is_paired, p_T, nearest = _pair(source, target, X_TS)
+    sample, is_paired, p_T, nearest = _pair_points(source, target, X_TS)
     n_T = target.normals[nearest[is_paired]]
     J = np.concatenate([np.cross(p_T[is_paired], n_T), n_T], axis=1)
     counting = len(source.points) / len(sample) / _CORRELATED
     H = J.T @ J * (counting / _SIGMA**2)
-    reverse, is_found, _, _ = _pair(target, source, poses.inverse(X_TS))
+    reverse, is_found, _, _ = _pair_points(target, source, poses.inverse(X_TS))
     return Registration(
         X_TS=X_TS,
         fitness=float(max(is_paired.mean(), is_found.mean())),

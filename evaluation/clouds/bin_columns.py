@@ -91,7 +91,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
                 windows.append(np.fromfile(stream, "<f4", _WINDOW))
     values = np.concatenate(windows)
     places = np.concatenate([np.arange(len(one)) for one in windows])
-    found = _period(values, places)
+    found = _find_period(values, places)
     wanted = found or _USUAL
     for path, size in zip(files, sizes, strict=True):
         if size % (4 * wanted):
@@ -133,7 +133,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     )
 
 
-def _period(values: np.ndarray, places: np.ndarray) -> int | None:
+def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
     """Returns the number of columns found from the values, or None.
 
     Args:

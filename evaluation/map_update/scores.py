@@ -87,9 +87,9 @@ def score(
     result["points"] = int(sum(rows.sum() for rows in counted))
     result["without_vehicles_and_people"] = _of_points(still)
     for name, distance in _TOLERANCES.items():
-        result[name] = _within(both, distance)
+        result[name] = _scores_within(both, distance)
     result["by_structure"] = _by_structure(both)
-    result.update(_called(still))
+    result.update(_predicted_shares(still))
     result["updated_map"] = _updated_map(both)
     classes = np.unique(np.concatenate([one.classes for one in pair]))
     result["by_class"] = {
@@ -150,7 +150,7 @@ def _of_points(both: _Labelled) -> dict[str, float]:
     return result
 
 
-def _within(both: _Labelled, distance: float) -> dict[str, float]:
+def _scores_within(both: _Labelled, distance: float) -> dict[str, float]:
     """Returns precision and recall of changed points within a distance [m]."""
     pair, truth, predicted, counted = both
     found = {}
@@ -210,7 +210,7 @@ def _by_structure(both: _Labelled) -> dict[str, float]:
     return found
 
 
-def _called(both: _Labelled) -> dict[str, float]:
+def _predicted_shares(both: _Labelled) -> dict[str, float]:
     """Returns shares of points and structures predicted gone or new.
 
     The function also returns the share of the observed structures whose verdict

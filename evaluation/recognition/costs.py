@@ -74,7 +74,7 @@ def measure_search(
         queries: drive with described queries.
     """
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
-    search = _searched(method, places, queries)
+    search = _search_after(method, places, queries)
     return QueryCost(
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
@@ -127,10 +127,10 @@ def query_ms(
         places: described places, all of them candidates.
         queries: drive with described queries.
     """
-    return _median_ms(_searched(method, places, queries))
+    return _median_ms(_search_after(method, places, queries))
 
 
-def _searched(
+def _search_after(
     method: Method, places: DescribedScans, queries: DriveDescriptors
 ) -> Search:
     """Returns a search after some queries."""

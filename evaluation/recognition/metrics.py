@@ -237,10 +237,10 @@ def resampled_weights(
         number = len(known)
         if number == 1:
             return resampled_weights(num_queries, seed)
-    return _drawn(number, seed)[:, of_query]
+    return _block_counts(number, seed)[:, of_query]
 
 
-def _drawn(number: int, seed: int) -> np.ndarray:
+def _block_counts(number: int, seed: int) -> np.ndarray:
     """Returns how often each of `number` blocks is in each sample, float64."""
     rng = np.random.default_rng([seed, number])
     draws = rng.integers(number, size=(_SAMPLES, number))
@@ -277,7 +277,7 @@ def weights_by_drive(
             yield 1, resampled_weights(len(some), drive)
         else:
             of_query = np.searchsorted(known[drive], some)
-            yield number, _drawn(number, drive)[:, of_query]
+            yield number, _block_counts(number, drive)[:, of_query]
 
 
 def resampled_metrics(

@@ -15,19 +15,9 @@ from typing import NamedTuple
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.result_tables import MethodDifference
 from evaluation.results import table_forms as tables
-from evaluation.results.headlines import (
-    KEPT,
-    by_significance,
-    listed,
-    survival,
-)
+from evaluation.results.headlines import KEPT, by_significance, listed, survival
 from evaluation.results.summaries import Ranked, ranking
-from evaluation.results.table import (
-    OWN,
-    STAGE,
-    Results,
-    Row,
-)
+from evaluation.results.table import OWN, STAGE, Results, Row
 
 NO_CONTROL = "no control"
 # A result, and that of its control, if there is one.
@@ -255,9 +245,9 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
             "map": lambda s: s.pair[0],
             "DB → query": lambda s: " → ".join(s.pair[1:]),
             "method": lambda s: tables.title(s.method),
-            **_shown("AUC", "auc", "kept"),
-            **_shown("AUC strict", "auc_strict"),
-            **_shown("R@1", "r1", "kept_r1"),
+            **_metric_columns("AUC", "auc", "kept"),
+            **_metric_columns("AUC strict", "auc_strict"),
+            **_metric_columns("R@1", "r1", "kept_r1"),
             ("recall at full precision", "with change"): lambda s: s.number(
                 "after", "recall_at_full_precision"
             ),
@@ -266,7 +256,7 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
     )
 
 
-def _shown(
+def _metric_columns(
     group: str, metric: str, kept: str | None = None
 ) -> tables.Columns[Survival]:
     """Returns columns: a metric without change, with change, and retained."""

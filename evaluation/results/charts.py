@@ -395,7 +395,7 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
             axes.plot(x, y, linestyle=style, marker=marker, color=colour, ms=5)
             if x[-1:] == at[-1:]:
                 last.setdefault(label, []).append(y[-1])
-        _spread(axes, at)
+        _spread_axis(axes, at)
         if chart.metric in COSTS:
             axes.set_yscale("log")
         else:
@@ -419,7 +419,7 @@ def _number(row: Row, column: str) -> float:
     return float(value)
 
 
-def _spread(axes: Axes, at: Sequence[float]) -> None:
+def _spread_axis(axes: Axes, at: Sequence[float]) -> None:
     """Makes the x axis logarithmic if its values span a wide range."""
     above = [one for one in at if one > 0.0]
     if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:

@@ -259,7 +259,11 @@ def compare(
                 " intervals are too narrow"
             )
         own.append(
-            _Table(_name(path, paths), _by_place(chosen_rows), _by_place(asked))
+            _Table(
+                _table_name(path, paths),
+                _by_place(chosen_rows),
+                _by_place(asked),
+            )
         )
     less = bool(_LESS.fullmatch(metric))
     if rankings:
@@ -267,7 +271,7 @@ def compare(
             raise InputError("--rankings: two tables are needed")
         for k, table in enumerate(own):
             changed, left = _without_controls(table.conditions)
-            own[k] = _on(table, changed)
+            own[k] = _reduced_to(table, changed)
             notes += [f"{table.name}: {one}" for one in left]
         pairs = itertools.combinations(own, 2)
         found = [_agreement(*pair, metric) for pair in pairs]
@@ -278,12 +282,12 @@ def compare(
         ]
         return Comparison(metric, task, 0, each, (), found, notes)
     shipped = _shipped(wanted)
-    common, apart = _common(own, shipped, paths)
+    common, apart = _common_conditions(own, shipped, paths)
     common, left_out = _without_controls(common)
     notes += [*apart, *left_out]
-    tables = [_on(table, common) for table in (shipped, *own)]
-    entries, left_out = _entries(tables, common)
-    notes += [*left_out, *_unlike(entries, common)]
+    tables = [_reduced_to(table, common) for table in (shipped, *own)]
+    entries, left_out = _ranked_entries(tables, common)
+    notes += [*left_out, *_mismatch_notes(entries, common)]
     rows = [
         replace(table.rows[method, one], method=name)
         for name, (table, method) in entries.items()
@@ -312,7 +316,7 @@ def suggest_comparison(folder: Path) -> None:
         next_command("cns-eval", "compare", folder)
 
 
-def _name(path: Path, paths: Iterable[Path]) -> str:
+def _table_name(path: Path, paths: Iterable[Path]) -> str:
     """Returns the name of a table: the name of its file or folder."""
     names = [
         one.stem
@@ -391,7 +395,7 @@ def _check_agreement(
             )
 
 
-def _entries(
+def _ranked_entries(
     tables: Sequence[_Table], common: Sequence[tuple[object, ...]]
 ) -> tuple[dict[str, tuple[_Table, str]], list[str]]:
     """Returns the methods to rank by their names, and notes on the others.
@@ -447,7 +451,7 @@ def _entries(
     }, notes
 
 
-def _unlike(
+def _mismatch_notes(
     entries: Mapping[str, tuple[_Table, str]],
     common: Sequence[tuple[object, ...]],
 ) -> Iterator[str]:
@@ -489,7 +493,7 @@ def _baselines() -> list[Results]:
     return [Results.read(path) for path in sorted(_BASELINES.glob("*.csv"))]
 
 
-def _common(
+def _common_conditions(
     own: Sequence[_Table], shipped: _Table, paths: Sequence[Path]
 ) -> tuple[list[tuple[object, ...]], list[str]]:
     """Returns the conditions that all tables have, and notes for the user."""
@@ -509,9 +513,8 @@ def _common(
     names = ", ".join(map(str, paths))
     others = (*own[1:], *([] if own[1:] else [shipped]))
     beside = "" if len(own) > 1 else " with the shipped tables"
-    raise InputError(
-        f"{names}: no condition in common{beside} ({_apart(own[0], others[0])})"
-    )
+    why = _why_nothing_is_common(own[0], others[0])
+    raise InputError(f"{names}: no condition in common{beside} ({why})")
 
 
 def _left_out(
@@ -571,7 +574,7 @@ def _without_controls(
     ]
 
 
-def _apart(one: _Table, other: _Table) -> str:
+def _why_nothing_is_common(one: _Table, other: _Table) -> str:
     """Returns as text why two tables have no condition in common."""
     rows = [list(table.rows.values()) for table in (one, other)]
     factors = {
@@ -589,7 +592,7 @@ def _apart(one: _Table, other: _Table) -> str:
     return "each value is in both, but no row has the same ones in all columns"
 
 
-def _on(table: _Table, common: Iterable[tuple[object, ...]]) -> _Table:
+def _reduced_to(table: _Table, common: Iterable[tuple[object, ...]]) -> _Table:
     """Returns a table reduced to some of its conditions."""
     kept = set(common)
     rows = {place: row for place, row in table.rows.items() if place[1] in kept}
@@ -642,8 +645,8 @@ def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
             f"{first.name}, {second.name}: fewer than two methods are on all"
             f" conditions of both ({', '.join(methods) or 'none'})"
         )
-    one, one_samples = _values(first, methods, metric)
-    other, other_samples = _values(second, methods, metric)
+    one, one_samples = _means_and_samples(first, methods, metric)
+    other, other_samples = _means_and_samples(second, methods, metric)
     samples = zip(one_samples, other_samples, strict=True)
     taus = np.array([_tau(*pair) for pair in samples])
     return Agreement(
@@ -655,7 +658,7 @@ def _agreement(first: _Table, second: _Table, metric: str) -> Agreement:
     )
 
 
-def _values(
+def _means_and_samples(
     table: _Table, methods: Sequence[str], metric: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns means (M,) of methods, and their bootstrap samples (B, M)."""

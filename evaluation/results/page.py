@@ -26,13 +26,7 @@ from evaluation.results.summaries import (
     means,
     summarised,
 )
-from evaluation.results.table import (
-    COSTS,
-    KEYS,
-    SETTINGS,
-    QueryRows,
-    Results,
-)
+from evaluation.results.table import COSTS, KEYS, SETTINGS, QueryRows, Results
 from evaluation.results.table_forms import in_table_order
 from evaluation.results.table_forms import title as title_of
 
@@ -126,7 +120,7 @@ def write_page(
             check_all(one.what, (one.value, one.low, one.high))
         write_csv(folder / _SUMMARIES, Summary._fields, numbers)
     templates = environment(
-        __package__, _TEMPLATES, {"shown": _shown, "corners": _corners}
+        __package__, _TEMPLATES, {"shown": _value_text, "corners": _corners}
     )
 
     def section(
@@ -300,9 +294,9 @@ def _wide_table(results: Results) -> dict[str, Any]:
         for column in zip(*cells, strict=True)
     ]
     columns = [
-        [f"{v:.0f}" if _is_finite(v) else _shown(v) for v in column]
+        [f"{v:.0f}" if _is_finite(v) else _value_text(v) for v in column]
         if _are_counts(column)
-        else [_shown(v) for v in column]
+        else [_value_text(v) for v in column]
         for column in zip(*cells, strict=True)
     ]
     return {
@@ -324,7 +318,7 @@ def _is_finite(value: object) -> bool:
     return isinstance(value, float) and math.isfinite(value)
 
 
-def _shown(value: object) -> str:
+def _value_text(value: object) -> str:
     """Returns a value as text for a reader."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""

@@ -327,7 +327,7 @@ class Results:
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one, key, identity in table.keyed():
-            row = Row(**key, **_measured(one))
+            row = Row(**key, **_measured_values(one))
             first = lines.setdefault((*identity, row.metric), one.number)
             if first != one.number:
                 raise one.fault("metric", f"the same is in line {first}")
@@ -435,7 +435,9 @@ class QueryRows:
         return cls(
             table.factors,
             tuple(
-                Answers(**key, columns=_answered(lines, names, key["task"]))
+                Answers(
+                    **key, columns=_answer_columns(lines, names, key["task"])
+                )
                 for key, lines in found.values()
             ),
         )
@@ -497,7 +499,7 @@ def _answer_cell(value: Any, kind: type) -> str:
     return str(int(value)) if kind in (bool, int) else _cell(value)
 
 
-def _answered(
+def _answer_columns(
     lines: Sequence[_Line], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
     """Returns column -> checked values of all lines with the same key."""
@@ -532,7 +534,7 @@ def _answered(
     return columns
 
 
-def _measured(one: _Line) -> dict[str, Any]:
+def _measured_values(one: _Line) -> dict[str, Any]:
     """Returns a row's values in the columns after those of its key."""
     metric = one.text("metric")
     value, low, high = (

@@ -135,14 +135,14 @@ def find_evidence(
             right = shown[matches[best]]
             overlaps[row], hidden_shares[row] = seen[best]
             if classes:
-                changed[row], changed_classes[row] = _change(
+                changed[row], changed_classes[row] = _changed_share(
                     right, query_scan, classes
                 )
         answers = sorted({int(places[row]) for places in wrong.values()} - {-1})
         compared = [shown[k] for k in answers]
         if answers and right is not None:
             compared.append(right)
-        found = _fits(query_scan, compared)
+        found = _coinciding_shares(query_scan, compared)
         if len(found) > len(answers):
             right_fits[row] = found[-1]
         fit_of = dict(zip(answers, found, strict=False))
@@ -201,7 +201,9 @@ class _Shown:
     @cached_property
     def standing(self) -> np.ndarray:
         """(M, 3) centroids of the points on upright objects, per voxel [m]."""
-        return thin(self.points[self.points[:, 2] > _standing()], _CELL)
+        return thin(
+            self.points[self.points[:, 2] > _least_standing_height()], _CELL
+        )
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -234,7 +236,7 @@ class _Shown:
         return transform(X_OS, self.some)
 
 
-def _change(
+def _changed_share(
     place: _Shown, query: _Shown, classes: Mapping[int, str]
 ) -> tuple[float, str]:
     """Returns the share of two scans that is new or gone, and its main class.
@@ -248,7 +250,7 @@ def _change(
         points, instances = one.some, one.some_instances
         if instances is None or other.instances is None:
             return math.nan, ""
-        is_standing = points[:, 2] > _standing()
+        is_standing = points[:, 2] > _least_standing_height()
         total += int(is_standing.sum())
         is_gone = is_standing & ~np.isin(instances, other.instances)
         X_OS = inverse(other.X_WS) @ one.X_WS
@@ -264,7 +266,7 @@ def _change(
     return changed.total() / total, name
 
 
-def _fits(query: _Shown, places: Sequence[_Shown]) -> list[float]:
+def _coinciding_shares(query: _Shown, places: Sequence[_Shown]) -> list[float]:
     """Returns, for each place, the share of upright points that coincide.
 
     Query and place are aligned at the pose that the method layered overlap
@@ -291,6 +293,6 @@ def _fits(query: _Shown, places: Sequence[_Shown]) -> list[float]:
     return shared
 
 
-def _standing() -> float:
+def _least_standing_height() -> float:
     """Returns the least height of standing points above the sensor [m]."""
     return _STANDING - MethodConfig().sensor_height

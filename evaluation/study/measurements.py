@@ -108,7 +108,7 @@ def shown_overlaps(
     )
     database = searched.described
     names = searched.drives
-    allowed = _others(query, names) if leaves_out_itself else True
+    allowed = _other_places(query, names) if leaves_out_itself else True
     matches = {
         radius: matches_within_radius(
             database, query, replace(protocol, radius=radius)
@@ -331,7 +331,7 @@ def _compare(
         protocol,
         [None, *radii],
         truth,
-        _others(query, drives) if leaves_out_itself else None,
+        _other_places(query, drives) if leaves_out_itself else None,
     )
     outcomes = []
     for radius, one in zip(radii, by_gate, strict=True):
@@ -355,7 +355,7 @@ def _compare(
     return outcomes
 
 
-def _others(query: DriveDescriptors, drives: Sequence[str]) -> np.ndarray:
+def _other_places(query: DriveDescriptors, drives: Sequence[str]) -> np.ndarray:
     """Returns (Q, D) bool, all places but that of the query's own scan."""
     return ~np.eye(len(query.queries.frames), len(drives), dtype=bool)
 

@@ -19,14 +19,7 @@ import struct
 import sys
 import tokenize
 from types import NoneType, UnionType
-from typing import (
-    Any,
-    BinaryIO,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Any, BinaryIO, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 import zstandard
@@ -204,11 +197,11 @@ def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
         return arrays[tree["scalar"]][()]
     if "named" in tree:
         values = [_decode(one, arrays) for one in tree["values"]]
-        kind = _find(*tree["named"])
+        kind = _find_type(*tree["named"])
         if not issubclass(kind, tuple) or len(kind._fields) != len(values):
             raise TypeError(f"{kind.__name__} is no such tuple")
         return tuple.__new__(kind, values)
-    kind = _find(*tree["dataclass"])
+    kind = _find_type(*tree["dataclass"])
     names = {field.name for field in fields(kind)}
     if names != tree["fields"].keys():
         raise TypeError(f"{kind.__name__} has other fields")
@@ -218,7 +211,7 @@ def _decode(tree: Any, arrays: list[np.ndarray]) -> Any:
     return made
 
 
-def _find(module: str, name: str) -> Any:
+def _find_type(module: str, name: str) -> Any:
     """Returns a type by its name; imports only modules of this package."""
     if module not in sys.modules and _OWN_MODULE.fullmatch(module):
         importlib.import_module(module)
@@ -230,12 +223,12 @@ def _find(module: str, name: str) -> Any:
     return found
 
 
-def _fits(tree: Any, hint: Any) -> bool:
+def _fits_type(tree: Any, hint: Any) -> bool:
     """Returns whether a tree may be of a type; arrays may hold anything."""
     kind = get_origin(hint) or hint
     inner = get_args(hint)
     if kind in (Union, UnionType):
-        return any(_fits(tree, one) for one in inner)
+        return any(_fits_type(tree, one) for one in inner)
     kind = NoneType if kind is None else kind
     is_open = kind is Any or not isinstance(kind, type)
     if is_open or (isinstance(tree, dict) and "scalar" in tree):
@@ -244,13 +237,13 @@ def _fits(tree: Any, hint: Any) -> bool:
     if isinstance(tree, dict):
         name = tree.get("dataclass") or tree.get("named")
         forms = [one for form, one in _FORMS.items() if form in tree]
-        found = _find(*name) if name else forms[0]
+        found = _find_type(*name) if name else forms[0]
     if not issubclass(found, (kind, int) if kind is float else kind):
         return False
     if is_dataclass(found) and not found.__module__.startswith(_METHODS):
-        hints = _hints(found)
+        hints = _annotations(found)
         return all(
-            _fits(tree["fields"][one.name], hints.get(one.name, Any))
+            _fits_type(tree["fields"][one.name], hints.get(one.name, Any))
             for one in fields(found)
         )
     if found not in (list, tuple, dict) or not inner:
@@ -259,11 +252,11 @@ def _fits(tree: Any, hint: Any) -> bool:
     if found is dict:
         items = [one for _, one in items]
     elif kind is tuple and inner[1:] != (...,):
-        return len(items) == len(inner) and all(map(_fits, items, inner))
-    return all(_fits(one, inner[found is dict]) for one in items)
+        return len(items) == len(inner) and all(map(_fits_type, items, inner))
+    return all(_fits_type(one, inner[found is dict]) for one in items)
 
 
-def _hints(kind: Any) -> dict[str, Any]:
+def _annotations(kind: Any) -> dict[str, Any]:
     """Returns the annotations of a class or function, if they can be found."""
     try:
         return get_type_hints(kind)
@@ -271,7 +264,7 @@ def _hints(kind: Any) -> dict[str, Any]:
         return {}
 
 
-def _most(size: int) -> int:
+def _uncompressed_size(size: int) -> int:
     """Returns the greatest uncompressed size of some compressed bytes."""
     return max(_MOST_RATIO * size, _ALWAYS_BYTES)
 
@@ -301,7 +294,7 @@ class Part:
             raise InputError(f"{self.path}: {error}") from error
         compressor = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True)
         data = compressor.compress(plain)
-        is_stored = len(plain) > _most(len(data))
+        is_stored = len(plain) > _uncompressed_size(len(data))
         data = plain if is_stored else data
         header = {
             "digest": fingerprint(inputs),
@@ -406,8 +399,8 @@ class Part:
             if "stored" not in header:
                 source = zstandard.ZstdDecompressor().stream_reader(stream)
             (length,) = _LENGTH.unpack(source.read(_LENGTH.size))
-            tree = source.read(min(length, _most(header["bytes"])))
-            return _fits(json.loads(tree), hint)
+            tree = source.read(min(length, _uncompressed_size(header["bytes"])))
+            return _fits_type(json.loads(tree), hint)
         return False
 
     @contextlib.contextmanager
@@ -426,7 +419,7 @@ class Part:
                 stream.seek(start)
                 if not {"stored", _SPENT} & header.keys():
                     claimed = zstandard.frame_content_size(stream.read(18))
-                    if not 0 <= claimed <= _most(size):
+                    if not 0 <= claimed <= _uncompressed_size(size):
                         raise ValueError(f"{size} bytes stand for {claimed}")
                     stream.seek(start)
                 yield header, stream
@@ -465,7 +458,7 @@ class MakePart(Step):
         return self.part.path
 
     def is_done(self) -> bool:
-        hint = _hints(self.function).get("return", Any)
+        hint = _annotations(self.function).get("return", Any)
         return (
             self.part.path.is_file()
             and self.part.is_current(self._inputs())

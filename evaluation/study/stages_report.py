@@ -302,7 +302,10 @@ class _CityReport:
             (*one.names, one.factors[STAGE]): one for one in measured
         }
         planned = study.engine.add(
-            measured, make_jobs=partial(ExtractionJobs, further=self._further())
+            measured,
+            make_jobs=partial(
+                ExtractionJobs, further=self._further_descriptors()
+            ),
         )
         assert isinstance(planned, ExtractionJobs)
         self._drawing, job = figures.drawing_job(city, self._files, planned)
@@ -312,7 +315,7 @@ class _CityReport:
             parts = tuple(
                 part
                 for stage in (OWN, LAST)
-                if (one := self._own(pair, stage)) is not None
+                if (one := self._measured_or_control(pair, stage)) is not None
                 for part in one.parts["change"]
                 if isinstance(part, Part)
             )
@@ -321,12 +324,12 @@ class _CityReport:
             )
             self._changes.append(change)
             jobs.append(job)
-        jobs += map(self._explaining, self._pairs)
+        jobs += map(self._evidence_job, self._pairs)
         self.jobs = {**planned.jobs, **{job.name: job for job in jobs}}
         # Drives -> the pairs of second runs.
         self._repeated: dict[tuple[str, str], list[Pair]] = {}
         for pair in self._pairs:
-            own = self._own(pair)
+            own = self._measured_or_control(pair)
             assert own is not None
             for again in self._repeats.get(own.names, ()):
                 one = again.of(own)
@@ -334,7 +337,9 @@ class _CityReport:
                 self.jobs |= added.jobs
                 self._repeated.setdefault(own.names, []).append(one)
 
-    def _own(self, pair: Recordings, stage: str = OWN) -> Pair | None:
+    def _measured_or_control(
+        self, pair: Recordings, stage: str = OWN
+    ) -> Pair | None:
         """Returns a pair as it is measured, or (stage `last`) its control."""
         return self._measured.get((pair[0].name, pair[1].name, stage))
 
@@ -364,7 +369,7 @@ class _CityReport:
             ):
                 yield replace(pair, names=(names, pair.query.name))
 
-    def _further(self) -> dict[str, tuple[Further, ...]]:
+    def _further_descriptors(self) -> dict[str, tuple[Further, ...]]:
         """Returns drive -> its descriptors that second runs need."""
         roles: dict[str, dict[Repeat, set[Role]]]
         roles = defaultdict(lambda: defaultdict(set))
@@ -387,9 +392,9 @@ class _CityReport:
         """Returns the file with evidence on why top-ranked places are wrong."""
         return self._files.part("why", *(one.name for one in pair))
 
-    def _explaining(self, pair: Recordings) -> Job:
+    def _evidence_job(self, pair: Recordings) -> Job:
         """Returns the job that finds out why answers of a pair are wrong."""
-        own = self._own(pair)
+        own = self._measured_or_control(pair)
         assert own is not None
         features = [self._files.features(one.name) for one in pair]
         step = MakePart(
@@ -437,7 +442,10 @@ class _CityReport:
         report.changes += [part.read() for part in self._changes]
         compared = []
         for pair in self._pairs:
-            own, control = self._own(pair), self._own(pair, LAST)
+            own, control = (
+                self._measured_or_control(pair),
+                self._measured_or_control(pair, LAST),
+            )
             assert own is not None
             found = self._outcomes(pair, own.parts["place"])
             before = {}
@@ -478,7 +486,7 @@ class _CityReport:
                 if one.name == together.database.name
             )
             pair = first, self._city.last
-            own = self._own(pair)
+            own = self._measured_or_control(pair)
             assert own is not None
             report.sessions += self._outcomes(pair, own.parts["place"])
             report.sessions += [

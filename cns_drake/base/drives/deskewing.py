@@ -96,7 +96,9 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     times_ns = stamps_ns - drive.stamps_ns[index]
     first, end = np.searchsorted(times_ns, [0, t_ns.max(initial=0)])
     around = slice(max(0, first - _REACH), end + _REACH + 1)
-    X_WT = _evaluate(times_ns[around] * 1e-9, X_WS[around], t_ns * 1e-9)
+    X_WT = _interpolate_poses(
+        times_ns[around] * 1e-9, X_WS[around], t_ns * 1e-9
+    )
     X_ST = poses.inverse(X_WS[first]) @ X_WT
     p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
     R_ST, p_ST = X_ST[column, :3, :3], X_ST[column, :3, 3]
@@ -106,7 +108,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     return points
 
 
-def _evaluate(
+def _interpolate_poses(
     times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
     """Returns poses (M, 4, 4) at (M,) times by splines through N poses [s]."""

@@ -46,12 +46,12 @@ def make_message(message_type: str, **fields: Any) -> Any:
     """
     _, kinds = _TYPESTORE.fielddefs[message_type]
     values = {
-        name: _value(kind, fields.pop(name, None)) for name, kind in kinds
+        name: _field_value(kind, fields.pop(name, None)) for name, kind in kinds
     }
     return message_class(message_type)(**values, **fields)
 
 
-def _value(kind: tuple, given: Any) -> Any:
+def _field_value(kind: tuple, given: Any) -> Any:
     """Converts a value to the type of a message's field; None becomes zero."""
     node, inner = kind
     if node is Nodetype.NAME:
@@ -68,7 +68,7 @@ def _value(kind: tuple, given: Any) -> Any:
         return python_type() if given is None else python_type(given)
     element, length = inner
     if element[0] is Nodetype.NAME:
-        return [_value(element, one) for one in given or ()]
+        return [_field_value(element, one) for one in given or ()]
     scalar = element[1][0]
     return (
         np.zeros(length, scalar) if given is None else np.asarray(given, scalar)

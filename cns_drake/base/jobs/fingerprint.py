@@ -110,7 +110,7 @@ def _source(module: _Module) -> Path | None:
     return None
 
 
-def _imported(module: _Module) -> Iterator[_Module]:
+def _imported_modules(module: _Module) -> Iterator[_Module]:
     """Yields imported modules that are ours or, of a script, beside it.
 
     Beside an installed package stand all other installed packages. Their
@@ -151,7 +151,7 @@ def _digest(modules: Iterable[_Module], without: tuple[str, ...]) -> str:
     for read in (_source, _imports_of):  # Files may have changed.
         read.cache_clear()
     total = hashlib.sha256(repr(installed_versions(_LIBRARIES)).encode())
-    for name, path in sorted(_files(modules, without).items()):
+    for name, path in sorted(_source_files(modules, without).items()):
         total.update(f"{name}\n".encode())
         with user_errors(path):
             # Line ends may differ between the machines of a cluster.
@@ -159,7 +159,7 @@ def _digest(modules: Iterable[_Module], without: tuple[str, ...]) -> str:
     return total.hexdigest()[:32]
 
 
-def _files(
+def _source_files(
     modules: Iterable[_Module], without: tuple[str, ...]
 ) -> dict[str, Path]:
     """Returns name -> path of the files that modules consist of."""
@@ -182,7 +182,7 @@ def _files(
             source = _source(one)
             if source is not None:
                 found[f"{one.name}.py"] = source
-                waiting += _imported(one)
+                waiting += _imported_modules(one)
     return found
 
 

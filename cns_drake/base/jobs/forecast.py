@@ -46,12 +46,12 @@ def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
             done.
         num_workers: number of jobs that run at a time.
     """
-    ends: Mapping[str, float] = _ends({job.name: job for job in jobs})
+    ends: Mapping[str, float] = _end_times({job.name: job for job in jobs})
     even = sum(job.cost for job in jobs) / num_workers
     return max(even, *ends.values(), 0.0)
 
 
-def _ends(jobs: Mapping[str, Job]) -> dict[str, float]:
+def _end_times(jobs: Mapping[str, Job]) -> dict[str, float]:
     """Returns when each job ends if none waits for a worker [s]."""
     ends: dict[str, float] = {}
 
@@ -121,7 +121,7 @@ def forecast(
     if cluster.slots is not None:
         seconds *= measure_slowness()
         parts += [
-            f"about {_rounded(seconds)} with {number} at a time, as this"
+            f"about {_rounded_time(seconds)} with {number} at a time, as this"
             " machine was measured just now",
             f"{_gigabytes(number * _JOB_MEMORY)} of memory",
         ]
@@ -130,7 +130,7 @@ def forecast(
     return f"{len(left)} jobs: {'; '.join(parts)}" if parts else None
 
 
-def _rounded(seconds: float) -> str:
+def _rounded_time(seconds: float) -> str:
     """Returns a time as text, with one or two digits."""
     if seconds < 100.0:
         return f"{max(math.ceil(seconds / 10.0), 1) * 10} s"

@@ -98,11 +98,11 @@ def run_process(
     ours, theirs = Pipe()
     with ours:
         with theirs:  # The pipe then ends with the process.
-            process = _start(theirs, job)
+            process = _start_process(theirs, job)
         try:
             kind, text = _listen(ours, on_message, is_wanted)
         finally:
-            status = _end(process)
+            status = _end_process(process)
             if status == -signal.SIGKILL:  # The killed process left its lock.
                 with interrupts.uninterrupted():
                     output = pickle.loads(job).output
@@ -111,11 +111,11 @@ def run_process(
     if kind == "fault":
         raise JobError(text)
     if kind != "done":
-        raise ProcessDiedError(text or _describe(status))
+        raise ProcessDiedError(text or _describe_status(status))
 
 
-def _start(connection: Connection, job: bytes) -> BaseProcess:
-    process = _context.Process(target=_work, args=(connection, job))
+def _start_process(connection: Connection, job: bytes) -> BaseProcess:
+    process = _context.Process(target=_process_main, args=(connection, job))
     try:
         with _starting, _environment_of_jobs():
             process.start()
@@ -175,7 +175,7 @@ def _listen(
     return "", ""
 
 
-def _end(process: BaseProcess) -> int:
+def _end_process(process: BaseProcess) -> int:
     """Ends a process and returns its status."""
     process.terminate()
     process.join(PATIENCE)
@@ -186,7 +186,7 @@ def _end(process: BaseProcess) -> int:
     return process.exitcode
 
 
-def _describe(status: int) -> str:
+def _describe_status(status: int) -> str:
     if status >= 0:
         return f"its process ended with status {status}"
     name = f"signal {-status}"
@@ -196,7 +196,7 @@ def _describe(status: int) -> str:
     return f"its process was ended by {name}{why}"
 
 
-def _work(connection: Connection, job: bytes) -> None:
+def _process_main(connection: Connection, job: bytes) -> None:
     """Runs a job: the main function of its process."""
     interrupts.interrupt_on_termination(once=True)
     # In its own session, which Ctrl-C does not reach: the interrupted parent
@@ -211,14 +211,14 @@ def _work(connection: Connection, job: bytes) -> None:
 
     try:
         threading.Thread(target=end_with_parent, daemon=True).start()
-        last = _run(job, Reporter(send))
+        last = _run_job(job, Reporter(send))
     except KeyboardInterrupt:
         interrupts.end_interrupted()
     interrupts.ignore_interrupts()
     send(*last)
 
 
-def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
+def _run_job(job: bytes, reporter: Reporter) -> tuple[str, str]:
     """Runs a job; returns its last message."""
     try:
         with interrupts.uninterrupted():
@@ -268,7 +268,7 @@ def end_with_parent() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _prepare(modules: Iterable[str]) -> None:
+def _preload_modules(modules: Iterable[str]) -> None:
     """Imports modules in the process from which job processes are forked."""
     # Python looks for modules in the current folder first.
     leave_out_folder(sys.path)
@@ -287,4 +287,4 @@ def _prepare(modules: Iterable[str]) -> None:
 
 
 if names := os.environ.pop(_MODULES_VARIABLE, None):
-    _prepare(names.split())
+    _preload_modules(names.split())

@@ -456,7 +456,7 @@ class SemiDetached(_FamilyHouse):
         _add_chimneys(self, main)
 
 
-def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+def _bay_middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
     """Returns the middles of the two bays along the main wall [m]."""
     half = (main.x1 - main.x0) / 2
     # Doors take the middle or the ends; bays take the rest of each half.
@@ -475,7 +475,7 @@ def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
     middle = (main.y0 + main.y1) / 2
     fronts = (
         (main.x0 + x - width / 2, main.x0 + x + width / 2)
-        for x in _middles(p, main)
+        for x in _bay_middles(p, main)
     )
     y0 = main.y0 - p.bay_reach
     return tuple(
@@ -503,7 +503,7 @@ def _add_entrances(
         details.add_porch(
             p, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
         )
-    for x in _middles(p, main) if p.bay == "canted" else ():
+    for x in _bay_middles(p, main) if p.bay == "canted" else ():
         width = min(2.4, 0.5 * half)
         ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
         openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)

@@ -276,7 +276,7 @@ def _add_walk_up_ground(
     cellar = bays.rhythm(2 * p.pitch, [vent], 0.5)
     doors = stairs or [0]
     entries = dict.fromkeys(doors, bays.with_middle(rows, door, 2.4))
-    others = _both(rows, cellar) if p.floor > 0.7 else rows
+    others = _combined_layout(rows, cellar) if p.floor > 0.7 else rows
     layout = bays.by_edge({0: rows} | entries, others)
     bands = (Band(p.floor, p.floor + 0.12, -0.08), Band(h - 0.2, h, -0.08))
     pieces: list[Mesh] = []
@@ -340,7 +340,7 @@ def _add_top(
         add_chimney(p, f"chimney_{k}", spot, brick, item="chimney_row")
 
 
-def _both(first: Layout, second: Layout) -> Layout:
+def _combined_layout(first: Layout, second: Layout) -> Layout:
     """Returns a layout with the reliefs of two layouts that do not overlap."""
 
     def layout(edge: int, length: float) -> list[Relief]:

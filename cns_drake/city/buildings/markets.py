@@ -58,7 +58,7 @@ class ShopStrip(Building):
             tall = self.height > self.ground + 3.4 and (
                 k == highest or self.chance(self.upper)
             )
-            top = self.height if k == highest else _top(self, tall)
+            top = self.height if k == highest else _parapet_top(self, tall)
             back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
             area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
@@ -71,7 +71,7 @@ class ShopStrip(Building):
                 )
 
 
-def _top(p: ShopStrip, tall: bool) -> float:
+def _parapet_top(p: ShopStrip, tall: bool) -> float:
     """Returns the parapet's height for a unit that is not the highest [m]."""
     drop = p.steps * p.whole(0, 3)
     if tall or p.height < p.ground + 3.4:

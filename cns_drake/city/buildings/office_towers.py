@@ -72,7 +72,7 @@ class BandedTower(Building):
         counts = tiers.divided(room, self.storey, 12 // self.stacks)
         plans = {"wide": outer, "slim": inner}
         shapes = [
-            (plan, _stack(self, plan, counts, name))
+            (plan, _stack_adder(self, plan, counts, name))
             for name, plan in list(plans.items())[: self.stacks]
         ]
         for k in range(self.stacks):
@@ -134,7 +134,7 @@ def _add_garden(
     return round(z0 + height, 3)
 
 
-def _stack(
+def _stack_adder(
     p: BandedTower, plan: np.ndarray, counts: tuple[int, int, float], name: str
 ) -> Callable[[float, int], float]:
     """Returns a function that adds a stack of storeys with one outline.
@@ -221,7 +221,7 @@ class GridTower(Building):
 
         The building's site must be a rectangle.
         """
-        plan = np.round(_plan(self, self.site), 2)
+        plan = np.round(_outline(self, self.site), 2)
         top = _add_grid_tower_lobby(self, plan)
         if self.waist > 0:
             top = _add_grid(self, plan, top, self.waist * self.height, "low")
@@ -238,7 +238,7 @@ class GridTower(Building):
         equip_roof(self, free, roof, self.roof_items, clear=0.8)
 
 
-def _plan(p: GridTower, site: Site) -> np.ndarray:
+def _outline(p: GridTower, site: Site) -> np.ndarray:
     """Returns the outline, slightly within the site; the front comes first."""
     x0, y0, x1, y1 = site.bounds
     base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
@@ -358,7 +358,7 @@ class UnfinishedTower(Building):
             _add_hoist(self, plan)
 
 
-def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
+def _column_places(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
     """Returns the places of the columns."""
     x0, y0, x1, y1 = massing.extent(plan)
     places = []
@@ -371,7 +371,7 @@ def _columns(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
 
 def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the columns and the slab of every storey."""
-    columns = _columns(p, plan)
+    columns = _column_places(p, plan)
     low = p.storey - _SLAB_M
     top = p.storeys * p.storey
     pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
@@ -391,7 +391,7 @@ def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
             post = (u - 0.03, u + 0.03, -0.09, -0.03)
             stubs.append(wall.box(*post, top, top + 1.1))
-    group = _repeated(pieces, p.group, p.storey)
+    group = _repeated_meshes(pieces, p.group, p.storey)
     step = p.group * p.storey
     p.stack("frame", group, 0.0, step, p.storeys // p.group)
     p.add("stubs", *stubs)
@@ -441,7 +441,7 @@ def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
         ("cladding", walls, p.colours["clad"]),
         ("cladding_glass", panes, p.glass),
     ):
-        mesh = _repeated(pieces, p.group, p.storey)
+        mesh = _repeated_meshes(pieces, p.group, p.storey)
         p.stack(part, mesh, 0.0, step, groups, finish)
     p.add("foot", massing.foundation(outer), finish=p.colours["clad"])
 
@@ -487,7 +487,7 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
                 low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
                 nets.append(wall.box(*spot, low, high))
-    stack = _repeated(levels, per_group, _LIFT_M)
+    stack = _repeated_meshes(levels, per_group, _LIFT_M)
     p.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, finish=_STEEL)
     p.add("standards", *standards, finish=_STEEL)
     p.add("nets", *nets, finish=p.colours["net"])
@@ -510,7 +510,7 @@ def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
     p.add("hoist", *pieces, cage, finish=Finish((0.80, 0.62, 0.16)))
 
 
-def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:
+def _repeated_meshes(pieces: list[Mesh], count: int, step: float) -> Mesh:
     """Returns meshes repeated `count` times, one above another."""
     storey = merge_meshes(*pieces)
     copies = (storey.moved((0.0, 0.0, k * step)) for k in range(count))

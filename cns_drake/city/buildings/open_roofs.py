@@ -70,7 +70,7 @@ class GasStation(Building):
         _add_sign(self, (x0, x1), y0)
 
 
-def _rows(p: GasStation, canopy: np.ndarray) -> list[float]:
+def _pump_rows(p: GasStation, canopy: np.ndarray) -> list[float]:
     """Returns the y of each row of pumps [m]."""
     (_, y0), (_, y1) = canopy[0], canopy[2]
     return [y0 + (k + 0.5) * (y1 - y0) / p.lanes for k in range(p.lanes)]
@@ -96,7 +96,7 @@ def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
         )
         p.add_to("steel", massing.flat(canopy, low, up=False))
     count = max(2, p.pumps)
-    for y in _rows(p, canopy):
+    for y in _pump_rows(p, canopy):
         for x in np.linspace(x0 + 2.2, x1 - 2.2, count).tolist():
             p.add_to("steel", massing.post(x, y, 0.22, low + 0.1))
 
@@ -106,7 +106,7 @@ def _add_islands(p: GasStation, canopy: np.ndarray) -> None:
     (x0, _), (x1, _) = canopy[0], canopy[2]
     step = (x1 - x0 - 3.0) / p.pumps
     half = min(2.2, 0.4 * step)
-    for y in _rows(p, canopy):
+    for y in _pump_rows(p, canopy):
         for k in range(p.pumps):
             x = x0 + 1.5 + (k + 0.5) * step
             kerb = (x - half, x + half, y - 0.55, y + 0.55, 0.18)

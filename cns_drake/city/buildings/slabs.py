@@ -268,7 +268,7 @@ def _add_balconies(
     pieces: list[Mesh] = []
     joined = p.balconies == "ribbons"
     for front in walls:
-        for a, b in _runs(front.cells, front.spots, joined):
+        for a, b in _balcony_stretches(front.cells, front.spots, joined):
             width = b - a - 0.3
             if not joined:
                 width = min(width, p.balcony_width)
@@ -349,7 +349,7 @@ class _Front:
         return sum(self.cells[self.middle]) / 2
 
 
-def _runs(
+def _balcony_stretches(
     cells: list[bays.Span], spots: list[int], joined: bool
 ) -> list[bays.Span]:
     """Returns stretches with balconies; neighbours are merged if `joined`."""

@@ -259,7 +259,7 @@ def _add_first_floor(
     return tiers.add_storeys(p, plan, floor, z0, 1, 1, rails, part="main_floor")
 
 
-def _center(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
+def _corner_centre(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
     """Returns the middle of the rounded corner's circle."""
     low, high = plan.min(axis=0), plan.max(axis=0)
     x = low[0] + p.radius if p.corner == 0 else high[0] - p.radius
@@ -268,7 +268,7 @@ def _center(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
 
 def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     """Returns a drum over the corner with a dome, cone or open lantern."""
-    center = _center(p, plan)
+    center = _corner_centre(p, plan)
     r = 0.62 * p.radius
     top = p.height
     height = p.height - z0
@@ -451,7 +451,7 @@ class CornerStore(Building):
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)
         rectangle = site.outline
-        plan, front = _plan(self, rectangle)
+        plan, front = _corners(self, rectangle)
         blind = massing.edges_on(plan, rectangle, site.blind_edges)
         side = (front - 1) % 5 if self.corner == 0 else (front + 1) % 5
         top = _add_shop(self, plan, (0, front, side), blind)
@@ -470,7 +470,7 @@ class CornerStore(Building):
         self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
 
 
-def _plan(p: CornerStore, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
+def _corners(p: CornerStore, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
     """Returns the five corners, and which edge cuts off the corner."""
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
     c = p.cut

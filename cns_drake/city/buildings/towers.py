@@ -125,7 +125,7 @@ class GlassSkyscraper(Building):
         # height, how far edges step back, as a part of the most, and by how
         # much it starts higher.
         self.setbacks = [
-            (start, self._share(edges), self.uniform(-0.06, 0.06))
+            (start, self._setback_share(edges), self.uniform(-0.06, 0.06))
             for start in starts
         ]
         walls, glass = (self.kind.choices[part] for part in ("walls", "glass"))
@@ -149,7 +149,7 @@ class GlassSkyscraper(Building):
         self.crown = self.pick(("screen", "wedge", "stepped"))
         self.crown_height = self.uniform(5.0, 9.0, 1)
 
-    def _share(self, edges: int) -> float | np.ndarray:
+    def _setback_share(self, edges: int) -> float | np.ndarray:
         """Returns how far a tier steps back: its edges, or all alike."""
         if edges == 4:
             return self.rng.uniform(0.06, 0.13, 4) * (self.rng.random(4) < 0.6)

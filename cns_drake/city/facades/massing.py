@@ -130,7 +130,7 @@ def rounded(
             for a in angles
         ]
 
-    return _replaced(points, arc, corners)
+    return _with_replaced_corners(points, arc, corners)
 
 
 def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
@@ -150,15 +150,15 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
         faces = cut_ears([(x, y) for x, y in thousandths], fans=True)
     if not up:
         faces = [face[::-1] for face in faces]
-    return Mesh(_at(points, z), tuple(faces))
+    return Mesh(_corners_at(points, z), tuple(faces))
 
 
-def _at(points: np.ndarray, z: float | np.ndarray) -> np.ndarray:
+def _corners_at(points: np.ndarray, z: float | np.ndarray) -> np.ndarray:
     """Returns the corners (N, 3) of an outline, at one height or one each."""
     return np.column_stack([points, np.broadcast_to(z, len(points))])
 
 
-def _turns(points: np.ndarray) -> np.ndarray:
+def _corner_turns(points: np.ndarray) -> np.ndarray:
     """Returns (N,) the cross product of the two edges at each corner [m^2].
 
     It is positive where the outline turns left.
@@ -169,7 +169,7 @@ def _turns(points: np.ndarray) -> np.ndarray:
 
 
 def _is_convex(points: np.ndarray) -> bool:
-    return bool((_turns(points) > -1e-9).all())
+    return bool((_corner_turns(points) > -1e-9).all())
 
 
 def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
@@ -181,7 +181,7 @@ def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     n = len(lower)
-    vertices = np.vstack([_at(lower, z0), _at(upper, z1)])
+    vertices = np.vstack([_corners_at(lower, z0), _corners_at(upper, z1)])
     faces = []
     for k in range(n):
         m = (k + 1) % n
@@ -233,7 +233,7 @@ def sloped_prism(
     share = (y - y.min()) / (y.max() - y.min())
     top = flat(points, 0.0)
     z1 = z0 + height * (low + (1.0 - low) * share)
-    vertices = np.vstack([_at(points, z0), _at(points, z1)])
+    vertices = np.vstack([_corners_at(points, z0), _corners_at(points, z1)])
     walls = tuple((k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n))
     roof = tuple(tuple(n + i for i in face) for face in top.faces)
     return Mesh(vertices, (*walls, *roof))
@@ -248,7 +248,7 @@ def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
     points = np.asarray(points, dtype=float)
     n = len(points)
     apex = [*np.asarray(tip, dtype=float), z1]
-    vertices = np.vstack([_at(points, z0), apex])
+    vertices = np.vstack([_corners_at(points, z0), apex])
     return Mesh(vertices, tuple((k, (k + 1) % n, n) for k in range(n)))
 
 
@@ -412,7 +412,9 @@ def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
 
     Each cut starts `cut` metres from the corner on both edges.
     """
-    return _replaced(points, lambda k, p, a, b: [p - a * cut, p + b * cut])
+    return _with_replaced_corners(
+        points, lambda k, p, a, b: [p - a * cut, p + b * cut]
+    )
 
 
 def notched(points: np.ndarray, depth: float) -> np.ndarray:
@@ -421,12 +423,12 @@ def notched(points: np.ndarray, depth: float) -> np.ndarray:
     A square with the side `depth` is cut out of each convex corner.
     """
     d = depth
-    return _replaced(
+    return _with_replaced_corners(
         points, lambda k, p, a, b: [p - a * d, p - a * d + b * d, p + b * d]
     )
 
 
-def _replaced(
+def _with_replaced_corners(
     points: ArrayLike,
     corner: Callable[[int, np.ndarray, np.ndarray, np.ndarray], Corners],
     chosen: Collection[int] | None = None,

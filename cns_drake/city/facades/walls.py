@@ -213,10 +213,10 @@ def _front_quads(grid: WallCells, left_out: np.ndarray) -> Quads:
     xs, zs, depths = grid.xs, grid.zs, grid.depths
     groups = np.broadcast_to(grid.groups[:, None], depths.shape)
     keys = np.stack([depths, groups])
-    wide = _merged(keys, left_out)
+    wide = _merged_cells(keys, left_out)
     tall = [
         (i0, i1, j0, j1)
-        for j0, j1, i0, i1 in _merged(keys.transpose(0, 2, 1), left_out.T)
+        for j0, j1, i0, i1 in _merged_cells(keys.transpose(0, 2, 1), left_out.T)
     ]
     for i0, i1, j0, j1 in min(wide, tall, key=len):
         d = depths[i0, j0]
@@ -228,7 +228,7 @@ def _front_quads(grid: WallCells, left_out: np.ndarray) -> Quads:
         ]
 
 
-def _merged(
+def _merged_cells(
     keys: np.ndarray, left_out: np.ndarray
 ) -> list[tuple[int, int, int, int]]:
     """Returns blocks (row0, row1, column0, column1) of cells with equal keys.
@@ -260,7 +260,7 @@ def _reveal_quads(grid: WallCells) -> Quads:
     num_rows, num_columns = depths.shape
     for j in range(1, num_columns):
         steps = [(depths[i, j - 1], depths[i, j]) for i in range(num_rows)]
-        for i0, i1, (left, right) in _runs(steps):
+        for i0, i1, (left, right) in _step_runs(steps):
             yield [
                 Corner(xs[j], zs[i0], left, i0),
                 Corner(xs[j], zs[i0], right, i0),
@@ -270,7 +270,7 @@ def _reveal_quads(grid: WallCells) -> Quads:
     closed = np.vstack([np.zeros(num_columns), depths, np.zeros(num_columns)])
     for i in range(num_rows + 1):
         steps = [(closed[i, j], closed[i + 1, j]) for j in range(num_columns)]
-        for j0, j1, (below, above) in _runs(steps):
+        for j0, j1, (below, above) in _step_runs(steps):
             yield [
                 Corner(xs[j0], zs[i], below, i - 1),
                 Corner(xs[j1], zs[i], below, i - 1),
@@ -279,7 +279,7 @@ def _reveal_quads(grid: WallCells) -> Quads:
             ]
 
 
-def _runs(
+def _step_runs(
     steps: list[tuple[float, float]],
 ) -> Iterator[tuple[int, int, tuple[float, float]]]:
     """Yields (start, end, step) of runs of equal steps that are not zero."""
@@ -525,15 +525,15 @@ def _panel(
     def place(corners: Sequence[Corner]) -> np.ndarray:
         x, _, depth, row = np.array(corners).T
         start, end = ends[:, row.astype(int) + 1]
-        first = _shift(directions[0], along, depth, start)
-        last = x - _shift(along, directions[2], depth, end)
+        first = _corner_shift(directions[0], along, depth, start)
+        last = x - _corner_shift(along, directions[2], depth, end)
         x = np.where(x == 0.0, first, np.where(x == grid.xs[-1], last, x))
         return points[edge] + np.outer(x, along) + np.outer(depth, inward)
 
     return grid, place
 
 
-def _shift(
+def _corner_shift(
     a: np.ndarray, b: np.ndarray, depth: np.ndarray, other: np.ndarray
 ) -> np.ndarray | float:
     """Returns how much a wall at `depth` is shortened at a corner [m].

@@ -310,7 +310,7 @@ class Openings:
                 continue
             shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
             if self._out.chance(0.5):
-                shop = _reversed(shop)
+                shop = _mirrored_bay(shop)
             self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
             z = head + 0.08
             tall = self._out.uniform(0.55, 0.8, 2)
@@ -358,7 +358,7 @@ def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
     return [panel.moved(shift) for panel in panels]
 
 
-def _reversed(bay: bays.Bay) -> bays.Bay:
+def _mirrored_bay(bay: bays.Bay) -> bays.Bay:
     """Returns a bay mirrored left to right."""
 
     def mirrored(x0: float, x1: float) -> list[walls.Relief]:

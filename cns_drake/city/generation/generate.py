@@ -549,19 +549,19 @@ def generate_city(
     if (world / MESH_FOLDER).is_symlink():
         # The linked folder may belong to another map.
         raise InputError(f"{world / MESH_FOLDER}: a link instead of a folder")
-    files = _rendered(world, progress, repair_stages)
+    files = _rendered_files(world, progress, repair_stages)
     doing("writing the stages")
     with user_errors(world / MESH_FOLDER):
         (world / MESH_FOLDER).mkdir(exist_ok=True)
     for name, content in files.items():
         write_text(world / name, content)
-    for path in _generated(world) - {world / name for name in files}:
+    for path in _generated_files(world) - {world / name for name in files}:
         with user_errors(path):
             path.unlink()
     return [world / name for name in files if name != STAGES_NAME]
 
 
-def _rendered(
+def _rendered_files(
     world: Path, progress: Callable[[str], None], repair_stages: bool
 ) -> dict[str, str]:
     """Returns the text of every file to write, by relative path."""
@@ -624,8 +624,8 @@ def differing_files(
     The arguments are the same as those of `generate_city`.
     """
     world = Path(world)
-    files = _rendered(world, progress, repair_stages)
-    stale = _generated(world) - {world / name for name in files}
+    files = _rendered_files(world, progress, repair_stages)
+    stale = _generated_files(world) - {world / name for name in files}
     changed = {
         world / name
         for name, text in files.items()
@@ -635,7 +635,7 @@ def differing_files(
     return sorted(stale | changed)
 
 
-def _generated(world: Path) -> set[Path]:
+def _generated_files(world: Path) -> set[Path]:
     """Returns the files in a world folder that the generator wrote."""
     return {
         *world.glob(stage_name("*")),

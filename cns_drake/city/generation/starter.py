@@ -93,12 +93,14 @@ def start_city(
         write(
             MapFolder(world).drive(stage).name,
             f"A drive through stage {stage}, on a route sampled at random.",
-            partial(_drive, network, stage, rng),
+            partial(_drive_scenario, network, stage, rng),
         )
     return written
 
 
-def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
+def _drive_scenario(
+    network: RoadNetwork, stage: str, rng: np.random.Generator
+) -> dict:
     """Returns a scenario of a drive through one stage, as YAML data."""
     route = draw_route(network, _ROUTE_LENGTH, rng)
     return {

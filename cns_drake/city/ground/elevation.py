@@ -112,7 +112,7 @@ class SlopingGround:
         inside = shapely.intersects_xy(self._streets, x, y)
         z[inside] = self._sidewalk(x[inside], y[inside])
         outside = np.flatnonzero(~inside)
-        z[outside] = self._drawn(x[outside], y[outside], z[outside])
+        z[outside] = self._adjusted_field(x[outside], y[outside], z[outside])
         return z
 
     def _sidewalk(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ class SlopingGround:
             kerb(xy) if callable(kerb) else kerb
         )
 
-    def _drawn(
+    def _adjusted_field(
         self, x: np.ndarray, y: np.ndarray, field: np.ndarray
     ) -> np.ndarray:
         """Returns the field, adjusted to the streets and pads nearby."""
@@ -135,7 +135,7 @@ class SlopingGround:
         if len(near):
             p = np.column_stack([x, y])[near]
             foot = _foot_points(p, self._edges[edge])
-            gain = _gain(np.hypot(*(foot - p).T))
+            gain = _exact_height_weight(np.hypot(*(foot - p).T))
             weight[near] += gain
             total[near] += gain * self._sidewalk(*foot.T)
         if self.pads:
@@ -143,11 +143,11 @@ class SlopingGround:
                 points, predicate="dwithin", distance=_REACH
             )
             areas: np.ndarray = self._pad_tree.geometries[pad]
-            gain = _gain(shapely.distance(points[near], areas))
+            gain = _exact_height_weight(shapely.distance(points[near], areas))
             # Of several pads that touch a point, only the first counts.
             order = np.lexsort((pad, near))
             near, pad, gain = near[order], pad[order], gain[order]
-            touching = gain > _gain(np.array([2 * _TOUCHING]))[0]
+            touching = gain > _exact_height_weight(np.array([2 * _TOUCHING]))[0]
             _, first = np.unique(near[touching], return_index=True)
             keep = ~touching
             keep[np.flatnonzero(touching)[first]] = True
@@ -284,7 +284,7 @@ def _foot_points(p: np.ndarray, segments: np.ndarray) -> np.ndarray:
     return start + np.clip(part, 0.0, 1.0)[:, None] * along
 
 
-def _gain(distance: np.ndarray) -> np.ndarray:
+def _exact_height_weight(distance: np.ndarray) -> np.ndarray:
     """Returns the weight of the exact height at a distance, 1/d - 1/R [1/m]."""
     weight = 1 / np.maximum(distance, _TOUCHING) - 1 / _REACH
     return np.maximum(weight, 0.0)

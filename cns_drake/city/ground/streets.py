@@ -158,7 +158,7 @@ def street_surfaces(
         kerbless: area in W without kerbs, where streets lead onto bridges; None
             for kerbs everywhere.
     """
-    road, walk = _heights(surface, kerb)
+    road, walk = _street_heights(surface, kerb)
     medians = snap(areas.medians)
     paved = snap(areas.carriageway).difference(medians)
     covered = unary_union([one.area for one in coverings])
@@ -188,7 +188,7 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
     return MultiPolygon(polygons_of(snap(grown.difference(paved))))
 
 
-def _heights(
+def _street_heights(
     surface: street_areas.SurfaceHeights, kerb: float | street_areas.KerbMap
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""

@@ -65,7 +65,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
     ground = box(*model.footprint.bounds)
     site = Site(ground, f"{name}_at_{round(10 * height)}")
-    assembly = Assembly(site, np.random.default_rng(seed), _walls(placed))
+    assembly = Assembly(site, np.random.default_rng(seed), _wall_finish(placed))
     parts: list[Part] = []
     edges: list[np.ndarray] = []
     for part, mesh in placed:
@@ -135,7 +135,7 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
             continue
         if max(heights) > height:
             normal = _normal_of(ring)
-            ring, crossing = _clipped(ring, height)
+            ring, crossing = _clip_face(ring, height)
             if len(crossing) == 2:
                 (x0, y0), (x1, y1) = crossing
                 # The inside of a wall is on the left of an edge whose face
@@ -161,7 +161,7 @@ def _normal_of(ring: list[_Point]) -> tuple[float, float]:
     )
 
 
-def _clipped(
+def _clip_face(
     ring: list[_Point], height: float
 ) -> tuple[list[_Point], list[list[float]]]:
     """Returns the part of a face below a height, and the edges of the cut."""
@@ -197,10 +197,10 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
         # The outer edges of a building run counter-clockwise, those of a
         # courtyard clockwise.
         if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0:
-            plan = plan.union(_offset(outer, -_REVEAL))
+            plan = plan.union(_grown_area(outer, -_REVEAL))
         else:
             holes = [Polygon(hole) for hole in ring.interiors]
-            yard = _offset(unary_union(holes), _REVEAL)
+            yard = _grown_area(unary_union(holes), _REVEAL)
             plan = plan.difference(yard)
     return MultiPolygon(
         [
@@ -211,7 +211,7 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     )
 
 
-def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
+def _grown_area(area: BaseGeometry, distance: float) -> BaseGeometry:
     """Returns an area grown by a distance [m], with its corners kept sharp."""
     # For edges on one line, GEOS divides by zero on its way to a valid result.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -221,8 +221,8 @@ def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
 def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
     """Closes the walls with a band, a parapet and a flat roof."""
     top = round(height + _PARAPET, 3)
-    outer = snap(_offset(plan, _BAND_REACH))
-    inner = snap(_offset(plan, -_PARAPET_WIDTH))
+    outer = snap(_grown_area(plan, _BAND_REACH))
+    inner = snap(_grown_area(plan, -_PARAPET_WIDTH))
     assembly.add(
         "new_roof",
         # The wall is seen from outside, not from within.
@@ -242,7 +242,7 @@ def _is_shared(part: Part) -> bool:
     return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
 
 
-def _walls(placed: Sequence[tuple[Part, Mesh]]) -> Finish:
+def _wall_finish(placed: Sequence[tuple[Part, Mesh]]) -> Finish:
     """Returns the finish of the building's largest part that is not glass."""
 
     def extent(one: tuple[Part, Mesh]) -> float:

@@ -136,7 +136,7 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     is tiny.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
-    xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)
+    xs, ys = (_evenly_chosen(np.unique(np.round(c, 3))) for c in corners.T)
     x0, x1 = (xs[k] for k in np.triu_indices(len(xs), 1))
     y0, y1 = (ys[k] for k in np.triu_indices(len(ys), 1))
     sides = x0[:, None], y0[None], x1[:, None], y1[None]
@@ -150,7 +150,7 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     return max(inside, key=lambda one: one.area)
 
 
-def _spread(values: np.ndarray) -> np.ndarray:
+def _evenly_chosen(values: np.ndarray) -> np.ndarray:
     """Returns at most a dozen of some increasing values, evenly chosen."""
     if len(values) <= _MOST_SIDES:
         return values
@@ -199,7 +199,7 @@ def lot_objects(
     weights = _USES[use].get("objects", cars)
     taken = Occupancy()
     count = 0
-    for x, y, yaw in _places(footprint, use, rng):
+    for x, y, yaw in _object_places(footprint, use, rng):
         kind = pick(weights, rng)
         builder = OBJECTS[kind]
         model = builder.build(rng)
@@ -219,7 +219,7 @@ def lot_objects(
             yield thing
 
 
-def _places(
+def _object_places(
     footprint: BaseGeometry, use: LotUse, rng: np.random.Generator
 ) -> Iterator[tuple[float, float, float]]:
     """Yields x, y [m] and heading [rad] of the objects on a lot, in S."""

@@ -89,13 +89,13 @@ def _build(
     with value_errors(fault_at):
         model = sample(*what, rng, name, house.blind_edges)
     x, y = (round(float(value), 3) for value in house.xy)
-    xyz = (x, y, _floor(draft, house))
+    xyz = (x, y, _ground_height_before(draft, house))
     tags = (district, house.archetype)
     yaw = round(house.yaw, 5)
     draft.add_building(Structure(name, "building", model, xyz, yaw, tags))
 
 
-def _floor(draft: Draft, house: _House) -> float:
+def _ground_height_before(draft: Draft, house: _House) -> float:
     """Returns the height of the ground in front of a house [m]."""
     start, end = Site(house.footprint, house.archetype).outline[:2]
     along = (end - start) / np.hypot(*(end - start))

@@ -113,7 +113,7 @@ def furnish_sidewalks(
         )
         for index, line in enumerate(lines):
             rng = draft.task("sidewalk", task, index)
-            _walk(draft, districts, task, line, keep_off, rng)
+            _furnish_sidewalk(draft, districts, task, line, keep_off, rng)
 
 
 def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
@@ -152,7 +152,7 @@ def plant_medians(draft: Draft) -> None:
         while s < line.length - 1.0:
             at = station_at(line, s)
             name = pick(plan.trees, rng)
-            _place(draft, name, at, rng, ("median",))
+            _place_along(draft, name, at, rng, ("median",))
             s += float(rng.uniform(*plan.tree_spacing))
 
 
@@ -168,7 +168,7 @@ def _middle_line(median: Polygon) -> LineString:
     return LineString([a + (b - a) * inset, b - (b - a) * inset])
 
 
-def _walk(
+def _furnish_sidewalk(
     draft: Draft,
     districts: Sequence[District],
     task: str,
@@ -183,14 +183,14 @@ def _walk(
         here = shapely.Point(at.x, at.y)
         district = min(districts, key=lambda d: d.area.distance(here))
         street = district.plan.street or draft.plan.street
-        step, name = _draw(street, task, rng)
+        step, name = _draw_next(street, task, rng)
         if name is not None and not keep_off.intersects(here):
             tags = ("sidewalk", district.plan.name)
-            _place(draft, name, at, rng, tags, facing_street=True)
+            _place_along(draft, name, at, rng, tags, facing_street=True)
         s += step
 
 
-def _draw(
+def _draw_next(
     street: StreetPlan, task: str, rng: Generator
 ) -> tuple[float, str | None]:
     """Returns the distance to the next place [m], and the object at this place.
@@ -211,7 +211,7 @@ def _draw(
     return step, pick(street.furniture, rng)
 
 
-def _place(
+def _place_along(
     draft: Draft,
     name: str,
     at: Station,

@@ -146,23 +146,25 @@ def missing_sidewalks(
         ]
         if surface:
             laid = np.concatenate(surface)
-            yield _paved(f"sidewalk_{street.name}", "sidewalk", laid)
+            yield _paved_structure(f"sidewalk_{street.name}", "sidewalk", laid)
 
 
-def _paved(name: str, semantic_class: str, surface: np.ndarray) -> Imported:
+def _paved_structure(
+    name: str, semantic_class: str, surface: np.ndarray
+) -> Imported:
     """Returns a road or a sidewalk made of triangles (N, 3, 3) [m]."""
     kind = semantic_class.capitalize()
     return make_imported(name, semantic_class, kind, {"surface": surface}, {})
 
 
-def _areas(geometry: BaseGeometry) -> MultiPolygon:
+def _polygons_only(geometry: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of a geometry, without its lines and points."""
     return MultiPolygon(list(parts_of(geometry)))
 
 
 def _cut(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of an area outside of another area."""
-    return _areas(shapely.difference(area, other, grid_size=_GRID))
+    return _polygons_only(shapely.difference(area, other, grid_size=_GRID))
 
 
 # Half the width of a street of unknown width [m].
@@ -215,12 +217,14 @@ def guessed_streets(
     ):
         for number, part in enumerate(parts_of(area)):
             hit = np.sort(tree.query(part, "intersects"))
-            surface = _laid(part, below[hit], outlines[hit], above)
+            surface = _drape(part, below[hit], outlines[hit], above)
             if len(surface):
-                yield _paved(f"{name}_{number}", semantic_class, surface)
+                yield _paved_structure(
+                    f"{name}_{number}", semantic_class, surface
+                )
 
 
-def _laid(
+def _drape(
     area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
 ) -> np.ndarray:
     """Returns an area laid above a ground, as triangles (N, 3, 3) [m].
@@ -298,7 +302,7 @@ def paved_gaps(
         )
         free = _cut(part, taken)
         inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
-        wide = _areas(inside.buffer(_NARROWEST_GAP / 2.0, 2))
+        wide = _polygons_only(inside.buffer(_NARROWEST_GAP / 2.0, 2))
         open_ = shapely.intersection(wide, free, grid_size=_GRID)
         square = (
             int(part.centroid.x // _SQUARE),
@@ -311,7 +315,7 @@ def paved_gaps(
     found = [some for some in surfaces.values() if some]
     for number, some in enumerate(found):
         surface = np.concatenate(some)
-        yield _paved(f"sidewalk_gap_{number}", "sidewalk", surface)
+        yield _paved_structure(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
 def _upper_sides(

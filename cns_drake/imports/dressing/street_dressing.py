@@ -122,17 +122,17 @@ def without_curves(model: Model) -> Model:
             sides = _SIDES_OF_DISC if is_disc else _SIDES
             scaled = MeshShape(name, (r, r, shape.length))
             part = replace(part, shape=scaled)
-            meshes[name] = _turned([1.0], [0.5], sides)
+            meshes[name] = _revolved([1.0], [0.5], sides)
         elif isinstance(shape, SphereShape):
             r = shape.radius
             part = replace(part, shape=MeshShape(_BALL, (r, r, r)))
             low = np.sqrt(0.5)
-            meshes[_BALL] = _turned([0.0, low, 1.0], [1.0, low, 0.0], _SIDES)
+            meshes[_BALL] = _revolved([0.0, low, 1.0], [1.0, low, 0.0], _SIDES)
         parts.append(part)
     return replace(model, parts=tuple(parts), meshes=meshes)
 
 
-def _turned(radius: list[float], z: list[float], sides: int) -> Mesh:
+def _revolved(radius: list[float], z: list[float], sides: int) -> Mesh:
     """Returns a solid of revolution with polygons of the circles' areas."""
     step = 2.0 * np.pi / sides
     wide = np.sqrt(step / np.sin(step)) * np.array(radius)
@@ -510,17 +510,17 @@ def dress_streets(
     for one in structures:
         if one.kind == "Parking":
             fill_car_park(placing, one, seed)
-    for row in _rows(near, drives):
+    for row in _streets_to_dress(near, drives):
         if placing.is_near(np.array(row.line.coords), ROWS_WITHIN):
             rng = random_generator(seed, "row", row.name)
             park_along(placing, row, lines, rng)
-            _light(placing, row, rng)
+            _place_lamps(placing, row, rng)
             if not things:
-                _furnish(placing, row, rng)
+                _place_small_objects(placing, row, rng)
     return found
 
 
-def _rows(
+def _streets_to_dress(
     streets: Sequence[Street], drives: Sequence[WaypointRoute]
 ) -> Iterator[Row]:
     """Yields the streets; without streets, drives as middles of streets."""
@@ -585,7 +585,9 @@ def _place_thing(
         placing.found.no_room += 1
 
 
-def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
+def _place_lamps(
+    placing: StreetRoom, row: Row, rng: np.random.Generator
+) -> None:
     """Places lamps along a street where the file has none."""
     s = float(rng.uniform(3.0, 12.0))
     side = 1.0
@@ -607,7 +609,9 @@ def _light(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
         side = -side
 
 
-def _furnish(placing: StreetRoom, row: Row, rng: np.random.Generator) -> None:
+def _place_small_objects(
+    placing: StreetRoom, row: Row, rng: np.random.Generator
+) -> None:
     """Places small objects along a street if the file has none at all."""
     s = float(rng.uniform(3.0, 12.0))
     while s < row.line.length:

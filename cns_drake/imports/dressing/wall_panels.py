@@ -115,7 +115,7 @@ def find_panels(
     if not len(triangles):
         return []
     units = unit_normals(triangles)
-    component = _connected(triangles, units, building, _SAME_PLANE)
+    component = _panel_numbers(triangles, units, building, _SAME_PLANE)
     order = np.argsort(component, kind="stable")
     begins = np.flatnonzero(np.diff(component[order], prepend=-1))
     groups = np.split(order, begins[1:])
@@ -140,7 +140,9 @@ def find_panels(
         if panel.is_plane:
             found.append(panel)
         else:
-            facets = _connected(wall[0], units[some], building[some], _STRAIGHT)
+            facets = _panel_numbers(
+                wall[0], units[some], building[some], _STRAIGHT
+            )
             found += _plane_pieces(panel, facets, *wall)
     return found
 
@@ -177,7 +179,7 @@ def _plane_pieces(
     return found
 
 
-def _connected(
+def _panel_numbers(
     triangles: np.ndarray,
     normals: np.ndarray,
     building: np.ndarray,

@@ -95,7 +95,7 @@ def find_free_space(
     `structures` contains the structures of all stages. If the city has roads,
     only space on roads counts as free.
     """
-    low, high = _window(structures)
+    low, high = _search_bounds(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     window = (low, high)
     on_road, in_water, blocked = np.zeros((3, *size[::-1]), dtype=bool)
@@ -108,7 +108,7 @@ def find_free_space(
     ):
         # In one call: thousands of small groups would take far longer.
         surfaces = joined(one.triangles for one in some)
-        for row, column in _cells(surfaces, window):
+        for row, column in _covered_cells(surfaces, window):
             covered[row, column] = True
     walls = []
     for one in structures:
@@ -119,11 +119,14 @@ def find_free_space(
     free = ~(blocked | (in_water & ~on_road))
     least = _FROM_WALL
     paved = ndimage.binary_closing(on_road, iterations=1) & ~blocked
-    if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
+    if (
+        _largest_part_size(_clearance(paved) >= _FROM_EDGE) * CELL**2
+        >= _LEAST_ROAD
+    ):
         free = paved
         least = _FROM_EDGE
     elif blocked.any():
-        free &= _between(blocked)
+        free &= _between_buildings(blocked)
     outlines = joined(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
@@ -137,7 +140,7 @@ def _is_water(one: Imported) -> bool:
     return one.kind.startswith("Water")
 
 
-def _cells(
+def _covered_cells(
     triangles: np.ndarray, window: _Window, ground: Ground | None = None
 ) -> Iterator[np.ndarray]:
     """Yields rows and columns (2, N) that triangles (M, 3, 3) cover.
@@ -165,14 +168,14 @@ def _blocked_by(
     highest = above.reshape(-1, 3).max(axis=1)
     is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
     found = [np.zeros((2, 0), dtype=int)]
-    found += _cells(one.triangles[is_low], window, ground)
+    found += _covered_cells(one.triangles[is_low], window, ground)
     row, column = np.concatenate(found, axis=1)
     if one.structure.semantic_class == "building" and len(row):
-        row, column = _filled(row, column)
+        row, column = _with_enclosed(row, column)
     return (row, column), one.triangles[is_low & (highest > _KERB)]
 
 
-def _filled(
+def _with_enclosed(
     row: np.ndarray, column: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns cells (N,), at least one, together with those they enclose."""
@@ -190,7 +193,7 @@ def _clearance(free: np.ndarray) -> np.ndarray:
     return ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 
 
-def _between(blocked: np.ndarray) -> np.ndarray:
+def _between_buildings(blocked: np.ndarray) -> np.ndarray:
     """Returns the cells that have buildings on both sides."""
     reach = int(_HALF_STREET / CELL)
     near = ndimage.distance_transform_edt(~np.pad(blocked, 2 * reach)) <= reach
@@ -199,13 +202,13 @@ def _between(blocked: np.ndarray) -> np.ndarray:
     ]
 
 
-def _largest(cells: np.ndarray) -> int:
+def _largest_part_size(cells: np.ndarray) -> int:
     """Returns the size of the largest connected part, in cells."""
     parts, number = ndimage.label(cells, np.ones((3, 3)))
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
-def _window(structures: Sequence[Imported]) -> _Window:
+def _search_bounds(structures: Sequence[Imported]) -> _Window:
     """Returns the corners of the area in which room is searched."""
     boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)

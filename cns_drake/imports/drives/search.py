@@ -273,7 +273,7 @@ def find_drives(graph: WayGraph) -> list[WaypointRoute]:
     it is empty.
     """
     for _ in range(_MOST_TRIES):
-        way = _longest(graph)
+        way = _longest_way(graph)
         if graph.length(way) < SHORTEST:
             return []
         first = graph.drive(way)
@@ -282,14 +282,14 @@ def find_drives(graph: WayGraph) -> list[WaypointRoute]:
         graph.is_open[graph.blocked(way, first)] = False
     else:
         return []
-    for candidate in islice(_seconds(graph, way), _MOST_TRIES):
+    for candidate in islice(_second_ways(graph, way), _MOST_TRIES):
         second = graph.drive(candidate)
         if isinstance(second, WaypointRoute):
             return [first, second]
     return [first]
 
 
-def _longest(graph: WayGraph) -> list[int]:
+def _longest_way(graph: WayGraph) -> list[int]:
     """Returns approximately the longest of all shortest ways; [] if none."""
     pieces = np.flatnonzero(graph.is_open)
     if len(pieces) == 0:
@@ -307,15 +307,15 @@ def _longest(graph: WayGraph) -> list[int]:
     begins: dict[int, None] = {}
     for start in (int(pieces[k]) for k in starts):
         begins[start] = None
-        begins[_farthest(graph, into, start)[-1]] = None
+        begins[_longest_way_from(graph, into, start)[-1]] = None
     for begin in begins:
-        way = _farthest(graph, links, begin)
+        way = _longest_way_from(graph, links, begin)
         if graph.length(way) > graph.length(best) + 1e-6:
             best = way
     return best
 
 
-def _farthest(
+def _longest_way_from(
     graph: WayGraph, links: csr_array, start: int, longest: float = LONGEST
 ) -> list[int]:
     """Returns the longest of the shortest ways from a piece, up to a length.
@@ -341,7 +341,7 @@ def _farthest(
     return [start]
 
 
-def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
+def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
     """Yields ways that share the middle of the first way, the best first."""
     along = np.concatenate([[0.0], graph.along(first)])
     part = along / along[-1]
@@ -349,14 +349,14 @@ def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
     for low, middle, high in _SHARED:
         begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
         ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
-        for begin in (*_some(begins, along), None):
+        for begin in (*_spaced_places(begins, along), None):
             start = _nearest(part[:-1], low) if begin is None else begin
             head: list[int] = []
             if begin is not None:
-                head = _arm(graph, first, first[begin], backwards=True)
+                head = _longest_arm(graph, first, first[begin], backwards=True)
                 if not head:
                     continue
-            for end in (*_some(ends, along), None):
+            for end in (*_spaced_places(ends, along), None):
                 stop = _nearest(part[1:], high) if end is None else end
                 if begin is None and end is None:
                     continue
@@ -364,7 +364,7 @@ def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
                     continue
                 tail: list[int] = []
                 if end is not None:
-                    tail = _arm(graph, [*first, *head], first[end])
+                    tail = _longest_arm(graph, [*first, *head], first[end])
                     if not tail:
                         continue
                 way = [*head[:0:-1], *first[start : stop + 1], *tail[1:]]
@@ -377,7 +377,7 @@ def _nearest(values: np.ndarray, wanted: float) -> int:
     return int(np.abs(values - wanted).argmin())
 
 
-def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
+def _spaced_places(places: np.ndarray, along: np.ndarray) -> list[int]:
     """Returns some of the places, at least `_APART` from each other.
 
     They are at most `_MOST_PLACES`.
@@ -389,7 +389,7 @@ def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
     return kept[:: -(-len(kept) // _MOST_PLACES) or 1]
 
 
-def _arm(
+def _longest_arm(
     graph: WayGraph, used: Sequence[int], joint: int, backwards: bool = False
 ) -> list[int]:
     """Returns the longest way that leaves a drive at a piece, the joint.
@@ -400,7 +400,7 @@ def _arm(
     links = graph.links(graph.beside(np.array(used), joint))
     if backwards:
         links = links.T.tocsr()
-    way = _farthest(graph, links, joint, _LONGEST_ARM)
+    way = _longest_way_from(graph, links, joint, _LONGEST_ARM)
     return way if graph.length(way[1:]) >= _SHORTEST_ARM else []
 
 
@@ -598,14 +598,14 @@ def simplified_drive(
         )
         line = LineString(smooth).simplify(tolerance)
         found = steerable_drive(
-            _densified(np.array(line.coords)), space.obstacle
+            _dense_waypoints(np.array(line.coords)), space.obstacle
         )
         if isinstance(found, WaypointRoute):
             break
     return found
 
 
-def _densified(corners: np.ndarray) -> np.ndarray:
+def _dense_waypoints(corners: np.ndarray) -> np.ndarray:
     """Returns waypoints with additional ones between those far apart."""
     points = [corners[:1]]
     for a, b in pairwise(corners):

@@ -186,10 +186,10 @@ class ImportedStreets:
         level = [one for kind in _LEVEL for one in alike[kind]]
         gaps = [
             gap
-            for gap in _gaps(shapely.union_all(level))
+            for gap in _enclosed_gaps(shapely.union_all(level))
             if gap.intersects(junctions) and not gap.intersects(islands)
         ]
-        road = _closed([*alike["road"], *gaps])
+        road = _union_without_slits([*alike["road"], *gaps])
         parking = _simple(shapely.union_all(alike["parking"]).difference(road))
         paved = road.union(parking)
         path = _simple(shapely.union_all(alike["sidewalk"]).difference(paved))
@@ -197,9 +197,9 @@ class ImportedStreets:
         other = _simple(
             shapely.union_all(alike["other-ground"]).difference(paved)
         )
-        whole = _closed([paved, other])
+        whole = _union_without_slits([paved, other])
         tapers = kerb_tapers(whole)
-        whole = _closed([whole, *tapers])
+        whole = _union_without_slits([whole, *tapers])
         carriageway = _cut_at_tiles(_multi(whole))
         medians = _simple(shapely.union_all(alike["median"]))
         medians = _multi(medians.difference(carriageway))
@@ -237,7 +237,7 @@ def lane_polygon(band: LaneBand) -> BaseGeometry:
     return shapely.union_all([p for p in pieces if p.area > _LEAST_AREA])
 
 
-def _gaps(lanes: BaseGeometry) -> list[Polygon]:
+def _enclosed_gaps(lanes: BaseGeometry) -> list[Polygon]:
     """Returns the gaps that lanes enclose, without those large as islands."""
     # GEOS divides by zero where lanes only touch; they enclose ground as well.
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -250,7 +250,7 @@ def _gaps(lanes: BaseGeometry) -> list[Polygon]:
     ]
 
 
-def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
+def _union_without_slits(parts: Iterable[BaseGeometry]) -> BaseGeometry:
     """Returns the union of areas, with slits between neighbours closed."""
     # GEOS divides by zero at edges that fold back, but its result is right.
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -12,11 +12,7 @@ from cns_drake.imports.drives.search import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway, resampled
-from cns_drake.traffic.lane_joining import (
-    DirectedLane,
-    join_lanes,
-    usual_limit,
-)
+from cns_drake.traffic.lane_joining import DirectedLane, join_lanes, usual_limit
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].
@@ -107,7 +103,7 @@ class BandGraph(search.WayGraph):
 
     def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         line = np.concatenate([self.lines[k] for k in way])
-        points = search.evenly_spaced(_forwards(line), _SPACING)[
+        points = search.evenly_spaced(_without_backward_points(line), _SPACING)[
             : int(search.LONGEST / _SPACING) + 1
         ]
         found: WaypointRoute | Obstacle = points[0, :2]
@@ -184,7 +180,7 @@ def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
     ]
 
 
-def _forwards(line: np.ndarray) -> np.ndarray:
+def _without_backward_points(line: np.ndarray) -> np.ndarray:
     """Returns a line without points that go backwards, as at rough joints."""
     kept = [line[0], line[1]]
     for point in line[2:]:

@@ -448,7 +448,7 @@ class KerbHeights:
             if is_raised(band.kind, band.lane.height):
                 rise = np.nan_to_num(band.rise, nan=usual)
                 edges = [band.inner[:, :2], band.outer[:, :2], rise]
-                own = _dense(band, np.column_stack(edges))
+                own = _interpolated(band, np.column_stack(edges))
                 wide = np.linalg.norm(own[:, :2] - own[:, 2:4], axis=1)
                 rows.append(own[wide > _LEAST_WIDTH])
         places = np.concatenate(rows)
@@ -470,13 +470,13 @@ class KerbHeights:
 
 def _places(band: LaneBand) -> np.ndarray:
     """Returns (N, 6): places in the middle, and heading, roll and grade."""
-    return _dense(
+    return _interpolated(
         band,
         np.column_stack([band.middle, band.heading, band.roll, band.grade]),
     )
 
 
-def _dense(band: LaneBand, rows: np.ndarray) -> np.ndarray:
+def _interpolated(band: LaneBand, rows: np.ndarray) -> np.ndarray:
     """Returns values (N, K) of a lane, interpolated between its stations."""
     # Both sides of a joint stay, with a stretch of no length between them.
     steps = np.diff(band.s)

@@ -130,7 +130,7 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
         if own not in ("-1", "") and own not in junctions:
             faults.add("road of a junction that is not in the file", name)
         for end in _ENDS:
-            kind, linked = _linked(road, end)
+            kind, linked = _link_at(road, end)
             known = junctions if kind == "junction" else roads
             if linked is not None and linked not in known:
                 faults.add(f"link to a {kind} that is not in the file", name)
@@ -176,7 +176,7 @@ def count_unread(element: Element, faults: ImportFaults, name: str) -> None:
             count_unread(child, faults, own)
 
 
-def _linked(road: Element, end: str) -> tuple[str, str | None]:
+def _link_at(road: Element, end: str) -> tuple[str, str | None]:
     """Returns kind and id of the link at an end of a road; None if none."""
     link = road.first("link", end)
     if link is None:
@@ -208,7 +208,7 @@ def _dangling_lanes(
                     at += 1 if end == "successor" else -1
                     beside.append(own[at])
             else:
-                kind, linked = _linked(road, end)
+                kind, linked = _link_at(road, end)
                 if kind != "road" or linked is None or linked not in roads:
                     continue
                 # The link names the end of the other road; some files omit it.
@@ -238,7 +238,7 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
         with value_errors(path):
             _check_ids(top.all(kind))
     for element in top.all("road"):
-        name = _plain(element.attrib.get("id", ""), names)
+        name = _unique_name(element.attrib.get("id", ""), names)
         names.add(name)
         with value_errors(f"{path}: road {name}"):
             road = _road(element, name, faults)
@@ -286,15 +286,15 @@ def _check_ids(elements: Iterable[Element]) -> None:
         own = one.value("id", "")
         if own in lines:
             raise ValueError(
-                f"{one.tag} {_stem(own)}: line {one.line}: duplicate id, that"
-                f" of line {lines[own]}"
+                f"{one.tag} {_plain_name(own)}: line {one.line}: duplicate id,"
+                f" that of line {lines[own]}"
             )
         lines[own] = one.line
 
 
-def _plain(own: str, taken: set[str]) -> str:
+def _unique_name(own: str, taken: set[str]) -> str:
     """Returns a new, unique name of letters, digits, dots and dashes."""
-    stem = _stem(own)
+    stem = _plain_name(own)
     name = stem
     number = 1
     while name in taken:
@@ -303,7 +303,7 @@ def _plain(own: str, taken: set[str]) -> str:
     return name
 
 
-def _stem(own: str) -> str:
+def _plain_name(own: str) -> str:
     """Returns an id reduced to letters, digits, dots and dashes."""
     return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
 

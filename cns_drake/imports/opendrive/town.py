@@ -49,11 +49,7 @@ from cns_drake.imports.opendrive.lanes import (
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMap, RoadMark
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.options import (
-    ImportFaults,
-    ImportOptions,
-    ImportReport,
-)
+from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # The edges of carriageways and of lanes differ by less than this, which is also
@@ -154,13 +150,13 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
         pieces = shapely.intersection(outlines[chosen], ground, grid_size=_MM)
         for quad, piece in zip(rest[chosen], pieces, strict=True):
             found += [
-                _raised(np.array(triangulate(part)), quad)
+                _at_quad_heights(np.array(triangulate(part)), quad)
                 for part in parts_of(piece)
             ]
     return np.concatenate(found)
 
 
-def _raised(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
+def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
     """Returns triangles (M, 3, 3): flat ones at the heights of a quad [m].
 
     `flat` is (M, 3, 2), and `quad` (4, 3).
@@ -495,7 +491,7 @@ def _build(
                 *marks,
             ),
             furnish=lambda draft: None,
-            park=lambda draft: _park(draft, ground, plan.cars),
+            park=lambda draft: _park_cars(draft, ground, plan.cars),
         ),
         plan,
         str(source),
@@ -584,7 +580,7 @@ def _kerb(bands: Sequence[LaneBand]) -> float:
     return float(np.clip(np.median(kerbs), *_KERBS)) if kerbs else _KERB
 
 
-def _park(
+def _park_cars(
     draft: Draft, bands: Sequence[LaneBand], cars: dict[str, float]
 ) -> None:
     """Parks cars in parking lanes, facing in the direction of traffic."""

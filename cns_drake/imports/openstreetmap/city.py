@@ -469,7 +469,7 @@ def make_buildings(
     taken: dict[str, int] = {}
     for whole, blocks in groups:
         walls, roofs = [], []
-        for block in _opened(blocks, through, faults):
+        for block in _solids_with_openings(blocks, through, faults):
             wall, top = extruded(
                 block.polygon,
                 block.low,
@@ -500,7 +500,7 @@ def make_buildings(
         yield replace(made, is_gone=True) if _is_gone(whole.tags) else made
 
 
-def _opened(
+def _solids_with_openings(
     blocks: Iterable[_Block], passages: Passages, faults: ImportFaults
 ) -> Iterator[_Block]:
     """Yields the solids of a building, with an opening for each passage.

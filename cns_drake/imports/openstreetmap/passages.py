@@ -15,12 +15,7 @@ from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmWay,
-    Tags,
-    has_tag,
-)
+from cns_drake.imports.openstreetmap.reading import Local, OsmWay, Tags, has_tag
 from cns_drake.imports.openstreetmap.tags import (
     is_inside,
     length,
@@ -122,12 +117,12 @@ def passages_of(
             area = area.buffer(_BEYOND_WALLS, join_style="mitre")
         else:
             half = width / 2.0 + _BESIDE_WAY
-            area = _longer(course).buffer(half, cap_style="flat")
+            area = _extended_line(course).buffer(half, cap_style="flat")
         found.append(Passage(name, course, area, clear or usual))
     return found
 
 
-def _longer(course: LineString) -> LineString:
+def _extended_line(course: LineString) -> LineString:
     """Returns a line that is extended a little beyond both ends."""
     places = shapely.get_coordinates(course)
     ends = []
@@ -263,14 +258,16 @@ class WayOpenings:
                 continue
             before = places[k - 1 if k else last - 1]
             after = places[k + 1 if k < last else 1]
-            to_before = _turn(places[k], after, before)
-            sides = {_turn(places[k], after, arm) < to_before for arm in arms}
+            to_before = _turn_angle(places[k], after, before)
+            sides = {
+                _turn_angle(places[k], after, arm) < to_before for arm in arms
+            }
             if len(sides) > 1:
                 found.add(node)
         return found
 
 
-def _turn(place: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+def _turn_angle(place: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
     """Returns the angle from one direction to another, from 0 to 2 pi."""
     first, second = start - place, end - place
     angle = math.atan2(second[1], second[0]) - math.atan2(first[1], first[0])

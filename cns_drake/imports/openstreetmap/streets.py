@@ -508,7 +508,9 @@ def sea(
     lines = [line for line in lines if line.length > 0.0]
     merged = shapely.get_parts(shapely.line_merge(shapely.union_all(lines)))
     whole = box(*limits.ravel().tolist())
-    cuts = [_prolonged(line, whole).intersection(whole) for line in merged]
+    cuts = [
+        _extended_within(line, whole).intersection(whole) for line in merged
+    ]
     edges = shapely.union_all([whole.boundary, *cuts])
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
@@ -517,7 +519,7 @@ def sea(
     )
 
 
-def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
+def _extended_within(line: LineString, whole: BaseGeometry) -> LineString:
     """Returns a line whose ends within an area are extended straight on."""
     points = np.array(line.coords)
     if line.is_closed:

@@ -266,7 +266,7 @@ class _MeetingStreets:
                         if not len(parts):
                             continue
                         longest = parts[shapely.length(parts).argmax()]
-                        points = _rounded(longest, _LANE_ROUNDED_OVER)
+                        points = _rounded_line(longest, _LANE_ROUNDED_OVER)
                     yield _Lane(
                         k,
                         is_forward,
@@ -343,13 +343,13 @@ def _stretches(
             layout = tags.lane_layout(street.tags, street.width)
             yield Stretch(
                 street,
-                _rounded(shapely.LineString(line), _ROUNDED_OVER),
+                _rounded_line(shapely.LineString(line), _ROUNDED_OVER),
                 ends,
                 layout,
             )
 
 
-def _rounded(whole: shapely.LineString, mean: float) -> np.ndarray:
+def _rounded_line(whole: shapely.LineString, mean: float) -> np.ndarray:
     """Returns evenly spaced points (N, 2) along a line with smooth corners.
 
     `mean` is the length of the running mean that rounds them [m].
@@ -436,7 +436,7 @@ def lanes_of_streets(
     )
     side = 1.0 if drive_on == "right" else -1.0
     traffic = make_traffic_lanes(near, set(walks.crossings), surface, side)
-    free = _free(traffic, structures)
+    free = _are_free(traffic, structures)
     outer = traffic.beside
     graph = join_lanes(
         traffic.lanes,
@@ -465,7 +465,9 @@ def _sidewalks(
     return shapely.union_all(flat[near], grid_size=0.001)
 
 
-def _free(traffic: StreetTraffic, structures: Iterable[Imported]) -> np.ndarray:
+def _are_free(
+    traffic: StreetTraffic, structures: Iterable[Imported]
+) -> np.ndarray:
     """Returns (L,) which lanes are free of everything in the file."""
     solid = [
         one.triangles

@@ -314,17 +314,17 @@ class VehicleImu(LeafSystem):
         if abs(time * self._rate - number) > _TOLERANCE:
             sample = self._measure(number, np.array([time]))
         else:
-            sample = self._some(number, number + 1)
+            sample = self._samples_between(number, number + 1)
         output.SetFromVector(getattr(sample, name)[0])
 
     def _calc_samples(self, context: Context, output: AbstractValue) -> None:
         end = self._last_sample(context.get_time()) + 1
-        output.set_value(self._some(end - _REMEMBERED, end))
+        output.set_value(self._samples_between(end - _REMEMBERED, end))
 
     def _last_sample(self, time: float) -> int:
         return math.floor(time * self._rate + _TOLERANCE)
 
-    def _some(self, first: int, end: int) -> ImuSamples:
+    def _samples_between(self, first: int, end: int) -> ImuSamples:
         """Returns the samples with numbers `first` to `end` - 1."""
         parts = []
         for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):

@@ -191,8 +191,8 @@ def add_lidar(
             seed=seed,
             sensor_name=name,
         )
-    measurement = _named(measurement or IDEAL, name)
-    model = None if isinstance(returns, str) else _named(returns, name)
+    measurement = _with_name(measurement or IDEAL, name)
+    model = None if isinstance(returns, str) else _with_name(returns, name)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         source = plant.get_source_id()
@@ -389,7 +389,7 @@ def connect_lidar(
 _Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")
 
 
-def _named(model: _Model, name: str) -> _Model:
+def _with_name(model: _Model, name: str) -> _Model:
     """Returns a model with the name of the LiDAR, unless it has a name."""
     return model if model.sensor_name else replace(model, sensor_name=name)
 

@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import (
-    FrameId,
-    GeometryId,
-    QueryObject,
-    Role,
-)
+from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import BaseField, Fields, PointCloud
@@ -239,7 +234,7 @@ class Lidar(LeafSystem):
         self.structures = structures
         self.anchored_frames = frozenset(anchored_frames)
         self.num_threads = num_threads
-        self._first = _ready(pattern.beams(0), returns)
+        self._first = _shared_revolution(pattern.beams(0), returns)
         # When each column fires, as a fraction of the revolution.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
@@ -605,7 +600,9 @@ class Lidar(LeafSystem):
         frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first
-        return frame, _ready(self.pattern.beams(frame), self._returns)
+        return frame, _shared_revolution(
+            self.pattern.beams(frame), self._returns
+        )
 
     def _calc_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of S at the time of the output."""
@@ -922,7 +919,9 @@ class _Turn:
 
 
 @lru_cache(maxsize=4)
-def _ready(beams: Beams, returns: CalibratedReturns | None) -> _Turn:
+def _shared_revolution(
+    beams: Beams, returns: CalibratedReturns | None
+) -> _Turn:
     """Returns a revolution; LiDARs with equal beams and returns share it.
 
     Sharing saves memory, because Drake's bindings may keep a dropped Diagram

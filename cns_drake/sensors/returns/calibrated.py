@@ -193,8 +193,8 @@ class CalibratedReturns:
         met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
         if turn.height.any():
             every = np.arange(len(turn.height))
-            up = turn.height[:, None] * _taken(R_WSset[:, :, 2], every)
-            p_WSset = _taken(p_WSset, every) + up
+            up = turn.height[:, None] * _row_value(R_WSset[:, :, 2], every)
+            p_WSset = _row_value(p_WSset, every) + up
 
         def cast(
             p_Wset: np.ndarray,
@@ -218,7 +218,7 @@ class CalibratedReturns:
         )
         sides = find_sides(shots, turn.orders, met)
         # A single place for all is faster.
-        origins = _taken(p_WSset, sides.row)
+        origins = _row_value(p_WSset, sides.row)
         when = times[sides.row % len(times)]
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
@@ -279,8 +279,8 @@ class CalibratedReturns:
         block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
         return CalibratedTurn(
             beams,
-            _turned(beams.d_Sset, own + azimuth, elevation / across),
-            _turned(beams.d_Sset, own + shift, 0.0),
+            _turned_directions(beams.d_Sset, own + azimuth, elevation / across),
+            _turned_directions(beams.d_Sset, own + shift, 0.0),
             heights[block],
             range_error * parts[block],
             np.maximum(1.0 + gain, 0.0)
@@ -288,12 +288,12 @@ class CalibratedReturns:
         )
 
 
-def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def _row_value(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Returns row i's value, values[i mod K]; a single value stays single."""
     return values if len(values) == 1 else values[rows % len(values)]
 
 
-def _turned(
+def _turned_directions(
     d_Sset: np.ndarray, left: np.ndarray | float, up: np.ndarray | float
 ) -> np.ndarray:
     """Returns (N, 3) directions turned by small angles.

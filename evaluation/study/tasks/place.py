@@ -8,11 +8,7 @@ from typing import Any
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
-from evaluation.recognition.costs import (
-    NUM_TRIALS,
-    QueryCost,
-    measure_search,
-)
+from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
 from evaluation.recognition.keeping import KEEP_ALL
 from evaluation.recognition.place_outcome import (
     Number,
@@ -150,7 +146,7 @@ class PoseTask(Task):
         self, found: Outcomes, before: Outcomes | None
     ) -> Iterator[Number]:
         for now in found:
-            yield from self._numbers(now, _same(before, now))
+            yield from self._numbers(now, _same_settings_outcome(before, now))
 
 
 class PlaceTask(PoseTask):
@@ -263,7 +259,9 @@ def measure_costs(
     return found
 
 
-def _same(before: Outcomes | None, now: PlaceOutcome) -> PlaceOutcome | None:
+def _same_settings_outcome(
+    before: Outcomes | None, now: PlaceOutcome
+) -> PlaceOutcome | None:
     """Returns the baseline's outcome with `now`'s method and verification."""
     for one in before or ():
         if (one.method, one.is_gated) == (now.method, now.is_gated):

@@ -12,7 +12,7 @@ import yaml
 from cns_drake.roads.driver_offsets import (
     FINE_SPACING,
     _change_lanes,
-    _wander,
+    _draw_offsets,
     depart,
     kerbs,
 )
@@ -20,10 +20,7 @@ from cns_drake.roads.lane_path import LanePath
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import REAL_DRIVER, DriverConfig
-from cns_drake.scenarios.scenario_files import (
-    load_scenario,
-    make_scenario,
-)
+from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 
 NOTHING = shapely.STRtree([])
 # Absolute lateral offsets of two real drives along one route: the quantiles of
@@ -59,7 +56,7 @@ def positions(trajectory, spacing):
 @pytest.mark.parametrize(("spread", "length"), [(0.35, 50.0), (0.2, 20.0)])
 def test_wander_has_its_spread_and_its_length(spread, length):
     far = np.full(1_000_000, 9.0)
-    offset = _wander(-far, far, spread, length, np.random.default_rng(1))
+    offset = _draw_offsets(-far, far, spread, length, np.random.default_rng(1))
     assert abs(offset.mean()) < 0.03 * spread
     assert offset.std() == pytest.approx(spread, rel=0.03)
     lag = round(length / FINE_SPACING)
@@ -69,7 +66,7 @@ def test_wander_has_its_spread_and_its_length(spread, length):
 
 def test_wander_keeps_between_bounds_and_away_from_the_nearer_one():
     low, high = np.full(100_000, -0.1), np.full(100_000, 0.8)
-    offset = _wander(low, high, 0.35, 50.0, np.random.default_rng(2))
+    offset = _draw_offsets(low, high, 0.35, 50.0, np.random.default_rng(2))
     assert offset.min() >= -0.1 - 1e-12
     assert offset.max() <= 0.8 + 1e-12
     assert offset.mean() == pytest.approx(0.35, abs=0.03)

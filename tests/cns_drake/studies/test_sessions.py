@@ -9,11 +9,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.studies import study as study_module
 from cns_drake.studies.comparisons import PairMaker
-from cns_drake.studies.experiment import (
-    Experiment,
-    conditions,
-    load_experiment,
-)
+from cns_drake.studies.experiment import Experiment, conditions, load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.results.table import Results
 from evaluation.study import engine
@@ -186,7 +182,7 @@ def test_costs_grow_with_what_is_measured(town, tmp_path):
             **SIMULATED,
         )
         study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-        jobs = study._plan(study._drives(())).jobs
+        jobs = study._plan(study._map_drives(())).jobs
         found: dict[str, float] = {}
         for name, job in jobs.items():
             kind = name.partition(" ")[0]
@@ -454,7 +450,7 @@ def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
         **SIMULATED,
     )
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    jobs = study._plan(study._drives(())).jobs
+    jobs = study._plan(study._map_drives(())).jobs
     (upkeep,) = [name for name in jobs if name.startswith("upkeep ")]
     waiting = [one.name for one in jobs.values() if upkeep in one.needs]
     kinds = sorted(name.partition(" ")[0] for name in waiting)

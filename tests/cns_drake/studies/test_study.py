@@ -69,9 +69,9 @@ def measure(wanted, output, **options):
 def planned(wanted, output, **options):
     """The jobs of an experiment, and the comparisons that they measure."""
     study = Study(wanted, output, "mine.yaml", Cluster(), **options)
-    drives = list(study._drives(()))
+    drives = list(study._map_drives(()))
     for some in drives:
-        list(study._simulated(some, made=False))
+        list(study._simulated_pairs(some, made=False))
     made = study._plan(drives)
     return made.jobs, made.measured
 
@@ -828,10 +828,10 @@ def test_maps_on_the_command_line(town, tmp_path):
         maps=["suburbia", {"name": "a", "age": "x", "years": 2, "seed": 1}],
     )
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    (drives,) = study._drives([str(town)])
+    (drives,) = study._map_drives([str(town)])
     assert drives.map_name == "town"
     with pytest.raises(InputError, match="maps: a: no map 'x'"):
-        list(study._drives(["a"]))
+        list(study._map_drives(["a"]))
 
 
 def test_each_part_of_years_has_a_job_of_its_own(tmp_path):
