@@ -64,7 +64,7 @@ from evaluation.results.drawing import (
     NEW,
     PALE,
     name_lines,
-    unit,
+    unit_rgb,
 )
 from evaluation.results.headlines import SURVIVES, listed, survivors
 from evaluation.results.table import OWN, STAGE, Results, Row
@@ -625,7 +625,7 @@ def layers(path: Path) -> None:
         # A cell meets those in 3 x 3.
         both = cKDTree(other).query(one, p=np.inf)[0] <= 0.75
         lone = one[~both]
-        panels[2].scatter(*lone.T, 2, color=unit(colour), lw=0, label=text)
+        panels[2].scatter(*lone.T, 2, color=unit_rgb(colour), lw=0, label=text)
         panels[2].scatter(*one[both].T, 2, INK, lw=0)
     panels[2].scatter([], [], 2, INK, label="both")
     words = ("a query", "its layers", "over the place")

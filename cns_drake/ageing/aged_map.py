@@ -214,7 +214,7 @@ def past(
             if height > _LEAST_TREE and thing.kind == kinds.TREE:
                 young = max(height + _GROWTH * year, _LEAST_TREE)
                 whole = world.structure(name)
-                model = stage_structures.younger(whole.model, young)
+                model = stage_structures.younger_plant(whole.model, young)
                 standing[name] = replace(whole, model=model)
     events.sort(key=lambda one: one.year)
     return standing, events

@@ -154,7 +154,7 @@ class _Tree:
 
     def structure(self) -> Structure:
         share = round(self.height / self.full, 4)
-        model = stage_structures.scaled(self.whole.model, share)
+        model = stage_structures.scaled_plant(self.whole.model, share)
         return replace(self.whole, name=self.name, model=model)
 
 
@@ -545,7 +545,7 @@ class AgeingCity:
         assert coming is not None
         self._empty(lot)
         if self.year < lot.finished:
-            model = plots.frame(coming, seed=lot.number)
+            model = plots.unfinished_frame(coming, seed=lot.number)
             one = replace(coming, name=f"{coming.name}_frame", model=model)
             self._put(one)
             lot.parts.append(one.name)
@@ -645,7 +645,7 @@ class AgeingCity:
         ]
         insulated = alone and rng.uniform() < _INSULATED
         triangles = self._triangles(name)
-        self.standing[name] = plots.renewed(
+        self.standing[name] = plots.renovated(
             self._structure(name), insulated, rng
         )
         words = ["colour", *(["insulation"] if insulated else [])]

@@ -264,7 +264,7 @@ def building_site_on(
     return things + list(lot_objects(empty, "yard", {}, rng))
 
 
-def frame(building: Structure, seed: int) -> Model:
+def unfinished_frame(building: Structure, seed: int) -> Model:
     """Returns the unfinished frame of a building under construction."""
     model, name = building.model, building.name
     height = max(0.55 * top_of(model), _LEAST_FRAME)
@@ -359,13 +359,15 @@ def annex_to(
         is_free: function that returns whether an area in W may be built on.
         rng: random generator for the size of the annex.
     """
-    cut = section(plot.triangles(triangles), 1.3)
+    cut = horizontal_section(plot.triangles(triangles), 1.3)
     x0, _, x1, _ = plot.inside(plot.area).bounds
     for _ in range(6):
         w = float(np.clip(rng.uniform(0.35, 0.65) * (x1 - x0), 3.0, 9.0))
         d = float(rng.uniform(2.8, 4.5))
         x = float(rng.uniform(x0 + w / 2, max(x1 - w / 2, x0 + w / 2 + 0.01)))
-        walls = [last(cut, x + part * w) for part in (-0.48, -0.2, 0.2, 0.48)]
+        walls = [
+            greatest_y(cut, x + part * w) for part in (-0.48, -0.2, 0.2, 0.48)
+        ]
         if not np.ptp(walls) < 0.5:  # There is no wall, or no plane one.
             continue
         y = min(walls) - 0.05
@@ -417,10 +419,12 @@ def balconies_on(
         np.arange(_STOREY + 0.2, inside[:, :, 2].max() - 3.5, _STOREY)
     ):
         # Existing balconies or bays show at one of these heights.
-        cuts = [section(inside, z + up) for up in (-0.3, 0.4, 1.0, 1.8)]
+        cuts = [
+            horizontal_section(inside, z + up) for up in (-0.3, 0.4, 1.0, 1.8)
+        ]
         for j, x in enumerate(xs):
             walls = [
-                -last(-cut, -x - at)
+                -greatest_y(-cut, -x - at)
                 for cut in cuts
                 for at in (-1.7, -0.8, 0.8, 1.7)
             ]
@@ -438,7 +442,7 @@ def balconies_on(
     return plot.thing(name, "building", assemble(*parts))
 
 
-def renewed(
+def renovated(
     building: Structure, moves: bool, rng: np.random.Generator
 ) -> Structure:
     """Returns a building with renovated walls: plaster of another colour.
@@ -483,7 +487,7 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
     return replace(part, shape=shape, xyz=(float(x), float(y), part.xyz[2]))
 
 
-def section(triangles: np.ndarray, z: float) -> np.ndarray:
+def horizontal_section(triangles: np.ndarray, z: float) -> np.ndarray:
     """Returns where triangles cut a horizontal plane: segments (N, 2, 2) [m].
 
     Each row of a segment is x and y of one of its ends.
@@ -502,7 +506,7 @@ def section(triangles: np.ndarray, z: float) -> np.ndarray:
     return points[both][cut[both]].reshape(-1, 2, 2)
 
 
-def last(segments: np.ndarray, x: float) -> float:
+def greatest_y(segments: np.ndarray, x: float) -> float:
     """Returns the greatest y at which segments cross a line of constant x.
 
     Args:

@@ -15,7 +15,7 @@ def num_cores() -> int:
     return os.cpu_count() or 1
 
 
-def look_seldom() -> None:
+def collect_garbage_seldom() -> None:
     """Makes Python's garbage collector run less often in this process.
 
     Imports and compilation create many objects that are never freed. At

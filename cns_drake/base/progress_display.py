@@ -14,12 +14,7 @@ from typing import Any, TextIO
 
 from cns_drake.base.errors import printable
 from cns_drake.base.pace import Pace, TimeLeft
-from cns_drake.base.progress import (
-    JobsListener,
-    Listener,
-    heard_by,
-    listener,
-)
+from cns_drake.base.progress import JobsListener, Listener, heard_by, listener
 
 # What takes less time than this is not mentioned [s].
 PATIENCE = 1.0
@@ -284,7 +279,7 @@ def _bar(share: float) -> str:
 
 
 @contextlib.contextmanager
-def shown() -> Iterator[None]:
+def show_progress() -> Iterator[None]:
     """Shows the progress of the block on stderr, unless it is shown already."""
     if isinstance(listener(), Display):
         yield

@@ -9,7 +9,7 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import collect_garbage_seldom
 
 
 def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
@@ -25,7 +25,7 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
     """
     try:
         interrupt_on_termination()
-        look_seldom()
+        collect_garbage_seldom()
         with uninterrupted():
             run = load()
         run()

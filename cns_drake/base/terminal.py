@@ -26,7 +26,7 @@ from cns_drake.base.errors import (
     printable,
     shows_traceback,
 )
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 
@@ -152,7 +152,7 @@ def run(
             before the line that names a fault is written.
     """
     message: str | None = None
-    look_seldom()
+    collect_garbage_seldom()
     _open_standard_streams()
     if not has_utf8():
         # Drake would print a traceback of its own.

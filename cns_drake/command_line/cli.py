@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from cns_drake.base import terminal
 from cns_drake.base.commands import Command
-from cns_drake.base.progress_display import shown
+from cns_drake.base.progress_display import show_progress
 from cns_drake.base.terminal import example
 from cns_drake.command_line import exporting, learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
@@ -82,7 +82,7 @@ for _command, (_first, *_rest) in _EXAMPLES.items():
 
 def main() -> None:
     """Runs the command line."""
-    terminal.run(app, "cns-drake", shown())
+    terminal.run(app, "cns-drake", show_progress())
 
 
 if __name__ == "__main__":

@@ -107,7 +107,7 @@ def run_drive(
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
     goes_on = contextlib.nullcontext if overwrite else terminal.resumable
-    with goes_on(), progress_display.shown():
+    with goes_on(), progress_display.show_progress():
         run = simulate(
             scenario,
             output,
@@ -182,4 +182,4 @@ def run_script(name: str, description: str) -> None:
         epilog=epilog,
         context_settings=terminal.WIDE_HELP,
     )(script)
-    terminal.run(app, Path(sys.argv[0]).name, progress_display.shown())
+    terminal.run(app, Path(sys.argv[0]).name, progress_display.show_progress())

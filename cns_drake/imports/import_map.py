@@ -82,7 +82,7 @@ def import_city(
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
-    drives = search.lifted(drives, ground.height, city.faults)
+    drives = search.with_ground_heights(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None
     added: list[Imported] = []

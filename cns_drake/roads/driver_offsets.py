@@ -18,7 +18,7 @@ from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.route import smooth_step
 from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
-# Distance between the points of the path that `depart` needs [m].
+# Distance between the points of the path that `driven_path` needs [m].
 FINE_SPACING = 0.5
 # Least length of an episode in another lane [m].
 SHORTEST_EPISODE = 15.0
@@ -54,7 +54,7 @@ def kerbs(network: RoadNetwork) -> STRtree:
     return STRtree(shapely.linestrings(pairs[line[:-1] == line[1:]]))
 
 
-def depart(
+def driven_path(
     path: LanePath,
     spacing: float,
     obstacles: STRtree,

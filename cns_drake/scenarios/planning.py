@@ -15,7 +15,7 @@ from cns_drake.motion import suspension
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
-from cns_drake.roads.driver_offsets import FINE_SPACING, depart, kerbs
+from cns_drake.roads.driver_offsets import FINE_SPACING, driven_path, kerbs
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import make_lane_path
@@ -116,7 +116,7 @@ class DrivePlan:
             source = f"{scenario.source}: route"
             cure = "give the junction a greater kerb_radius"
         if driver.departs:
-            path = depart(
+            path = driven_path(
                 path,
                 POINT_SPACING,
                 _things_beside(scenario, path.points)

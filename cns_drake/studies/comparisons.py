@@ -256,7 +256,9 @@ class PairMaker:
         )
         self._plain = dict(self._unchanged)
         if self.same_route:
-            self._plain["database"] = beside(self._unchanged["database"])
+            self._plain["database"] = with_lidars_beside(
+                self._unchanged["database"]
+            )
         # Side -> content of a drive -> the drive; equal drives share a name.
         self._known: dict[str, dict[str, Scenario]] = {
             "database": {},
@@ -617,9 +619,11 @@ class PairMaker:
             place = self._viewpoint(
                 side, "near" if viewpoint is None else viewpoint
             )
-            drive = moved(drive, _AHEAD, *place)
+            drive = with_lidars_moved(drive, _AHEAD, *place)
         elif viewpoint is not None:
-            drive = moved(drive, 0.0, *self._viewpoint(side, viewpoint))
+            drive = with_lidars_moved(
+                drive, 0.0, *self._viewpoint(side, viewpoint)
+            )
         stage = self._resolve_stage(side, drive, left.pop("stage", OWN))
         if stage != drive.stage:
             drive = drive.replaced(stage=stage)
@@ -871,16 +875,16 @@ def _name_suffix(side: str, given: Changes, seed: int) -> str:
     return "_".join([*labels, str(seed)])
 
 
-def beside(drive: Scenario) -> Scenario:
+def with_lidars_beside(drive: Scenario) -> Scenario:
     """Returns a drive with its LiDARs moved 1.25 m ahead and 0.5 m to the left.
 
     This is the default viewpoint of a database on the same route as the
     queries, so that the two drives do not coincide.
     """
-    return moved(drive, _AHEAD, *VIEWPOINTS["near"])
+    return with_lidars_moved(drive, _AHEAD, *VIEWPOINTS["near"])
 
 
-def moved(
+def with_lidars_moved(
     drive: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
     """Returns a drive whose LiDARs are mounted elsewhere on the vehicle.

@@ -72,7 +72,7 @@ class Sight:
         return rows, d_Sset[covered], distances[rows]
 
 
-def sights(drive: SimulatedDrive) -> Callable[[int], Sight]:
+def sights_of(drive: SimulatedDrive) -> Callable[[int], Sight]:
     """Returns a function that returns the `Sight` at a frame of a drive.
 
     Its argument is the number of the frame. A `Sight` is valid until the next
@@ -150,7 +150,7 @@ def exact_overlaps(
         InputError: the drives are through different maps.
     """
     check_same_world(database, query)
-    look = sights(database)
+    look = sights_of(database)
     return overlap_matrix(
         database,
         query,

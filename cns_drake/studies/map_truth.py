@@ -46,7 +46,7 @@ from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.exact_overlap import Sight, sights
+from cns_drake.studies.exact_overlap import Sight, sights_of
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.labels import SIDES, Label
 from evaluation.map_update.sessions import (
@@ -275,14 +275,14 @@ def label_points(
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)
-    seen = observed(session.points, other.simulated, frames)
+    seen = observed_points(session.points, other.simulated, frames)
     rows = np.flatnonzero(seen)
     there = is_there(session.points[rows], other.still())
     labels[rows] = np.where(there, kept, changed)
     return labels
 
 
-def observed(
+def observed_points(
     points: np.ndarray,
     drive: SimulatedDrive,
     frames: np.ndarray,
@@ -299,7 +299,7 @@ def observed(
         frames: (K,) frame numbers.
     """
     result = np.zeros(len(points), bool)
-    look = sights(drive)
+    look = sights_of(drive)
     tiles = _Tiles(points)
     first = sample_frames(drive.X_WS[frames, :3, 3], _FIRST_LOOKS)
     looks = np.concatenate([frames[first], np.delete(frames, first)]).tolist()

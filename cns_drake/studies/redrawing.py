@@ -372,9 +372,9 @@ class RedrawFrozen(RedrawCity):
         del texts[source.stage_plan.name]
         plan = read_yaml(source.plan) | {"seed": self.seed}
         if self.turn_deg:
-            roads = turned(read_yaml(source.roads), self.turn_deg)
+            roads = turned_content(read_yaml(source.roads), self.turn_deg)
             texts[source.roads.name] = to_yaml("the map's roads, turned", roads)
-            plan = turned(plan, self.turn_deg)
+            plan = turned_content(plan, self.turn_deg)
             plan["bounds"] = _turned_bounds(plan["bounds"], self.turn_deg)
             texts[source.plan.name] = to_yaml("the map's plan, turned", plan)
         for path in source.drives():
@@ -394,7 +394,7 @@ class RedrawFrozen(RedrawCity):
         return {**super().sources(), "stages": stages.read_text("utf-8")}
 
 
-def turned(values: Any, turn_deg: float) -> Any:
+def turned_content(values: Any, turn_deg: float) -> Any:
     """Returns the content of `roads.yaml` or `city.yaml` for a rotated city.
 
     Args:
@@ -403,7 +403,7 @@ def turned(values: Any, turn_deg: float) -> Any:
             anticlockwise about the world's origin [deg].
     """
     if isinstance(values, list):
-        return [turned(one, turn_deg) for one in values]
+        return [turned_content(one, turn_deg) for one in values]
     if not isinstance(values, Mapping):
         return values
     result: dict[str, Any] = {}
@@ -413,7 +413,7 @@ def turned(values: Any, turn_deg: float) -> Any:
         elif name in _LISTS_OF_PLACES and isinstance(value, list):
             result[name] = [_turned_place(one, turn_deg) for one in value]
         else:
-            result[name] = turned(value, turn_deg)
+            result[name] = turned_content(value, turn_deg)
     if "at" in values:
         result["yaw_deg"] = values.get("yaw_deg", 0.0) + turn_deg
     return result

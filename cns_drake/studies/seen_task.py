@@ -79,7 +79,7 @@ class Noticed:
     delay: np.ndarray
 
 
-def noticed(
+def noticed_changes(
     drives: Sequence[tuple[int, Sighting]],
     query: Sighting,
     came: Mapping[str, int],
@@ -166,7 +166,7 @@ class SeenTask(Task):
         *sightings, years = [part.read() for part in pair.parts[self.name]]
         *drives, query = zip(pair.ages, sightings, strict=True)
         return [
-            noticed(some, query[1], *years)
+            noticed_changes(some, query[1], *years)
             for some in (drives, [drives[0], query])
         ]
 

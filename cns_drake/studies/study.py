@@ -26,10 +26,10 @@ from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
     PairMaker,
-    beside,
     check_frozen,
     frozen_drives,
     frozen_print,
+    with_lidars_beside,
 )
 from cns_drake.studies.experiment import (
     CAUSE,
@@ -498,7 +498,7 @@ class Study:
         # The same LiDARs see all places.
         database, _ = some.pairs[0]
         if self.experiment.drives == "same-route":
-            database = beside(database)
+            database = with_lidars_beside(database)
         return [
             self._named_drive(one)
             for one in distracting_drives(

@@ -31,9 +31,9 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.comparisons import moved
-from cns_drake.studies.exact_overlap import VisibleSurfaces, sights
-from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned
+from cns_drake.studies.comparisons import with_lidars_moved
+from cns_drake.studies.exact_overlap import VisibleSurfaces, sights_of
+from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned_content
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
 
@@ -179,7 +179,9 @@ class SampledCity:
         if self.returns and returns:
             drive = drive.with_returns("calibrated")
             fields["weather"] = {"visibility": fog}
-        return moved(drive, 0.0, aside, 0.0).with_fields(fields, drive.name)
+        return with_lidars_moved(drive, 0.0, aside, 0.0).with_fields(
+            fields, drive.name
+        )
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, self.number, purpose])
@@ -261,7 +263,7 @@ def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
     X_WSs = np.stack([one.drive.X_WS[one.frame] for one in scans])
     places = track(enumerate(scans), "comparing scans", len(scans), "scans")
     for column, place in places:
-        seen = VisibleSurfaces(sights(place.drive)(place.frame), _MAX_RANGE)
+        seen = VisibleSurfaces(sights_of(place.drive)(place.frame), _MAX_RANGE)
         X_PW = poses.inverse(X_WSs[column])
         apart = np.linalg.norm(X_WSs[:, :2, 3] - X_WSs[column, :2, 3], axis=1)
         for row in np.flatnonzero(apart <= _FARTHEST_OVERLAP).tolist():
@@ -327,7 +329,7 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
         "speed_limit": 12.0,
     }
     plan = {"defaults": defaults, "junctions": junctions, "roads": roads}
-    return turned(plan, float(rng.uniform(0.0, 90.0)))
+    return turned_content(plan, float(rng.uniform(0.0, 90.0)))
 
 
 def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:

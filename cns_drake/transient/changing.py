@@ -31,7 +31,7 @@ from cns_drake.transient.scene_editing import (
     Look,
     SceneEditing,
     Surroundings,
-    draws,
+    change_rng,
 )
 from cns_drake.transient.world_structures import (
     LoadedPart,
@@ -443,7 +443,7 @@ def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def _lay_banks(
     around: Surroundings, ground: GroundSurface, depth: float
 ) -> None:
-    phases = draws(around.seed, _SNOW, "banks").uniform(0, 2 * np.pi, 4)
+    phases = change_rng(around.seed, _SNOW, "banks").uniform(0, 2 * np.pi, 4)
     way = around.drive.buffer(1.4 + _BANK_ON_ROAD)
     shapely.prepare(way)
     meshes = []
@@ -616,7 +616,9 @@ def _thin_leaves(around: Surroundings, share: float) -> None:
             count = len(surface.triangles)
             # The key is the size of the mesh, not its path, so that the result
             # does not depend on where the file is.
-            order = draws(around.seed, "leaves", str(count)).permutation(count)
+            order = change_rng(around.seed, "leaves", str(count)).permutation(
+                count
+            )
             around.editing.keep_triangles(
                 part, np.sort(order[: round(left * count)])
             )

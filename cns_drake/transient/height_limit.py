@@ -10,7 +10,11 @@ from shapely.geometry import box
 from cns_drake.city.geometry import OBJECT_MESHES, Mesh, MeshShape, Model, Part
 from cns_drake.city.growth.lowering import STOREY, lowered, top_of
 from cns_drake.scene.surfaces import tessellate
-from cns_drake.transient.scene_editing import SceneEditing, Surroundings, draws
+from cns_drake.transient.scene_editing import (
+    SceneEditing,
+    Surroundings,
+    change_rng,
+)
 from cns_drake.transient.world_structures import LoadedPart, LoadedStructure
 
 _CAUSE = "height_limit"
@@ -40,7 +44,7 @@ def limit_heights(around: Surroundings, limit: float) -> None:
         if building.top - building.bottom < limit + STOREY:
             continue
         model, X_WS = _as_model(building, editing)
-        rng = draws(around.seed, _CAUSE, building.name)
+        rng = change_rng(around.seed, _CAUSE, building.name)
         low = lowered(model, limit, building.name, int(rng.integers(2**31)))
         if low is not model:
             editing.rebuild(building, model, low, X_WS, _CAUSE)

@@ -21,10 +21,10 @@ from cns_drake.city.geometry import (
     placed,
     post,
 )
-from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.transient.ground_surface import GROUND_CLASSES
 from cns_drake.transient.obstacles import Obstacles
-from cns_drake.transient.scene_editing import Surroundings, draws
+from cns_drake.transient.scene_editing import Surroundings, change_rng
 from cns_drake.transient.world_structures import LoadedStructure
 
 # Greatest distance between a front and the drive [m].
@@ -404,7 +404,7 @@ class _Site:
         shares = _WIDE if self.width > 4.0 else _NARROW
         taken: list[BaseGeometry] = []
         for _ in range(_TRIES):
-            name = pick(shares, self.rng)
+            name = pick_key(shares, self.rng)
             x = self.x + float(self.rng.uniform(-0.4, 0.4)) * self.length
             turn = float(self.rng.uniform(-0.15, 0.15))
             model = OBJECTS[name].build(self.rng)
@@ -476,7 +476,7 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
     for name, row in _ROWS.items():
         seed = around.seed if row.moves else 0
         for stretch in stretches:
-            rng = draws(seed, f"roadsides {name}", stretch.name)
+            rng = change_rng(seed, f"roadsides {name}", stretch.name)
             is_put_up = rng.uniform() < share
             if rng.uniform() >= row.share:
                 continue

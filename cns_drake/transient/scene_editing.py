@@ -508,12 +508,12 @@ class Surroundings:
             share: share of the objects, from 0 to 1.
         """
         for thing in things:
-            rng = draws(self.seed, cause, thing.name)
+            rng = change_rng(self.seed, cause, thing.name)
             if rng.uniform() < share:
                 yield thing, rng
 
 
-def draws(seed: int, cause: str, name: str) -> np.random.Generator:
+def change_rng(seed: int, cause: str, name: str) -> np.random.Generator:
     """Returns the random generator for one kind of change of one structure.
 
     The random numbers do not depend on other structures or other kinds of

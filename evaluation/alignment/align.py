@@ -36,7 +36,7 @@ from evaluation.alignment.anchor_search import (
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
-    evenly,
+    even_indices,
     find_self_loops,
     loop_errors,
 )
@@ -328,7 +328,7 @@ def _probe(
     X_TK = X_TS @ source.X_WK
     if keyframes is None:
         keyframes = search.near(X_TK)
-    chosen = keyframes[evenly(len(keyframes), _NUM_PROBES)]
+    chosen = keyframes[even_indices(len(keyframes), _NUM_PROBES)]
     for k in chosen:
         search.attempt(int(k), X_TK[k])
     return search, len(search.loops) >= max(2, 0.5 * len(chosen))

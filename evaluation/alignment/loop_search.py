@@ -48,7 +48,7 @@ class Loop:
     covariance: np.ndarray
 
 
-def close(
+def register_keyframe(
     source: Submaps, target: Submaps, k: int, place: int, X_LK: np.ndarray
 ) -> Loop | None:
     """Registers a keyframe of the source to one of the target.
@@ -158,7 +158,7 @@ class LoopSearch:
         self.num_attempts += 1
         self.tried[k] = X_TK
         X_LK = poses.inverse(self.target.X_WK[place]) @ X_TK
-        loop = close(self.source, self.target, k, place, X_LK)
+        loop = register_keyframe(self.source, self.target, k, place, X_LK)
         if loop is None:
             return False
         self.loops[k] = loop
@@ -242,19 +242,19 @@ def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
         away[drive.path > drive.path[k] - _DETOUR] = np.inf
         if away.min() <= SAME_PLACE:
             pairs.append((k, int(away.argmin())))
-    chosen = [pairs[index] for index in evenly(len(pairs), most)]
+    chosen = [pairs[index] for index in even_indices(len(pairs), most)]
     loops = []
     for k, place in track(
         chosen, f"checking {drive.name}", len(chosen), "places"
     ):
         X_LK = poses.inverse(drive.X_WK[place]) @ drive.X_WK[k]
-        loop = close(drive, drive, k, place, X_LK)
+        loop = register_keyframe(drive, drive, k, place, X_LK)
         if loop is not None:
             loops.append(loop)
     return loops
 
 
-def evenly(number: int, most: int) -> np.ndarray:
+def even_indices(number: int, most: int) -> np.ndarray:
     """Returns up to `most` evenly spaced indices from 0 to `number` - 1."""
     if number <= most:
         return np.arange(number)

@@ -15,7 +15,7 @@ import typer
 
 from cns_drake.base import commands, terminal
 from cns_drake.base.commands import Command
-from cns_drake.base.progress_display import shown
+from cns_drake.base.progress_display import show_progress
 from cns_drake.base.terminal import example, number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
@@ -139,7 +139,9 @@ def tcr(
     ]
     if output is not None:
         make_folder(output)
-    engine = one_pair.measured("tcr", pairs, [ChangeTask({}, "tcr")], output)
+    engine = one_pair.measure_pairs(
+        "tcr", pairs, [ChangeTask({}, "tcr")], output
+    )
     report, *beside = (engine.found(one, ChangeTask.name) for one in pairs)
     for one in beside:
         report = report.beside(one)
@@ -309,7 +311,7 @@ def pr(
         protocol,
         overlaps=shares,
     )
-    engine = one_pair.measured(
+    engine = one_pair.measure_pairs(
         "pr",
         [pair],
         [PlaceTask({}, "pr"), PoseTask({}, "pr")],
@@ -502,7 +504,7 @@ app.command(
 
 def main() -> None:
     """Runs the command line and exits with its status."""
-    terminal.run(app, "cns-eval", shown())
+    terminal.run(app, "cns-eval", show_progress())
 
 
 def _write_scores(

@@ -178,7 +178,7 @@ def localise(
         OpenSource(drive),
         (source.name, drive.name),
     )
-    engine = one_pair.measured(
+    engine = one_pair.measure_pairs(
         "localise",
         [pair],
         [LocaliseTask(settings, "localise")],

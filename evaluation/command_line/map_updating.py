@@ -70,7 +70,7 @@ def map_update(
         pair.A.folder, pair.B.folder, folder.resolve().name
     )
     task = LabelledMapTask(folder, [] if given else [method], given)
-    engine = one_pair.measured("map-update", [one], [task], output)
+    engine = one_pair.measure_pairs("map-update", [one], [task], output)
     found = engine.found(one, task.name)[name]
     if output is not None:
         for session, labels in zip(pair, found.labels, strict=True):

@@ -18,7 +18,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
 from cns_drake.base.number_text import number_within
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
-from evaluation.results.drawing import METHOD_STYLES, plain, save
+from evaluation.results.drawing import METHOD_STYLES, escape_dollars, save
 from evaluation.results.table import Row, made_by
 
 FOLDER = "sessions"
@@ -117,7 +117,7 @@ def draw_sessions(rows: Sequence[Row], folder: Path) -> Path:
                 color=colour,
                 capsize=2,
                 ms=5,
-                label=plain(name),
+                label=escape_dollars(name),
             )
         axes.set_xlabel("days after the map")
         axes.set_ylabel("R@1")

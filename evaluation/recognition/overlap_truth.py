@@ -88,7 +88,7 @@ def overlap_matrix(
     ]
     if see is None:
         see = see_scan
-        clouds = [sampled(points) for points in clouds]
+        clouds = [sample_points(points) for points in clouds]
     X_WQs = protocol.query_poses(query.X_WS[query_frames], query_frames)
     reaches = np.array(
         [np.linalg.norm(points, axis=1).max(initial=0.0) for points in clouds]
@@ -166,7 +166,7 @@ def best_overlaps(
     result = np.full(len(query_scans), math.nan)
     for row, scan in enumerate(query_scans):
         X_WQ = X_WQs[row]
-        p_W = sampled(scan).astype(float) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
+        p_W = sample_points(scan).astype(float) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
         shares = [
             seen[k].share_of((p_W - X_WPs[k, :3, 3]) @ X_WPs[k, :3, :3])
             for k in np.flatnonzero(matches[row]).tolist()
@@ -176,7 +176,7 @@ def best_overlaps(
     return result
 
 
-def sampled(points: np.ndarray) -> np.ndarray:
+def sample_points(points: np.ndarray) -> np.ndarray:
     """Returns at most 8192 of N points, sampled at random."""
     if len(points) <= _NUM_POINTS:
         return points

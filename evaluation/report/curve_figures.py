@@ -12,7 +12,13 @@ from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.results.charts import styles
-from evaluation.results.drawing import INK, PALE, name_lines, plain, save
+from evaluation.results.drawing import (
+    INK,
+    PALE,
+    escape_dollars,
+    name_lines,
+    save,
+)
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 # Size of the names of curves [pt]: 12 px on a phone, which shows one panel.
@@ -51,7 +57,9 @@ def draw_pr_curves(
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)
             axes.set_title(
-                plain(f"{map_name} {' → '.join(pair[1:])}, {mode} queries"),
+                escape_dollars(
+                    f"{map_name} {' → '.join(pair[1:])}, {mode} queries"
+                ),
                 fontsize=_NAME_SIZE,
             )
             axes.grid(alpha=0.3)
@@ -84,7 +92,7 @@ def _draw_curve(
         marker=marker,
         markersize=4,
         markevery=0.2,
-        label=plain(f"{title(method)} {metrics.auc:.3f}"),
+        label=escape_dollars(f"{title(method)} {metrics.auc:.3f}"),
     )
 
 

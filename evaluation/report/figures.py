@@ -19,13 +19,15 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from evaluation.change.drive_change import ChangeResult
-from evaluation.change.tcr import (
-    HULL_MARGIN,
-    TAU,
-    in_convex_hull,
-)
+from evaluation.change.tcr import HULL_MARGIN, TAU, in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
-from evaluation.results.drawing import PIXELS, Legend, plain, save, unit
+from evaluation.results.drawing import (
+    PIXELS,
+    Legend,
+    escape_dollars,
+    save,
+    unit_rgb,
+)
 
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
@@ -306,13 +308,13 @@ def _draw_panels(
     panels = figure.subplots(1, len(pictures), squeeze=False)[0]
     for axes, title, picture in zip(panels, titles, pictures, strict=True):
         _show(axes, picture)
-        axes.set_title(plain(title), fontsize=9)
+        axes.set_title(escape_dollars(title), fontsize=9)
     for axes, route in zip(panels, routes, strict=False):
         _draw_route(axes, route)
     if legend:
         figure.legend(
             handles=[
-                Patch(color=unit(rgb), label=text) for rgb, text in legend
+                Patch(color=unit_rgb(rgb), label=text) for rgb, text in legend
             ],
             loc="outside lower center",
             ncols=len(legend),

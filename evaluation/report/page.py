@@ -44,7 +44,7 @@ from evaluation.results.drawing import save
 from evaluation.results.page_frame import (
     PageSection,
     environment,
-    framed,
+    framed_page,
     read_asset,
 )
 from evaluation.results.table import OWN, STAGE, Results
@@ -329,7 +329,7 @@ def write_page(path: Path, report: Report) -> None:
         for name, word in _SECTIONS.items()
         if has_section.get(name, True)
     ]
-    text = framed(
+    text = framed_page(
         _TITLE,
         _TITLE,
         Markup(_render("intro.html", **values)),

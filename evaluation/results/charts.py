@@ -37,7 +37,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from evaluation.recognition.place_outcome import kept_share
-from evaluation.results.drawing import METHOD_STYLES, plain
+from evaluation.results.drawing import METHOD_STYLES, escape_dollars
 from evaluation.results.headlines import (
     from_least_to_greatest,
     greatest_auc,
@@ -182,7 +182,7 @@ class _Chart:
         for axes in grid.flat[len(panes) :]:
             axes.axis("off")
         for axes, name in zip(grid.flat, panes, strict=False):
-            axes.set_title(plain(name), loc="left")
+            axes.set_title(escape_dollars(name), loc="left")
         return figure, list(grid.flat[: len(panes)])
 
     def figure(self, height: float) -> Figure:
@@ -234,12 +234,12 @@ def draw(
         if kind in ("lines", "scatter"):
             legend = _legend(figure, drawn.styles)
         if alone:
-            figure.suptitle(plain(textwrap.fill(message, width // 9)))
+            figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
         if alone and legend:
             handles = []
             for one, (colour, style, marker) in legend.items():
                 options: dict = {"linestyle": style, "marker": marker}
-                options["label"] = plain(one)
+                options["label"] = escape_dollars(one)
                 handles.append(Line2D([], [], color=colour, **options))
             columns = max(1, width // _LEGEND_COLUMN)
             lines = math.ceil(len(handles) / columns)
@@ -305,7 +305,7 @@ def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
     }
 
 
-def words(name: str) -> str:
+def in_words(name: str) -> str:
     """Returns the name of a metric or a factor in words."""
     return _METRICS.get(name, name.rpartition(".")[2].replace("_", " "))
 
@@ -351,27 +351,29 @@ def _dumbbell(chart: _Chart) -> tuple[str, Figure]:
                 side = axes.get_yaxis_transform()
                 text = f"{100.0 * share:.0f} %"
                 axes.text(1.02, y, text, transform=side, va="center")
-    axes.set_yticks([y for _, y in places], [plain(one) for one, _ in places])
+    axes.set_yticks(
+        [y for _, y in places], [escape_dollars(one) for one, _ in places]
+    )
     for label in axes.get_yticklabels():
-        if label.get_text() in map(plain, chart.styles):
+        if label.get_text() in map(escape_dollars, chart.styles):
             label.set_fontweight("bold")
     axes.set_ylim(len(places) - 0.4, -0.7)
     first, last = (
         value_words(v, over)
         if over == STAGE
-        else f"at {words(over)} {value_words(v)}"
+        else f"at {in_words(over)} {value_words(v)}"
         for v in (before, after)
     )
-    text = f"{words(chart.metric)} {first} (hollow) and {last} (filled)"
+    text = f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
     text = textwrap.fill(text, chart.width // 9)
-    figure.supxlabel(plain(text), fontsize=_FONT)
+    figure.supxlabel(escape_dollars(text), fontsize=_FONT)
     axes.grid(axis="x", alpha=0.3)
     axes.tick_params(length=0)
     _start_at_zero(axes, x=chart.metric)
     shares = {name: 100.0 * median_kept(kept[name]) for name in kept}
     number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
     message = (
-        f"Share of the {words(chart.metric)} that is retained, {number}:"
+        f"Share of the {in_words(chart.metric)} that is retained, {number}:"
         f" {from_least_to_greatest(shares, _PERCENT)}"
     )
     return chart.tested(message, after), figure
@@ -402,11 +404,11 @@ def _lines(chart: _Chart) -> tuple[str, Figure]:
             _start_at_zero(axes, y=chart.metric)
         axes.grid(alpha=0.3)
         # A label of the whole figure would lie below its legend.
-        axes.set_xlabel(plain(words(over)))
-    figure.supylabel(plain(words(chart.metric)), fontsize=_FONT)
+        axes.set_xlabel(escape_dollars(in_words(over)))
+    figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=_FONT)
     found = {name: float(np.mean(some)) for name, some in last.items()}
     message = (
-        f"{words(chart.metric)} at {at[-1]:g} {words(over)}:"
+        f"{in_words(chart.metric)} at {at[-1]:g} {in_words(over)}:"
         f" {from_least_to_greatest(found)}"
     )
     return chart.tested(message, at[-1]), figure
@@ -486,30 +488,34 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
             most = max(most, len(shares))
             worst = value_words(values[y], over)
             if not isinstance(values[y], str) or over == "map":
-                worst = f"{words(over)} {worst}"
+                worst = f"{in_words(over)} {worst}"
             weakest.append((shares[-1], names[x], worst))
         axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
         middles = np.arange(len(names)) + 0.5
-        axes.set_xticks(middles, map(plain, names), rotation=45, ha="right")
+        axes.set_xticks(
+            middles, map(escape_dollars, names), rotation=45, ha="right"
+        )
         for label in axes.get_xticklabels():
             label.set_rotation_mode("anchor")
         axes.set_yticks(
             np.arange(len(values)) + 0.5,
-            [plain(value_words(v, over)) for v in values],
+            [escape_dollars(value_words(v, over)) for v in values],
         )
         axes.tick_params(length=0)
         axes.vlines(range(1, len(names)), 0, len(values), "white", lw=2)
         axes.hlines(range(1, len(values)), 0, len(names), "white", lw=2)
         axes.spines[:].set_visible(False)
-    text = f"{words(chart.metric)} in per cent"
+    text = f"{in_words(chart.metric)} in per cent"
     if strips is not None and most > 1:
-        text += f"; a strip for each {words(strips)}, the number is of the last"
+        text += (
+            f"; a strip for each {in_words(strips)}, the number is of the last"
+        )
     if losses:
         text += "; bold where its 95 % interval lies below 100"
     text = textwrap.fill(text, chart.width // 8)
-    figure.supxlabel(plain(text), fontsize=_FONT)
+    figure.supxlabel(escape_dollars(text), fontsize=_FONT)
     share, name, worst = min(weakest)
-    message = f"Least {words(chart.metric)}: {share:.2f}"
+    message = f"Least {in_words(chart.metric)}: {share:.2f}"
     number = sum(f"{one:.2f}" == f"{share:.2f}" for one, *_ in weakest)
     if number > 1:
         return f"{message}, in {number} of {len(weakest)} cells", figure
@@ -559,7 +565,10 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
                 one.x, one.low, one.high, color=colour, alpha=0.18, lw=0
             )
             axes.plot(one.x, one.y, style, color=colour)
-    axes.set(xlabel=plain(words(x_name)), ylabel=plain(words(y_name)))
+    axes.set(
+        xlabel=escape_dollars(in_words(x_name)),
+        ylabel=escape_dollars(in_words(y_name)),
+    )
     _start_at_zero(axes, x=x_name, y=y_name)
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
@@ -574,7 +583,7 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         for one in correlations(selected, x_name, y_name)
         if not math.isnan(one.value)
     ]
-    message = f"{words(y_name)} over {words(x_name)}"
+    message = f"{in_words(y_name)} over {in_words(x_name)}"
     if not found:
         number = len({row.but("method") for row, _ in points})
         if number < LEAST_POINTS:
@@ -582,9 +591,7 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         return message, figure
     shares = {title(one.method): one.value for one in found}
     text = from_least_to_greatest(shares, "{:+.2f}")
-    message = (
-        f"Rank correlation of {words(y_name)} with {words(x_name)}: {text}"
-    )
+    message = f"Rank correlation of {in_words(y_name)} with {in_words(x_name)}: {text}"
     doubtful = [title(one.method) for one in found if one.low <= 0 <= one.high]
     if doubtful:
         message += (

@@ -48,13 +48,13 @@ _PAGE_DPI = 130
 _WEBP_QUALITY = 82
 
 
-def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
+def unit_rgb(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
     """Scales a colour from 0 to 255 to 0 to 1, as matplotlib needs it."""
     red, green, blue = rgb
     return red / 255.0, green / 255.0, blue / 255.0
 
 
-def plain(text: str) -> str:
+def escape_dollars(text: str) -> str:
     """Returns text with its dollar signs escaped for matplotlib.
 
     A dollar sign that is not escaped begins a formula.

@@ -17,7 +17,7 @@ from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.version import __version__
 from evaluation.results import charts as drawing
 from evaluation.results.drawing import save
-from evaluation.results.page_frame import PageSection, environment, framed
+from evaluation.results.page_frame import PageSection, environment, framed_page
 from evaluation.results.ranges import check_all
 from evaluation.results.summaries import (
     CAUSE,
@@ -166,7 +166,7 @@ def write_page(
         sections.insert(0, charts_shown)
     protocols = ", ".join(filter(None, results.distinct("protocol")))
     about = f". {about}" if about else ""
-    text = framed(
+    text = framed_page(
         title,
         str(shown[0]["message"]) if shown else title,
         Markup("<p><strong>{}</strong>{}</p>").format(title, about),
@@ -241,12 +241,12 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         for name in in_table_order(row.label for row in rows)
         if any((name, gate, *one) in found for one in columns)
     ]
-    heads = [drawing.words(str(metric)) for metric, *_ in columns]
+    heads = [drawing.in_words(str(metric)) for metric, *_ in columns]
     title = _TASKS.get(task, task)
     if by_condition:
         title += f": {heads[0]}"
         if factors:
-            title += f" by {', '.join(map(drawing.words, factors))}"
+            title += f" by {', '.join(map(drawing.in_words, factors))}"
         heads = [
             ", ".join(map(drawing.value_words, values, factors))
             for _, *values in columns

@@ -32,7 +32,7 @@ class PageSection(NamedTuple):
     is_open: bool = False
 
 
-def framed(
+def framed_page(
     title: str,
     heading: str,
     intro: Markup,

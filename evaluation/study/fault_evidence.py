@@ -21,7 +21,7 @@ from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.overlap_truth import sampled
+from evaluation.recognition.overlap_truth import sample_points
 from evaluation.recognition.place_outcome import NEARLY, PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
@@ -223,12 +223,12 @@ class _Shown:
     @cached_property
     def some(self) -> np.ndarray:
         """(M, 3) a random sample of the scan's points."""
-        return sampled(self.points)
+        return sample_points(self.points)
 
     @cached_property
     def some_instances(self) -> np.ndarray | None:
         """(M,) number of the structure on which each point of `some` lies."""
-        return None if self.instances is None else sampled(self.instances)
+        return None if self.instances is None else sample_points(self.instances)
 
     def seen_from(self, other: _Shown) -> np.ndarray:
         """Returns the sample `some` in the frame of another scan's sensor."""

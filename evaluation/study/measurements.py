@@ -97,7 +97,7 @@ def shown_overlaps(
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
         ]
-    searched = crowded(
+    searched = with_distractors(
         described[0],
         (),
         0,
@@ -184,7 +184,7 @@ def measure_method(
     shown = {} if overlaps is None else overlaps.read()
     return _compare(
         (choice, method),
-        crowded(
+        with_distractors(
             database,
             distractors,
             num_distractors,
@@ -271,7 +271,7 @@ def measure_places(
 
         outcomes += _compare(
             (choice, method),
-            crowded(
+            with_distractors(
                 mapped,
                 [parts[k] for parts in distractors],
                 num_distractors,
@@ -390,7 +390,7 @@ def _describe(
     return found.scans, lambda k: found.described.pop(methods[k].key)
 
 
-def crowded(
+def with_distractors(
     database: DriveDescriptors | Part,
     distractors: Sequence[Part],
     num_others: int,

@@ -94,7 +94,7 @@ class JobsAtOnce(Jobs):
         return Reporter(send)
 
 
-def measured(
+def measure_pairs(
     experiment: str,
     pairs: Iterable[Pair],
     tasks: Iterable[Task],

@@ -31,7 +31,7 @@ import numpy as np
 from processes import in_process
 
 from cns_drake.base.jobs.processes import ALLOCATION
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
@@ -127,7 +127,7 @@ def record(
     # Ends of turns, each reported once.
     ends = iter(range(step, frames + 1, step))
     end = next(ends)
-    look_seldom()  # As jobs do.
+    collect_garbage_seldom()  # As jobs do.
     turns.recv()
 
     def on_frame(done: int, total: int) -> None:

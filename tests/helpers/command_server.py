@@ -32,7 +32,7 @@ from cns_drake.base.compiled import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.processes import ALLOCATION
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.simulation.simulation import simulate
 from evaluation.study import chosen_methods
 from helpers.studies import leave_figures_unrendered
@@ -125,7 +125,7 @@ def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
     if INSTALLED_VARIABLE in os.environ:
         assert _TESTS.parent not in Path(cns_drake.__file__).parents
-    look_seldom()
+    collect_garbage_seldom()
     os.fsync = os.fstat  # As in the process of the tests.
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."

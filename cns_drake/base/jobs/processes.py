@@ -31,7 +31,7 @@ from cns_drake.base.files import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.own_packages import leave_out_folder
-from cns_drake.base.process import look_seldom
+from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import heard_by
 
 # How long a process may take to close its files after SIGTERM [s].
@@ -272,7 +272,7 @@ def _preload_modules(modules: Iterable[str]) -> None:
     """Imports modules in the process from which job processes are forked."""
     # Python looks for modules in the current folder first.
     leave_out_folder(sys.path)
-    look_seldom()
+    collect_garbage_seldom()
     os.setsid()
     for name in modules:
         # The process of a job reports what fails.

@@ -30,11 +30,11 @@ from cns_drake.city.geometry import (
     triple,
 )
 from cns_drake.city.growth.lowering import lowered
-from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.city.plan.stages import LotUse, Stages
 
 
-def younger(model: Model, height: float) -> Model:
+def younger_plant(model: Model, height: float) -> Model:
     """Returns a plant scaled down to a height above z = 0 [m].
 
     A plant that is already lower is returned unchanged.
@@ -43,10 +43,10 @@ def younger(model: Model, height: float) -> Model:
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
     if top <= height:
         return model
-    return scaled(model, round(height / float(top), 4))
+    return scaled_plant(model, round(height / float(top), 4))
 
 
-def scaled(model: Model, share: float) -> Model:
+def scaled_plant(model: Model, share: float) -> Model:
     """Returns a plant scaled about its origin by the factor `share`."""
 
     def times(values: tuple[float, ...], digits: int) -> list[float]:
@@ -200,7 +200,7 @@ def lot_objects(
     taken = Occupancy()
     count = 0
     for x, y, yaw in _object_places(footprint, use, rng):
-        kind = pick(weights, rng)
+        kind = pick_key(weights, rng)
         builder = OBJECTS[kind]
         model = builder.build(rng)
         xyz = structure.p_WP((x, y, 0.0))
@@ -313,7 +313,7 @@ def _at_height(structure: Structure, height: float) -> Structure:
     """Returns a structure that has only grown to a height so far [m]."""
     name, model = structure.name, structure.model
     if structure.semantic_class == "vegetation":
-        return replace(structure, model=younger(model, height))
+        return replace(structure, model=younger_plant(model, height))
     if structure.semantic_class == "building":
         model = lowered(model, height, name, _seed(name))
         return replace(structure, model=model)

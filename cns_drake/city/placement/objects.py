@@ -17,7 +17,7 @@ from cns_drake.city.geometry.structures import Builder
 from cns_drake.city.plants.vegetation import TREES
 
 
-def pick(weights: Mapping[str, float], rng: np.random.Generator) -> str:
+def pick_key(weights: Mapping[str, float], rng: np.random.Generator) -> str:
     """Returns a random key of `weights`, which maps keys to weights."""
     names = list(weights)
     p = np.array([weights[name] for name in names])

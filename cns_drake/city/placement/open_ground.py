@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import station_at
-from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.city.plan.city_plan import (
     LinePlan,
     ObjectPlan,
@@ -88,7 +88,7 @@ def _place_line(
     s = 0.0
     while s <= line.length:
         at = station_at(line, s)
-        name = pick(plan.objects, rng)
+        name = pick_key(plan.objects, rng)
         yaw = at.yaw + math.radians(plan.yaw_deg)
         _try_object(draft, district, name, plan.kind, at[:2], yaw, rng)
         s += float(rng.uniform(*plan.spacing))
@@ -110,7 +110,7 @@ def _place_run(
     fall = float(np.abs(np.diff(draft.base(*line.T))).sum())
     count = max(count, math.ceil(round(fall, 3) / _HIGHEST_STEP))
     yaw = math.atan2(*(end - start)[::-1]) + math.radians(plan.yaw_deg)
-    name = pick(plan.objects, rng)
+    name = pick_key(plan.objects, rng)
     for k in range(count):
         middle = start + (end - start) * (k + 0.5) / count
         # A small gap between pieces prevents overlaps.
@@ -159,7 +159,7 @@ def place_car(
         rng: random generator for the choice of the car.
         tags: tags of the structure.
     """
-    name = pick(cars, rng)
+    name = pick_key(cars, rng)
     draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
 
 
@@ -188,7 +188,7 @@ def _scatter(
         # fill does not move the objects.
         keep = rng.uniform() < plan.fill
         yaw = rng.uniform(-math.pi, math.pi)
-        name = pick(plan.objects, rng)
+        name = pick_key(plan.objects, rng)
         if keep:
             xy = float(dart[0]), float(dart[1])
             _try_object(draft, district, name, plan.kind, xy, yaw, rng)

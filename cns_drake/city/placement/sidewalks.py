@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
-from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import StreetPlan
 from cns_drake.roads.network import RoadNetwork
@@ -151,7 +151,7 @@ def plant_medians(draft: Draft) -> None:
         s = float(rng.uniform(1.0, 3.0))
         while s < line.length - 1.0:
             at = station_at(line, s)
-            name = pick(plan.trees, rng)
+            name = pick_key(plan.trees, rng)
             _place_along(draft, name, at, rng, ("median",))
             s += float(rng.uniform(*plan.tree_spacing))
 
@@ -203,12 +203,12 @@ def _draw_next(
         step = float(rng.uniform(*street.tree_spacing))
         if not street.trees:
             return step, None
-        name = pick(street.trees, rng)
+        name = pick_key(street.trees, rng)
         return step, None if rng.uniform() < street.tree_gaps else name
     step = float(rng.uniform(*street.furniture_spacing))
     if not street.furniture:
         return step, None
-    return step, pick(street.furniture, rng)
+    return step, pick_key(street.furniture, rng)
 
 
 def _place_along(

@@ -29,7 +29,7 @@ from cns_drake.city.geometry import (
 )
 from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.frontage import station_at
-from cns_drake.city.placement.objects import OBJECTS, pick
+from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.imports.dressing.paving import HALF_STREET
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.faces import joined
@@ -409,7 +409,7 @@ def park_along(
             yaw += 0.0 if side > 0 else np.pi
             is_taken = rng.random() < _TAKEN_SHARE
             yaw += float(rng.uniform(-0.02, 0.02))
-            form = pick(_TABLES["vehicles"], rng)
+            form = pick_key(_TABLES["vehicles"], rng)
             # Without other streets, the distance is NaN.
             is_clear = not others.distance(Point(xy)) <= _FROM_CROSSING
             if is_taken and is_clear:
@@ -453,7 +453,7 @@ def fill_car_park(placing: StreetRoom, one: Imported, seed: int) -> None:
             x = (k - (count - 1) / 2.0) * pitch + float(rng.uniform(-0.2, 0.2))
             place = middle + x * along + offset * across
             yaw = heading + float(rng.uniform(-0.02, 0.02))
-            form = pick(_TABLES["vehicles"], rng)
+            form = pick_key(_TABLES["vehicles"], rng)
             if rng.random() > _TAKEN_SHARE or not area.contains(Point(place)):
                 continue
             xy = (float(place[0]), float(place[1]))
@@ -616,7 +616,7 @@ def _place_small_objects(
     s = float(rng.uniform(3.0, 12.0))
     while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0
-        kind = pick(_TABLES["small things"], rng)
+        kind = pick_key(_TABLES["small things"], rng)
         xy, yaw = place_along(row.line, s, side, row.half + FROM_EDGE)
         yaw += side * np.pi / 2.0
         if placing.place(f"{kind}_{row.name}_{int(s)}", kind, xy, yaw, rng):

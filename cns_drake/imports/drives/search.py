@@ -683,7 +683,7 @@ class StreetGraph(WayGraph):
         return np.array([way[int(np.argmin(from_line))]])
 
 
-def lifted(
+def with_ground_heights(
     drives: Iterable[WaypointRoute],
     height: Callable[[np.ndarray], np.ndarray],
     faults: ImportFaults,

@@ -499,7 +499,7 @@ def _build(
     drives = (
         lane_drives.find_lane_drives(bands)
         if own is None
-        else search.lifted(own, surface.heights, faults)
+        else search.with_ground_heights(own, surface.heights, faults)
     )
     if options.within is not None:
         city = _near_drives(city, drives, options.within, faults)

@@ -330,7 +330,9 @@ def _barriers(
         strip: BaseGeometry = course.buffer(width / 2.0, cap_style="flat")
         strip = strip.difference(openings.across(way, course, features.faults))
         look = streets.Look("Barrier", semantic_class, None, high)
-        yield from streets.raised(f"{kind}_{name}", look, [strip], where)
+        yield from streets.raised_structure(
+            f"{kind}_{name}", look, [strip], where
+        )
 
 
 def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:

@@ -149,7 +149,7 @@ _WALK = Look("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 
-def laid(
+def flat_structure(
     name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
 ) -> Iterator[Imported]:
     """Yields one level surface that fills areas; nothing for empty areas.
@@ -171,7 +171,7 @@ def laid(
         yield _made(name, look, "surface", surface)
 
 
-def raised(
+def raised_structure(
     name: str,
     look: Look,
     areas: Iterable[BaseGeometry],
@@ -236,7 +236,7 @@ def parapets(
                 edge.buffer(_PARAPET_THICKNESS / 2.0, cap_style="flat")
             )
         source = (name, ImportFaults())
-        yield from raised(f"parapet_{name}", _PARAPET, strips, source)
+        yield from raised_structure(f"parapet_{name}", _PARAPET, strips, source)
 
 
 def street_surfaces(
@@ -279,10 +279,12 @@ def street_surfaces(
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
     for name, area in roads:
-        yield from laid(f"road_{name}", _ROAD, faces.parts_of(area), faults)
+        yield from flat_structure(
+            f"road_{name}", _ROAD, faces.parts_of(area), faults
+        )
     for name, area in walks:
         areas = faces.parts_of(area.difference(paved))
-        yield from laid(f"walk_{name}", _WALK, areas, faults)
+        yield from flat_structure(f"walk_{name}", _WALK, areas, faults)
 
 
 def _is_elsewhere(name: str, tags: reading.Tags, bridges: Bridges) -> bool:
@@ -439,7 +441,9 @@ def ground_areas(
         if look is None or has_tag(tags, "building"):
             continue
         outlines = map(local.polygon, polygons)
-        yield from laid(f"land_{name}", look, outlines, features.faults)
+        yield from flat_structure(
+            f"land_{name}", look, outlines, features.faults
+        )
 
 
 def _plain_look(tags: reading.Tags) -> Look | None:
@@ -514,7 +518,7 @@ def sea(
     edges = shapely.union_all([whole.boundary, *cuts])
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
-    yield from laid(
+    yield from flat_structure(
         f"sea_{coasts[0].name}", _WATER, faces.parts_of(water), faults
     )
 

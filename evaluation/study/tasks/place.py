@@ -18,10 +18,10 @@ from evaluation.recognition.place_outcome import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import (
-    crowded,
     measure_method,
     measure_places,
     shown_overlaps,
+    with_distractors,
 )
 from evaluation.study.parts import MakePart, Part
 from evaluation.study.tasks.task import (
@@ -243,7 +243,7 @@ def measure_costs(
         method = choice.make()
         others = [parts[k] for parts in distractors]
         near = [parts[k] for parts in beside]
-        searched = crowded(
+        searched = with_distractors(
             database[k],
             others,
             num_distractors,

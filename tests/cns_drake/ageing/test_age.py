@@ -15,7 +15,12 @@ from cns_drake.ageing import plots
 from cns_drake.ageing.aged_map import age_map, past
 from cns_drake.ageing.history import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.plots import Plot, last, new_building, section
+from cns_drake.ageing.plots import (
+    Plot,
+    greatest_y,
+    horizontal_section,
+    new_building,
+)
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
     Tally,
@@ -499,11 +504,11 @@ def test_poisson_p():
 def test_section_of_a_roof():
     """A triangle from (0, 0, 0) and (4, 0, 0) to (0, 2, 2), cut at height 1."""
     triangle = np.array([[[0, 0, 0], [4, 0, 0], [0, 2, 2]]], float)
-    cut = section(triangle, 1.0)
+    cut = horizontal_section(triangle, 1.0)
     ends = cut[0][np.argsort(cut[0][:, 0])]
     np.testing.assert_allclose(ends, [[0, 1], [2, 1]], atol=1e-3)
-    assert last(cut, 1.0) == pytest.approx(1.0, abs=1e-3)
-    assert np.isnan(last(cut, 3.0))
+    assert greatest_y(cut, 1.0) == pytest.approx(1.0, abs=1e-3)
+    assert np.isnan(greatest_y(cut, 3.0))
 
 
 def test_a_plot_faces_its_street():
@@ -588,7 +593,7 @@ def test_a_scaffold_stands_before_its_building(world):
             triangles = city._triangles(name.removeprefix("scaffold_"))
             top = plots.structure_triangles(city._structure(name))[..., 2].max()
             for z in np.arange(triangles[..., 2].min() + 0.1, top - 1.2, 0.3):
-                cut = section(triangles, z)
+                cut = horizontal_section(triangles, z)
                 inside = shapely.intersection(shapely.linestrings(cut), own)
                 assert not shapely.length(inside).any()
             assert city.near(own, [name]) == []

@@ -9,14 +9,8 @@ from helpers.listening import Heard
 import pytest
 
 from cns_drake.base import progress
-from cns_drake.base.progress import (
-    doing,
-    heard_by,
-    interlude,
-    listener,
-    track,
-)
-from cns_drake.base.progress_display import Display, shown, shown_times
+from cns_drake.base.progress import doing, heard_by, interlude, listener, track
+from cns_drake.base.progress_display import Display, show_progress, shown_times
 
 
 class Clock:
@@ -266,10 +260,10 @@ def test_other_text_appears_above(clock, screen, monkeypatch):
 
 
 def test_one_display_at_a_time():
-    with shown():
+    with show_progress():
         first = listener()
         assert isinstance(first, Display)
-        with shown():
+        with show_progress():
             assert listener() is first
         assert listener() is first
     assert listener() is progress._NOBODY

@@ -22,7 +22,7 @@ from cns_drake.city.growth.stage_structures import (
     largest_rectangle,
     lot_objects,
     use_by_size,
-    younger,
+    younger_plant,
 )
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.stages import Growth, Stage, Stages
@@ -115,9 +115,9 @@ def test_a_younger_plant_is_alike(species):
         return np.array([corners.min(axis=0), corners.max(axis=0)])
 
     top = extent(plant)[1, 2]
-    young = younger(plant, 0.4 * top)
+    young = younger_plant(plant, 0.4 * top)
     np.testing.assert_allclose(extent(young), 0.4 * extent(plant), atol=2e-3)
-    assert younger(plant, top) is plant
+    assert younger_plant(plant, top) is plant
 
 
 def test_a_site_stands_on_its_lot():

@@ -13,7 +13,7 @@ from cns_drake.roads.driver_offsets import (
     FINE_SPACING,
     _change_lanes,
     _draw_offsets,
-    depart,
+    driven_path,
     kerbs,
 )
 from cns_drake.roads.lane_path import LanePath
@@ -109,7 +109,7 @@ def test_a_departing_path_keeps_limits_ends_and_heights():
     path = straight(500.0, (3.5, 0.0))
     driver = {"wander": 0.3, "wander_length": 50.0, "lane_changes": 5.0}
     path.points[:, 2] = 0.02 * path.points[:, 0]
-    moved = depart(
+    moved = driven_path(
         path, 2.0, NOTHING, "test", rng=np.random.default_rng(5), **driver
     )
     assert moved.spacing == pytest.approx(2.0, rel=0.01)

@@ -20,7 +20,7 @@ from cns_drake.studies.redrawing import (
     frozen_redraws,
     kept_names,
     redraw_frozen,
-    turned,
+    turned_content,
 )
 
 
@@ -51,16 +51,16 @@ def test_a_quarter_turn():
         ],
         "roads": {"a": {"start": "west", "via": [[3, 1, 10.5]]}},
     }
-    district = turned(plan, 90)["districts"][0]
+    district = turned_content(plan, 90)["districts"][0]
     assert district["area"] == [[-2, 1], [-4, 3]]
     building = {"at": [0, 1], "size": [5, 6], "yaw_deg": 110}
     assert district["buildings"] == [building]
     # A line's objects turn with it.
     assert district["lines"] == [{"points": [[-1, 0], [-1, 2]], "yaw_deg": 90}]
     assert district["parking"] == [{"start": [-1, 1], "end": [-1, 2]}]
-    road = turned(plan, 90)["roads"]["a"]
+    road = turned_content(plan, 90)["roads"]["a"]
     assert road == {"start": "west", "via": [[-1, 3, 10.5]]}
-    assert turned(plan, 360.0)["roads"] == plan["roads"]
+    assert turned_content(plan, 360.0)["roads"] == plan["roads"]
 
 
 def test_stages_keep_what_a_city_has():

@@ -16,7 +16,7 @@ from cns_drake.studies.seen_task import (
     SeenTask,
     Sighting,
     changes_until,
-    noticed,
+    noticed_changes,
     sight_structures,
 )
 from cns_drake.studies.study import Study
@@ -41,28 +41,28 @@ WENT = {"oak": 2, "elm": 5}
 
 
 def test_who_notices_what_and_when():
-    found = noticed(DRIVES, sighting(LAST), CAME, WENT)
+    found = noticed_changes(DRIVES, sighting(LAST), CAME, WENT)
     assert found.names == ["elm", "house", "oak", "shed"]
     # The elm still stood when a drive passed it.
     assert found.is_noticed.tolist() == [False, True, True, False]
     np.testing.assert_array_equal(found.delay, [math.nan, 3.0, 4.0, math.nan])
     # A change of an unknown year is noticed after an unknown time.
-    found = noticed(DRIVES, sighting(LAST), {}, {})
+    found = noticed_changes(DRIVES, sighting(LAST), {}, {})
     assert found.is_noticed.sum() == 2
     assert np.isnan(found.delay).all()
 
 
 def test_the_first_drive_alone_notices_nothing():
-    found = noticed(DRIVES[:1], sighting(LAST), CAME, WENT)
+    found = noticed_changes(DRIVES[:1], sighting(LAST), CAME, WENT)
     assert not found.is_noticed.any()
     # Nor is there something to notice if nothing changed.
-    assert noticed(DRIVES, sighting(FIRST), CAME, WENT).names == []
+    assert noticed_changes(DRIVES, sighting(FIRST), CAME, WENT).names == []
 
 
 def test_numbers_of_all_changes_and_of_those_that_the_query_sees():
     query = sighting(LAST, {"house"}, {"elm"})
     both = [
-        noticed(some, query, CAME, WENT)
+        noticed_changes(some, query, CAME, WENT)
         for some in (DRIVES, [DRIVES[0], (9, query)])
     ]
     task = SeenTask({}, "mine.yaml")

@@ -256,7 +256,7 @@ def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):
     ).stdout.split()
     assert module in loaded
     named = [fingerprints._Module(ROOT, module)]
-    found = fingerprints._files(named, ())
+    found = fingerprints._source_files(named, ())
     assert {f"{name}.py" for name in loaded} <= found.keys()
 
 

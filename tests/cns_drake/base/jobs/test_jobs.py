@@ -30,7 +30,7 @@ from cns_drake.base.jobs.processes import (
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.process import num_cores
-from cns_drake.base.progress_display import shown
+from cns_drake.base.progress_display import show_progress
 
 pytestmark = pytest.mark.slow
 
@@ -69,7 +69,7 @@ def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
         "unknown", job_functions.join, [], tmp_path / "unknown",
         is_done=job_functions.cannot_check,
     )  # fmt: skip
-    with shown():
+    with show_progress():
         run_jobs([done, new, again, unknown], Cluster(num_workers=1))
     assert (tmp_path / "unknown").is_file()
     assert path.read_text() == "path"
@@ -136,7 +136,7 @@ def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
         job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
         job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
     ]
-    with pytest.raises(FailedJobsError) as raised, shown():
+    with pytest.raises(FailedJobsError) as raised, show_progress():
         run_jobs(jobs, Cluster(num_workers=2))
     assert raised.value.exit_status == 1
     *faults, left_out = str(raised.value).split("; ")
