@@ -591,7 +591,8 @@ def _scatter(chart: _Chart) -> tuple[str, Figure]:
         return message, figure
     shares = {title(one.method): one.value for one in found}
     text = from_least_to_greatest(shares, "{:+.2f}")
-    message = f"Rank correlation of {in_words(y_name)} with {in_words(x_name)}: {text}"
+    names = f"{in_words(y_name)} with {in_words(x_name)}"
+    message = f"Rank correlation of {names}: {text}"
     doubtful = [title(one.method) for one in found if one.low <= 0 <= one.high]
     if doubtful:
         message += (
