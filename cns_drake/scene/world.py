@@ -179,7 +179,7 @@ class World:
             finalized, and not meant to be part of a Diagram.
         vehicle: model instance of the vehicle; None without one.
         structures: class and instance id of every structure in the world,
-            whether or not a table lists it.
+            whether or not the structure table lists it.
         notes: messages for the user.
 
     Example:

@@ -297,15 +297,15 @@ def distracting_drives(
     drives come in this order, until they have about the wanted number of
     places: the shipped drives of other maps, each through its own stage; if the
     query's map is shipped, drives along its streets between other buildings;
-    the drives of other maps through their other stages; and the drives of other
-    maps through their redrawn cities.
+    the drives of other maps through their other stages; and drives along the
+    streets of other maps, between other buildings.
 
     Args:
         query: the query drive. The returned drives have its LiDARs, and do not
             go through its city.
         number: approximate number of places.
         spacing: distance between two places [m].
-        output: folder for redrawn cities.
+        output: folder for the newly generated cities, with other buildings.
         cluster: runs the jobs.
         on_note: is called with each note for the user.
 

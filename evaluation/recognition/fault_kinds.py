@@ -109,7 +109,8 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
         applies:
 
         - `occluded`: the right place's scan shows less than half of the query's
-          scan, and at least half of the rest is occluded for its sensor.
+          scan, and at least half of the rest is occluded for the right place's
+          sensor.
         - `no_overlap`: the right place's scan shows less than half of the
           query's scan, for another reason.
         - `changed`: at least a quarter of the surroundings is new or gone.

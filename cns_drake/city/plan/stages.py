@@ -27,7 +27,8 @@ class Growth(_Model):
             ground below them [m].
         structures: names of the structures, as in `structures.csv`. `*` stands
             for any text and `?` for any one character.
-        but: names of exceptions, which match `structures` but are not lower.
+        but: names of exceptions: structures that match `structures`, but do not
+            belong to the group.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)

@@ -370,7 +370,8 @@ class LaneLayout(NamedTuple):
         forward: number of lanes in the direction of the street's line.
         backward: number of lanes in the opposite direction.
         width: width of each lane [m].
-        total: number of all lanes. Those between the two directions are empty.
+        total: number of all lanes, including the empty lanes in the middle
+            that belong to neither direction.
     """
 
     forward: int
