@@ -19,7 +19,7 @@ from cns_drake.imports.options import ImportFaults
 _LEAST_AREA = 1e-5
 # A face is bent if a corner is farther than this from its plane [m].
 _BENT = 0.05
-# Corners closer than this are the same [m].
+# Millimetres in a metre: corners that are equal in whole millimetres are one.
 _MM = 1000.0
 _LEAST_PART = 0.01  # [m^2]
 # The four corner triangles of a face with four corners. The second and the last

@@ -62,7 +62,7 @@ def find_speed_profile(
     # mean of the drive's speed, and u'' of its acceleration, over at most
     # REACH + 1 knot periods before and after. A limit on the acceleration
     # therefore also holds for u''; a limit on the speed holds for u' only if
-    # the drive keeps it for as long, see `_early_and_late`.
+    # the drive keeps it for as long, see `_widened_limits`.
     #
     # |p'| <= 1, so that a limit on u' also limits the speed. The acceleration
     # differs from u'' by a term that is subtracted from the limit.
@@ -82,7 +82,7 @@ def find_speed_profile(
     half = speeds.longitudinal_acceleration / 2.0
     parametric = np.maximum(np.abs(jet.dspeed), 1e-9)
     limit = np.minimum(limit, np.sqrt(half / parametric))
-    limit = _early_and_late(limit, u[1])
+    limit = _widened_limits(limit, u[1])
     parametric = np.max(np.abs(jet.dspeed) * limit**2)
     acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
     speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))
@@ -110,7 +110,7 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
     return _positions_at(drive_times, times, u, speed)
 
 
-def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
+def _widened_limits(limit: np.ndarray, step: float) -> np.ndarray:
     """Returns limits (N,) that also hold some time before and after each limit.
 
     A drive that keeps to the limit v within the distance T * v of a place

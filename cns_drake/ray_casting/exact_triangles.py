@@ -78,7 +78,7 @@ class ExactTriangles:
             if flat:
                 content = group.content()
                 if content not in by_content:
-                    by_content[content] = _sort(*merge_triangles(flat))
+                    by_content[content] = _make_tree(*merge_triangles(flat))
                 indices = np.array([index for index, *_ in group.members])
                 self._found.append((row, group, by_content[content], indices))
 
@@ -111,8 +111,11 @@ class ExactTriangles:
             )
 
 
-def _sort(surface: TriangleSurface, owners: np.ndarray) -> _Tree:
-    """Sorts triangles by the surface area heuristic (Wald 2007, with bins)."""
+def _make_tree(surface: TriangleSurface, owners: np.ndarray) -> _Tree:
+    """Returns the tree of a surface's triangles.
+
+    Nodes are divided by the surface area heuristic (Wald 2007, with bins).
+    """
     corners = surface.p_GVset[surface.triangles].astype(float)
     low, high = (
         corners.min(axis=1) - _BOX_MARGIN,
@@ -250,13 +253,14 @@ def _divide(
 
 
 @compiled
-def _enter(
+def _entry_distance(
     boxes: np.ndarray, node: int, p: np.ndarray, r: np.ndarray, limit: float
 ) -> float:
-    """Returns where a ray enters a box, inf if it does not before a limit.
+    """Returns the distance at which a ray enters a node's box [m].
 
-    `r` is the reciprocal of the direction; where that is infinite, comparisons
-    with NaN let the ray pass, which only costs time.
+    It is infinite if the ray does not enter the box before a limit. `p` is the
+    ray's origin, and `r` the reciprocal of its direction; where that is
+    infinite, comparisons with NaN let the ray pass, which only costs time.
     """
     near, far = 0.0, limit
     for axis in range(3):
@@ -307,13 +311,13 @@ def _cast(
         while size:
             size -= 1
             node = stack[size]
-            if _enter(boxes, node, p, r, best) == np.inf:
+            if _entry_distance(boxes, node, p, r, best) == np.inf:
                 continue
             if counts[node] == 0:
                 first = begins[node]
                 second = first + 1
-                one = _enter(boxes, first, p, r, best)
-                other = _enter(boxes, second, p, r, best)
+                one = _entry_distance(boxes, first, p, r, best)
+                other = _entry_distance(boxes, second, p, r, best)
                 if other < one:
                     first, second = second, first
                 # The nearer one is next.

@@ -343,7 +343,7 @@ class BagWriter:
 
     def _end(self) -> None:
         self._chunks.writer.add_metadata(
-            "rosbag2", {"serialized_metadata": to_yaml(self._information())}
+            "rosbag2", {"serialized_metadata": to_yaml(self._bag_information())}
         )
         self._chunks.finish({v: k for k, v in self._channel_ids.items()})
         self._stream.flush()
@@ -356,7 +356,7 @@ class BagWriter:
         never describe the new MCAP.
         """
         own = self._files
-        metadata = {"rosbag2_bagfile_information": self._information()}
+        metadata = {"rosbag2_bagfile_information": self._bag_information()}
         files.write_part(own.scenario, to_yaml(self._scenario))
         files.write_part(own.metadata, to_yaml(metadata))
         for path, value in self._beside.items():
@@ -394,7 +394,7 @@ class BagWriter:
             yield
         self._intact = True
 
-    def _information(self) -> dict:
+    def _bag_information(self) -> dict:
         """Returns rosbag2's description of the file."""
         first_ns, last_ns = self._span_ns or (self._start_ns, self._start_ns)
         topics = [

@@ -177,18 +177,21 @@ class RoadNetwork:
     def connections(self, junction: str) -> list[Connection]:
         """Returns every legal path through a junction."""
         if junction not in self._connections:
-            self._connections[junction] = list(self._ways(junction))
+            self._connections[junction] = list(
+                self._legal_connections(junction)
+            )
         return self._connections[junction]
 
-    def _ways(self, junction: str) -> Iterator[Connection]:
+    def _legal_connections(self, junction: str) -> Iterator[Connection]:
+        """Yields every legal path through a junction, computed anew."""
         lanes = list(self.lanes())
         incoming = [a for a in lanes if self.exit_junction(a) == junction]
         outgoing = [b for b in lanes if self.entry_junction(b) == junction]
         for a, b in itertools.product(incoming, outgoing):
             if not self._is_u_turn(a, b):
-                way = self.connection(a, b)
-                if self.is_legal(way):
-                    yield way
+                connection = self.connection(a, b)
+                if self.is_legal(connection):
+                    yield connection
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:

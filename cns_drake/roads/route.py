@@ -221,7 +221,7 @@ def _leg_points(
     count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
     travelled = np.linspace(start, end, count)
     offset = first + (last - first) * _lane_change(travelled, first != last)
-    offset = _moved_right(road, leg.direction, offset, travelled, aside)
+    offset = _offsets_moved_right(road, leg.direction, offset, travelled, aside)
     return road.evaluate(_stations(road, leg, travelled), offset)[:, :3]
 
 
@@ -256,7 +256,7 @@ def _turn_round(
         is on the left; its distance is that between both middles [m].
         """
         offsets = [
-            _moved_right(
+            _offsets_moved_right(
                 road,
                 one.direction,
                 np.array([road.lane_offset(one.direction, lane.lane)]),
@@ -292,7 +292,7 @@ def _turn_round(
     return points, loop.begin
 
 
-def _moved_right(
+def _offsets_moved_right(
     road: Road,
     direction: Direction,
     offset: np.ndarray,

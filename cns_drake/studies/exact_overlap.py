@@ -4,9 +4,10 @@ For simulated drives, rays cast in the world decide which points of a query's
 scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
 point is seen if
 
-- it is within the ranges of the LiDAR and of the protocol, - the place's beams
-  cover its direction, - nothing occludes it, and a surface lies within
-  `TOLERANCE` of it on the line of sight.
+- it is within the ranges of the LiDAR and of the protocol,
+- the place's beams cover its direction,
+- nothing occludes it, and a surface lies within `TOLERANCE` of it on the line
+  of sight.
 
 The place's sensor sees the world of its own drive, with the stage and the
 traffic of this drive.

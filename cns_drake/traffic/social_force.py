@@ -188,7 +188,7 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
         one = walkers[i]
         x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
         rest_x, rest_y = _stop(x, y, vx, vy)
-        off = _distance_off(paths, one, rest_x, rest_y)
+        off = _distance_to_path(paths, one, rest_x, rest_y)
         change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
             if attempt == 1:
@@ -223,7 +223,7 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
                 turn = (turn + np.pi) % (2 * np.pi) - np.pi
                 yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
             if attempt < 2 and (
-                _distance_off(paths, one, stop_x, stop_y) > off + 1e-9
+                _distance_to_path(paths, one, stop_x, stop_y) > off + 1e-9
             ):
                 continue
             if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
@@ -262,7 +262,7 @@ def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
 
 
 @compiled
-def _distance_off(paths: Paths, walker: Any, x: float, y: float) -> float:
+def _distance_to_path(paths: Paths, walker: Any, x: float, y: float) -> float:
     """Returns the distance from a place to a pedestrian's path [m]."""
     path, points = paths.paths[walker.path], paths.points
     row = _nearest(paths, walker, x, y)

@@ -134,10 +134,10 @@ class GroundSurface:
                 if shapely.Polygon(ring).area < _LEAST_AREA:
                     continue
                 xy = shapely.get_coordinates(ring.segmentize(spacing))[:-1]
-                yield from _runs(xy, shapely.contains_xy(inner, xy))
+                yield from _kerbs_inside(xy, shapely.contains_xy(inner, xy))
 
 
-def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
+def _kerbs_inside(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
     """Yields the stretches of a ring that are inside an area, as kerbs.
 
     The carriageway is on the left of the ring.

@@ -160,7 +160,7 @@ def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
         )[0]
         for k in candidates
     }
-    told = {k: _information(table) for k, table in tables.items()}
+    told = {k: _mutual_information(table) for k, table in tables.items()}
     most = max(told.values())
     if most <= _LEAST_INFORMATION:
         return None
@@ -206,11 +206,11 @@ def _period_of_zeros(is_value: np.ndarray, places: np.ndarray) -> int | None:
     return None
 
 
-def _information(table: np.ndarray) -> float:
-    """Returns the information of the column about the value's bin [nat].
+def _mutual_information(table: np.ndarray) -> float:
+    """Returns the mutual information of a value's column and its bin [nat].
 
-    It is their mutual information, less its expectation for columns that are
-    independent of the values (Miller and Madow).
+    The expectation for columns that are independent of the values is subtracted
+    (Miller and Madow).
 
     Args:
         table: (K, M) number of values by column and bin.

@@ -184,7 +184,9 @@ def compare_drives(first: Drive, second: Drive) -> DriveComparison:
     backwards = _offsets(p_A, tangent, way_b, opposite)[reverse]
     quantiles = (
         _quantiles("offset_{}", np.abs(offset[meets]), 50, 75, 90, 95, 99)
-        | _quantiles("episode_{}", _runs(outside) * STATION_SPACING, 50, 90)
+        | _quantiles(
+            "episode_{}", _run_lengths(outside) * STATION_SPACING, 50, 90
+        )
         | _quantiles("heading_{}_deg", heading, 5, 95)
         | _quantiles("height_{}", height, 5, 95)
         | _quantiles("reverse_{}", np.abs(backwards), 25, 50, 75, 95)
@@ -308,7 +310,7 @@ def _driving(drive: Drive, way: _Way) -> Driving:
     )
 
 
-def _runs(flags: np.ndarray) -> np.ndarray:
+def _run_lengths(flags: np.ndarray) -> np.ndarray:
     """Returns the length of each run of consecutive true values."""
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
     return edges[1::2] - edges[::2]

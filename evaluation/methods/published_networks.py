@@ -192,8 +192,11 @@ def _interpolated(
     return np.einsum("mk,mkc->mc", shares, features[found])
 
 
-def _norms(names: str, channels: int) -> dict[str, tuple[int, ...]]:
-    """Returns name -> shape of the weights of batch normalisations."""
+def _norm_shapes(names: str, channels: int) -> dict[str, tuple[int, ...]]:
+    """Returns name -> shape of the weights of batch normalisations.
+
+    `names` are the names of the layers, separated by spaces.
+    """
     return {
         f"{name}.{part}": (channels,)
         for name in names.split()
@@ -225,14 +228,16 @@ _SVT_NET = {
     "backbone.att_token.embedding1.weight": (256, 256, 1),
     "backbone.att_token.T_conv.weight": (256, 256, 1),
     "pooling.p": (1,),
-    **_norms("backbone.bn0.bn backbone.bn.0.bn backbone.bn.1.bn", 32),
-    **_norms("backbone.blocks.0.0.norm1.bn backbone.blocks.0.0.norm2.bn", 32),
-    **_norms(
+    **_norm_shapes("backbone.bn0.bn backbone.bn.0.bn backbone.bn.1.bn", 32),
+    **_norm_shapes(
+        "backbone.blocks.0.0.norm1.bn backbone.blocks.0.0.norm2.bn", 32
+    ),
+    **_norm_shapes(
         "backbone.blocks.1.0.norm1.bn backbone.blocks.1.0.norm2.bn"
         " backbone.blocks.1.0.downsample.1.bn",
         64,
     ),
-    **_norms(
+    **_norm_shapes(
         "backbone.att_sa.after_norm.bn backbone.att_token.after_norm.bn", 256
     ),
 }
@@ -331,8 +336,8 @@ _DPA_NET = {
     "Gem.weight.0.weight": (256, 256, 1),
     "Gem.weight.0.bias": (256,),
     "Gem.p": (1,),
-    **_norms("spconv0.bn.bn spconv1.bn.bn", 32),
-    **_norms(
+    **_norm_shapes("spconv0.bn.bn spconv1.bn.bn", 32),
+    **_norm_shapes(
         "FP_modules.0.mlp.layer0.bn.bn FP_modules.0.mlp.layer1.bn.bn", 256
     ),
 }

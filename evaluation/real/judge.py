@@ -190,8 +190,10 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     result["eigenvalues: mainly scattered"] = float(
         np.mean(scattered > np.maximum(linear, planar))
     )
-    result["eigenvalues: oblique"] = _mean((up > 0.3) & (up < 0.85), flat)
-    result["eigenvalues: up"] = _mean(up > 0.95, flat)
+    result["eigenvalues: oblique"] = _masked_mean(
+        (up > 0.3) & (up < 0.85), flat
+    )
+    result["eigenvalues: up"] = _masked_mean(up > 0.95, flat)
     ground = flat & (up > 0.95) & (p[chosen, 2] < low + 0.5)
     for name, mask in (("ground", ground), ("walls", flat & (up < 0.2))):
         for kind, values in (
@@ -203,7 +205,7 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
             for part in _QUANTILES:
                 key = f"roughness: {name}, {kind}, {part:.0%} [log mm]"
                 result[key] = _quantile(known, part)
-    result["intensity: ground"] = _mean(bright[chosen], ground)
+    result["intensity: ground"] = _masked_mean(bright[chosen], ground)
     return result
 
 
@@ -302,11 +304,13 @@ def _log_mm(metres: float) -> float:
     return float(np.log(max(1e3 * metres, 1e-2)))
 
 
-def _mean(values: np.ndarray, mask: np.ndarray) -> float:
+def _masked_mean(values: np.ndarray, mask: np.ndarray) -> float:
+    """Returns the mean of the masked values; NaN if there are fewer than 5."""
     return float(values[mask].mean()) if mask.sum() >= 5 else np.nan
 
 
 def _quantile(values: np.ndarray, part: float) -> float:
+    """Returns a quantile of values; NaN if there are fewer than 5."""
     return float(np.quantile(values, part)) if len(values) >= 5 else np.nan
 
 

@@ -68,7 +68,7 @@ class QueryOutcomes:
 
         It is NaN if no query has a match.
         """
-        return _mean(self.first_right_ranks[self.has_match] <= rank)
+        return _mean_or_nan(self.first_right_ranks[self.has_match] <= rank)
 
     @property
     def mean_reciprocal_rank(self) -> float:
@@ -77,7 +77,7 @@ class QueryOutcomes:
         A query without a match among its candidates counts 0. NaN if no query
         has a match.
         """
-        return _mean(1.0 / self.first_right_ranks[self.has_match])
+        return _mean_or_nan(1.0 / self.first_right_ranks[self.has_match])
 
     @property
     def match_auroc(self) -> float:
@@ -182,5 +182,5 @@ def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     return float(test.statistic / (len(positive) * len(negative)))
 
 
-def _mean(values: np.ndarray) -> float:
+def _mean_or_nan(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else math.nan

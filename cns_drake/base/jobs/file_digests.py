@@ -41,7 +41,7 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     # A cache that cannot be read or written only costs time.
     with contextlib.suppress(Exception):
         known = dict(json.loads(kept.read_bytes()))
-    found = {path: _digest(path, known.get(path)) for path in paths}
+    found = {path: _state_and_digest(path, known.get(path)) for path in paths}
     settled = {path: one for path, one in found.items() if one[0] is not None}
     if settled != known:
         with contextlib.suppress(Exception):
@@ -50,11 +50,12 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     return [found[path][1] for path in paths]
 
 
-def _digest(path: str, known: list | None) -> list:
+def _state_and_digest(path: str, known: list | None) -> list:
     """Returns the state of a file, and its digest.
 
     The state is what the file system says about the file. It is None if the
-    file may change without a change of its state.
+    file may change without a change of its state. `known` is an earlier result,
+    and is returned if the state is still the same.
     """
     check_regular(Path(path))
     with user_errors(path):

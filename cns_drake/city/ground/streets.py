@@ -327,7 +327,9 @@ def marking_structure(network: RoadNetwork) -> Structure:
             if _is_junction(network, road, end):
                 strips += _end_marks(road, end)
         if road.length > _LEAST_LENGTH and strips:
-            pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
+            pieces[name] = merge_meshes(
+                *(_painted_strip(road, *s) for s in strips)
+            )
     lanes = network.areas.lane_area
     ground = Covering("markings", "road", lanes, _RGB, "markings")
     return ground.structure(pieces)
@@ -400,10 +402,10 @@ def _from_end(
     return road.last_station - far, road.last_station - near
 
 
-def _strip(
+def _painted_strip(
     road: Road, first: float, last: float, right: float, left: float
 ) -> Mesh:
-    """Returns paint between two stations and two offsets of a road [m]."""
+    """Returns a strip of paint between two stations and two offsets [m]."""
     if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
         ends = sample_stations(first, last, _SLOPE_PIECE)
         pairs = itertools.pairwise(ends)

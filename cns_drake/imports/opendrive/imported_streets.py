@@ -306,12 +306,12 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
         left, right = band.inner, band.outer
         if band.lane.number > 0:
             left, right = right, left
-        of_road[band.road.name, kind].append(_strip(right, left))
+        of_road[band.road.name, kind].append(_triangles_between(right, left))
         low_left, low_right = left - _DEPTH, right - _DEPTH
         of_road[band.road.name, "other-structure"] += [
-            _strip(low_left, low_right),
-            _strip(low_right, right),
-            _strip(left, low_left),
+            _triangles_between(low_left, low_right),
+            _triangles_between(low_right, right),
+            _triangles_between(left, low_left),
         ]
     for (road, kind), pieces in of_road.items():
         triangles = np.concatenate(pieces)
@@ -338,7 +338,7 @@ def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
     return shapely.union_all(lines).buffer(_END, cap_style="flat")
 
 
-def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _triangles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Returns triangles between two lines (N, 3).
 
     They look upwards if the second line is on the left.

@@ -330,7 +330,7 @@ def split_levels(
             above, [band.s - _BRIDGE_REACH, band.s + _BRIDGE_REACH]
         )
         is_bridge = high > low
-        for run, carried in _runs(is_bridge):
+        for run, carried in _stretches_of_one_level(is_bridge):
             parts = {name: getattr(band, name)[run] for name in _ARRAYS}
             (bridges if carried else ground).append(replace(band, **parts))
     return ground, bridges
@@ -368,7 +368,9 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     return {road: np.unique(some) for road, some in found.items()}
 
 
-def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
+def _stretches_of_one_level(
+    is_bridge: np.ndarray,
+) -> Iterator[tuple[slice, bool]]:
     """Yields stretches of one level; neighbouring stretches share a place."""
     starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
     for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):

@@ -485,12 +485,13 @@ def _are_free(
         (z.max(axis=1) > _LOWEST_OBSTACLE) & (z.min(axis=1) < _HIGHEST_OBSTACLE)
     ]
     tree = shapely.STRtree(shapely.linearrings(low[:, [0, 1, 2, 0], :2]))
-    strips = [_strip(lane.points) for lane in traffic.lanes]
+    strips = [_driven_area(lane.points) for lane in traffic.lanes]
     free[np.unique(tree.query(strips, "intersects")[0])] = False
     return free
 
 
-def _strip(points: np.ndarray) -> BaseGeometry:
+def _driven_area(points: np.ndarray) -> BaseGeometry:
+    """Returns the area that vehicles on the middle line of a lane cover."""
     return shapely.LineString(points[:, :2]).buffer(
         _HALF_WIDTH, cap_style="flat", quad_segs=2
     )
@@ -502,7 +503,9 @@ def _in_the_way(
     """Returns the names of objects that stand where vehicles drive."""
     if not added:
         return []
-    tree = shapely.STRtree([_strip(piece.points) for piece in graph.pieces])
+    tree = shapely.STRtree(
+        [_driven_area(piece.points) for piece in graph.pieces]
+    )
     outlines = [one.structure.footprint_W for one in added]
     hit = np.unique(tree.query(outlines, "intersects")[0])
     return [added[k].structure.name for k in hit]

@@ -141,7 +141,8 @@ def _kind(material: Material, surface: Surface) -> int:
 def _brightness(rgb: tuple[float, float, float] | None) -> float:
     """Returns the fraction of white light that a colour reflects, 0 to 1.
 
-    sRGB values are about the square roots of the light (IEC 61966-2-1).
+    sRGB values are about the square roots of the light (IEC 61966-2-1). Without
+    a colour, the fraction is 0.5.
     """
     if rgb is None:
         return 0.5

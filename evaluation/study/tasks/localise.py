@@ -136,7 +136,9 @@ class LocaliseTask(Task):
         found = jobs.add(part, measure_localisation, arguments, needs, cost)
         return (found,)
 
-    def _runs(self, found: Sequence[np.ndarray]) -> Iterator[tuple[str, Any]]:
+    def _named_results(
+        self, found: Sequence[np.ndarray]
+    ) -> Iterator[tuple[str, Any]]:
         """Yields the name of each method and initial error, and its queries."""
         starts = self.settings["starts"]
         rows = iter(found)
@@ -149,8 +151,8 @@ class LocaliseTask(Task):
                 yield f"{stem}{far}", next(rows)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
-        then = dict(self._runs(before)) if before is not None else {}
-        for method, rows in self._runs(found):
+        then = dict(self._named_results(before)) if before is not None else {}
+        for method, rows in self._named_results(found):
             yield from localise.numbers(rows, method)
             if self.settings["odometry_drift"] is not None:
                 yield from tracking.numbers(rows, method)
@@ -162,7 +164,7 @@ class LocaliseTask(Task):
                 yield Number(method, False, "kept", float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
-        for method, rows in self._runs(found):
+        for method, rows in self._named_results(found):
             yield method, False, localise.columns(rows)
 
 
