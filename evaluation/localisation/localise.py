@@ -34,13 +34,13 @@ from evaluation.localisation.estimators import (
 )
 from evaluation.localisation.robust import MAX_RANGE
 from evaluation.maps.voxel_maps import thin
+from evaluation.recognition.auroc import auroc
 from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
     pose_error,
 )
-from evaluation.recognition.query_outcomes import auroc
 
 # Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3

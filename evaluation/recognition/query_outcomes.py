@@ -7,6 +7,8 @@ import math
 
 import numpy as np
 
+from evaluation.recognition.auroc import auroc
+
 
 @dataclass(frozen=True, eq=False)
 class QueryOutcomes:
@@ -159,27 +161,6 @@ def judge(
         num_places=num_places,
         blocks=blocks,
     )
-
-
-def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
-    """Returns the area under the receiver operating characteristic.
-
-    It is the probability that a positive has a higher score than a negative;
-    equal scores count half. It is NaN if all or none are positive.
-
-    Args:
-        scores: (N,) scores; NaN is the lowest.
-        is_positive: (N,) bool.
-    """
-    # Imported here: it is slow to load.
-    from scipy.stats import mannwhitneyu
-
-    values = np.where(np.isnan(scores), -np.inf, scores)
-    positive, negative = values[is_positive], values[~is_positive]
-    if not (len(positive) and len(negative)):
-        return math.nan
-    test = mannwhitneyu(positive, negative, method="asymptotic")
-    return float(test.statistic / (len(positive) * len(negative)))
 
 
 def _mean_or_nan(values: np.ndarray) -> float:

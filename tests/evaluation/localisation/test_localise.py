@@ -43,7 +43,7 @@ from evaluation.localisation.localise import (
     way_axes,
 )
 from evaluation.localisation.robust import _step
-from evaluation.recognition.query_outcomes import auroc
+from evaluation.recognition.auroc import auroc
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
 # Each point of a scan is in a voxel of its own.
