@@ -28,7 +28,10 @@ from evaluation.results.table import (
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import StudyFiles
-from evaluation.study.spending import restore, spend
+from evaluation.study.removed_descriptors import (
+    remove_descriptors,
+    restore_descriptors,
+)
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
 # What a study takes is told if it takes longer, as costs of jobs say [s].
@@ -116,7 +119,7 @@ class Engine:
             self.on_note(text)
         make_folder(self.output)
         jobs = list(self.jobs.values())
-        restore(jobs)
+        restore_descriptors(jobs)
         told = forecast(jobs, cluster, least=_LONG)
         if told is not None:
             self.on_note(
@@ -131,7 +134,7 @@ class Engine:
                 " why"
             )
         self._write(*tables)
-        spend(jobs)
+        remove_descriptors(jobs)
         return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:

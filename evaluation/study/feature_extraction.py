@@ -332,8 +332,9 @@ class FeatureExtraction(Step):
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
         further: methods with descriptors by a second protocol, if any.
-        spends: whether descriptors are removed once results were made from
-            them. Descriptors that new results need are computed again.
+        removes_descriptors: whether descriptors are removed once results were
+            made from them. Descriptors that new results need are computed
+            again.
     """
 
     source: DriveSource
@@ -344,7 +345,7 @@ class FeatureExtraction(Step):
     with_scans: bool = False
     with_map: bool = True
     further: tuple[Further, ...] = ()
-    spends: bool = False
+    removes_descriptors: bool = False
 
     @property
     def output(self) -> Path:

@@ -42,7 +42,7 @@ _OWN_MODULE = re.compile(r"evaluation(\.[a-z]\w*)+")
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
 # Field of the header of a part whose value was removed.
-_SPENT = "spent"
+_REMOVED = "spent"
 # Greatest size of a line of inputs [bytes].
 _MOST_INPUTS = 1 << 24
 # Limit of the uncompressed size, as a multiple of the compressed bytes.
@@ -305,7 +305,7 @@ class Part:
         make_folder(self.path.parent)
         self._write(header, data)
 
-    def spend(self) -> None:
+    def remove_value(self) -> None:
         """Removes the value, and keeps the record of its inputs.
 
         Results that were made from the value stay valid. Call `restore` if the
@@ -315,9 +315,9 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, _):
-            if _SPENT in header:
+            if _REMOVED in header:
                 return
-        self._write({**header, "bytes": 0, _SPENT: True}, b"")
+        self._write({**header, "bytes": 0, _REMOVED: True}, b"")
 
     def restore(self) -> None:
         """Removes the file if its value was removed; a job then makes it anew.
@@ -325,10 +325,10 @@ class Part:
         Raises:
             InputError: if the file cannot be removed.
         """
-        is_spent = False
+        is_removed = False
         with contextlib.suppress(InputError), self._opened() as (header, _):
-            is_spent = _SPENT in header
-        if is_spent:
+            is_removed = _REMOVED in header
+        if is_removed:
             with user_errors(self.path):
                 self.path.unlink()
 
@@ -364,7 +364,7 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
-            if _SPENT in header:
+            if _REMOVED in header:
                 raise InputError(f"{self.path}: its value was removed")
             data = stream.read()
             if "stored" not in header:
@@ -378,7 +378,7 @@ class Part:
             InputError: if there is no such file, or it is damaged.
         """
         with self._opened() as (header, stream):
-            if {"stored", _SPENT} & header.keys():
+            if {"stored", _REMOVED} & header.keys():
                 return header["bytes"]
             return zstandard.frame_content_size(stream.read(18))
 
@@ -417,7 +417,7 @@ class Part:
                 if size != header["bytes"]:
                     raise ValueError("cut off")
                 stream.seek(start)
-                if not {"stored", _SPENT} & header.keys():
+                if not {"stored", _REMOVED} & header.keys():
                     claimed = zstandard.frame_content_size(stream.read(18))
                     if not 0 <= claimed <= _uncompressed_size(size):
                         raise ValueError(f"{size} bytes stand for {claimed}")
@@ -553,16 +553,16 @@ class FeatureFiles:
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 
-    def spend(self) -> None:
+    def remove_descriptors(self) -> None:
         """Removes all descriptors, once results were made from them.
 
-        They take three quarters of the space; see `Part.spend`.
+        They take three quarters of the space; see `Part.remove_value`.
 
         Raises:
             InputError: a file cannot be written.
         """
         for path in sorted(self.folder.glob("described_*.data")):
-            Part(path).spend()
+            Part(path).remove_value()
 
 
 @dataclass(frozen=True)

@@ -265,7 +265,7 @@ class ExtractionJobs(Jobs):
                 with_scans=bool(roles),
                 with_map=self.with_map,
                 further=self.further.get(drive.name, ()),
-                spends=True,
+                removes_descriptors=True,
             )
             cost = self.with_map * _MAP_COST + _ROLE_COST * len(roles)
             self.jobs[name] = Job(name, step, drive.needs, cost)

@@ -42,8 +42,11 @@ from evaluation.study.recorded import (
     RecordedCondition,
     recorded_comparisons,
 )
+from evaluation.study.removed_descriptors import (
+    remove_descriptors,
+    restore_descriptors,
+)
 from evaluation.study.repeats import Repeat, repeats_of
-from evaluation.study.spending import restore, spend
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Pair, Result, Task
@@ -144,7 +147,7 @@ class StagesReport:
         if self._costed_pairs:
             needs = tuple(job.name for job in jobs)
             jobs.append(self._cost_job(self._costed_pairs[0], needs))
-        restore(jobs)
+        restore_descriptors(jobs)
         return jobs
 
     @property
@@ -253,7 +256,7 @@ class StagesReport:
             report, self.output, with_tables=with_tables
         )
         for one in self._cities:
-            spend(one.jobs.values())
+            remove_descriptors(one.jobs.values())
         return written
 
 

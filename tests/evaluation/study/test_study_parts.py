@@ -313,7 +313,7 @@ def test_a_value_that_is_removed_keeps_its_results(tmp_path):
     result.run(Reporter())
     before = part.identity()
     for _ in range(2):
-        part.spend()
+        part.remove_value()
         assert part.path.stat().st_size < 1000
         assert part.is_current(INPUTS)
         assert part.identity() == before
@@ -326,7 +326,7 @@ def test_a_value_that_is_removed_keeps_its_results(tmp_path):
     assert not part.path.exists()
     assert not nothing_left(result)
     with pytest.raises(InputError, match=r"one\.data"):
-        part.spend()
+        part.remove_value()
     part.write(INPUTS, np.arange(10_000.0))
     part.restore()  # There is nothing to restore.
     assert len(part.read()) == 10_000

@@ -14,27 +14,31 @@ from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.parts import MakePart, Part
 
 
-def spend(jobs: Iterable[Job]) -> None:
-    """Removes the descriptors of the steps with `FeatureExtraction.spends`.
+def remove_descriptors(jobs: Iterable[Job]) -> None:
+    """Removes the descriptors that jobs keep only until the study is done.
 
-    All jobs must be done.
+    Their steps have `FeatureExtraction.removes_descriptors`. All jobs must be
+    done.
 
     Raises:
         InputError: a file cannot be written.
     """
     for job in jobs:
-        if isinstance(job.step, FeatureExtraction) and job.step.spends:
-            job.step.files.spend()
+        if (
+            isinstance(job.step, FeatureExtraction)
+            and job.step.removes_descriptors
+        ):
+            job.step.files.remove_descriptors()
 
 
-def restore(jobs: Collection[Job]) -> None:
+def restore_descriptors(jobs: Collection[Job]) -> None:
     """Lets jobs compute removed descriptors again that new results need.
 
     Args:
         jobs: all jobs of a study, each after the jobs that it needs.
     """
     if not any(
-        isinstance(one.step, FeatureExtraction) and one.step.spends
+        isinstance(one.step, FeatureExtraction) and one.step.removes_descriptors
         for one in jobs
     ):
         return
