@@ -37,9 +37,12 @@ _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)
 CHANGE_LEGEND: Legend = (
-    (_CHANGED, "absent from the other"),
-    (_ABSENT_OUTSIDE, "absent, outside the other's hull: not counted"),
-    (_UNCHANGED, "unchanged"),
+    (_CHANGED, "only in this map"),
+    (
+        _ABSENT_OUTSIDE,
+        "only in this map, where the maps' hulls do not overlap: not counted",
+    ),
+    (_UNCHANGED, "in both maps"),
 )
 SETS_LEGEND: Legend = (
     (_IN_O, "unchanged (set O)"),
