@@ -20,6 +20,14 @@ log = np.vectorize(math.log, otypes=[float])
 power = np.vectorize(math.pow, otypes=[float])
 
 
+def smooth_step(u: np.ndarray) -> np.ndarray:
+    """Returns a quintic from 0 at u = 0 to 1 at u = 1.
+
+    Its first and second derivatives are zero at both ends.
+    """
+    return power(u, 3) * (10 - 15 * u + 6 * u**2)
+
+
 def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """Returns the matrix product A @ B for (..., M, K) and (..., K, N).
 

@@ -13,9 +13,9 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 import shapely
 from shapely import STRtree
 
+from cns_drake.base.elementary import smooth_step
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.route import smooth_step
 from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
 # Distance between the points of the path that `driven_path` needs [m].

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
-from cns_drake.base.elementary import power
+from cns_drake.base.elementary import smooth_step
 from cns_drake.base.errors import InputError
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import Connection, RoadNetwork
@@ -314,14 +314,6 @@ def _offsets_moved_right(
     from_middle = right * offset
     wanted = np.clip(from_middle + aside, inner, outer)
     return right * (from_middle + share * (wanted - from_middle))
-
-
-def smooth_step(u: np.ndarray) -> np.ndarray:
-    """Returns a quintic from 0 at u = 0 to 1 at u = 1.
-
-    Its first and second derivatives are zero at both ends.
-    """
-    return power(u, 3) * (10 - 15 * u + 6 * u**2)
 
 
 def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
