@@ -32,7 +32,6 @@ from pydrake.systems.primitives import ZeroOrderHold
 
 from cns_drake.base.errors import describe_validation_error
 from cns_drake.scene.drake_releases import find_bus
-from cns_drake.sensors.carriers import check_free
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
@@ -42,6 +41,7 @@ from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
+from cns_drake.sensors.system_names import check_unused_names
 
 # An interface on which messages are published.
 Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
@@ -409,7 +409,9 @@ def _carrier_frame(
             the names of others.
     """
     systems = ("to_lcm", "publisher", "delay")
-    check_free(builder, *(f"{config.name}_{system}" for system in systems))
+    check_unused_names(
+        builder, *(f"{config.name}_{system}" for system in systems)
+    )
     plant = plant or builder.GetSubsystemByName("plant")
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:

@@ -24,11 +24,11 @@ from cns_drake.recording.recorded_topics import (
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-from cns_drake.sensors.carriers import check_free
 from cns_drake.sensors.imu.imu import Imu
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.odometry.odometry import OdometrySensor
 from cns_drake.sensors.sensor_config import HIGHEST_RATE
+from cns_drake.sensors.system_names import check_unused_names
 
 
 def add_mcap_recorder(
@@ -101,7 +101,7 @@ def add_mcap_recorder(
                 f"lidars: '{lidar.get_name()}' is causal: its scan at a time "
                 "began a turn before, and a recording stamps it with the time"
             )
-    check_free(builder, name)
+    check_unused_names(builder, name)
     names = [*(lidar.get_name() for lidar in lidars), *cameras]
     for k, one in enumerate(names):
         check_sensor_name(one, names[:k])

@@ -24,7 +24,7 @@ from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.object_messages import RecordedObjects
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.sensors.carriers import check_free
+from cns_drake.sensors.system_names import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
@@ -399,7 +399,7 @@ def add_traffic(
 
         traffic = add_traffic(builder, scene_graph, plan)
     """
-    check_free(builder, name)
+    check_unused_names(builder, name)
     traffic = make_traffic(
         scene_graph,
         plan,

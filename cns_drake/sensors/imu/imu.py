@@ -26,7 +26,7 @@ from cns_drake.base.drives.drive import ImuSamples
 from cns_drake.base.drives.sensor_names import IMU_FRAME
 from cns_drake.base.elementary import product, rotated
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.sensors import carriers
+from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 
@@ -125,8 +125,8 @@ def add_imu(
         raise ValueError("noise: it needs a rate; give rate as well")
     if noise is not None and noise.sensor_name == ImuNoise.sensor_name:
         noise = replace(noise, sensor_name=name)
-    parts = carriers.IMU_PARTS
-    carriers.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
+    parts = system_names.IMU_PARTS
+    system_names.check_new_sensor(builder, name, own=IMU_FRAME, parts=parts)
     systems = [f"{name}_{part}" for part in parts]
     body, X_BI = carriers.body_and_pose(body, X_PB)
     # The accelerometer's default is no gravity.

@@ -16,8 +16,6 @@ from pydrake.systems.framework import DiagramBuilder, System
 from cns_drake.scene import perception_geometry
 from cns_drake.sensors.carriers import (
     body_and_pose,
-    check_free,
-    check_new_sensor,
     connect_motion,
 )
 from cns_drake.sensors.lidar.config import (
@@ -30,6 +28,7 @@ from cns_drake.sensors.lidar.lidar import Lidar, Structures
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
@@ -363,7 +362,7 @@ def add_lidar_view(
         add_lidar_view(builder, lidar, meshcat)
     """
     name = lidar.get_name()
-    check_free(builder, f"{name}_view")
+    check_unused_names(builder, f"{name}_view")
     view = builder.AddNamedSystem(
         f"{name}_view",
         geometry.MeshcatPointCloudVisualizer(

@@ -15,9 +15,9 @@ from pydrake.systems.framework import (
 
 from cns_drake.sensors.carriers import (
     body_and_pose,
-    check_new_sensor,
     connect_motion,
 )
+from cns_drake.sensors.system_names import check_new_sensor
 
 
 @dataclass(frozen=True)

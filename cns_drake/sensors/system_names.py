@@ -1,0 +1,51 @@
+"""Names of the systems of sensors and traffic in a diagram."""
+
+from collections.abc import Collection
+
+from pydrake.systems.framework import DiagramBuilder
+
+from cns_drake.base.drives.sensor_names import check_sensor_name
+
+# Endings of the names of an IMU's systems.
+IMU_PARTS = ("accelerometer", "gyroscope", "noise")
+
+
+def check_new_sensor(
+    builder: DiagramBuilder,
+    name: str,
+    own: str | None = None,
+    parts: Collection[str] = (),
+) -> None:
+    """Checks the name of a sensor that is added to a diagram.
+
+    Args:
+        builder: builder of the diagram.
+        name: the name.
+        own: a reserved name that this kind of sensor can have.
+        parts: endings of the names of the sensor's systems; an underscore
+            stands between the sensor's name and the ending.
+
+    Raises:
+        ValueError: the name cannot be a part of a ROS 2 topic, is reserved, or
+            another system or sensor of the diagram has it.
+    """
+    check_sensor_name(name, own=own)
+    # An IMU has the first part, but no system of the name itself.
+    endings = dict.fromkeys((IMU_PARTS[0], *parts))
+    check_unused_names(builder, name, *(f"{name}_{part}" for part in endings))
+
+
+def check_unused_names(builder: DiagramBuilder, *names: str) -> None:
+    """Checks that a diagram has no systems of these names yet.
+
+    A diagram with two systems of one name ends the process when it is built.
+
+    Raises:
+        ValueError: the diagram has a system of one of these names.
+    """
+    for name in names:
+        if builder.HasSubsystemNamed(name):
+            raise ValueError(
+                f"name: the diagram has a system '{name}'; give each a name "
+                "of its own"
+            )
