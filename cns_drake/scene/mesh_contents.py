@@ -54,8 +54,8 @@ _LAST_TRIANGLES = 6
 _JSON = 0x4E4F534A
 
 
-def unread_parts(path: Path) -> tuple[str, ...]:
-    """Returns notes on what is not read from a mesh file, such as lines.
+def check_mesh_file(path: Path) -> tuple[str, ...]:
+    """Checks a mesh file; returns notes on what is not read, such as lines.
 
     There is one note for each kind of content that is not read. The tuple is
     empty if everything is read.

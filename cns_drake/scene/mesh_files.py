@@ -18,7 +18,7 @@ from pydrake.geometry import (
 from cns_drake.base.errors import InputError
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.mesh_contents import GLTF, check_obj, unread_parts
+from cns_drake.scene.mesh_contents import GLTF, check_mesh_file, check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
@@ -144,7 +144,7 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        unread_parts(path)
+        check_mesh_file(path)
         p_GVset, triangles = _READERS.get(ending, self._foreign.read)(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
@@ -181,7 +181,7 @@ def _read_hull(shape: Convex) -> TriangleSurface:
     """Returns Drake's convex hull, with the scale applied."""
     source = shape.source()
     if source.is_path():
-        unread_parts(Path(source.path()))
+        check_mesh_file(Path(source.path()))
     hull = shape.GetConvexHull()
     vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
     triangles = []

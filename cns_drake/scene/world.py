@@ -28,7 +28,7 @@ from cns_drake.scene.gazebo_worlds import (
     simplify_world,
 )
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.mesh_contents import unread_parts
+from cns_drake.scene.mesh_contents import check_mesh_file
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import (
     anchored_frames,
@@ -164,7 +164,7 @@ def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
     notes = []
     for path in sorted({str(one.path()) for one in sources if one.is_path()}):
         with value_errors(path):
-            notes += [f"{path}: {one}" for one in unread_parts(Path(path))]
+            notes += [f"{path}: {one}" for one in check_mesh_file(Path(path))]
     return tuple(notes)
 
 

@@ -10,8 +10,8 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.scene.mesh_contents import (
     check_gltf,
+    check_mesh_file,
     check_obj,
-    unread_parts,
 )
 from cns_drake.scene.world import load_world
 
@@ -146,7 +146,7 @@ def test_what_is_not_read_of_collada_is_named(tmp_path, element, note):
     path = tmp_path / "thing.dae"
     path.write_text(f"<COLLADA>{element}</COLLADA>")
     expected = () if note is None else (f"{note} ignored",)
-    assert unread_parts(path) == expected
+    assert check_mesh_file(path) == expected
 
 
 SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
@@ -222,7 +222,7 @@ def test_surfaces_that_would_be_missing_are_refused(
 ):
     (tmp_path / name).write_text(text)
     with pytest.raises(ValueError, match=fault):
-        unread_parts(tmp_path / name)
+        check_mesh_file(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_surfaces_that_would_be_missing_are_refused(
 )
 def test_what_is_read_as_a_whole_is_not_refused(tmp_path, name, text, notes):
     (tmp_path / name).write_text(text)
-    assert unread_parts(tmp_path / name) == notes
+    assert check_mesh_file(tmp_path / name) == notes
 
 
 def binary_ply(order, faces, size="uchar", end="\n", more=b""):
@@ -293,10 +293,10 @@ def test_faces_of_ply_have_three_corners(tmp_path, corners):
     for text in texts:
         path.write_bytes(text)
         with pytest.raises(ValueError, match=f"PLY with {corners} corners"):
-            unread_parts(path)
+            check_mesh_file(path)
     for order in "<>":
         path.write_bytes(binary_ply(order, [good, (2, 1, 0)]))
-        assert unread_parts(path) == ()
+        assert check_mesh_file(path) == ()
 
 
 def test_a_binary_stl_may_begin_like_a_text(tmp_path):
@@ -304,7 +304,7 @@ def test_a_binary_stl_may_begin_like_a_text(tmp_path):
     facets = [struct.pack("<12fH", *(0.0,) * 3, *A, *B, *C, 0)] * 2
     head = b"solid made by a program".ljust(80)
     path.write_bytes(head + struct.pack("<I", len(facets)) + b"".join(facets))
-    assert unread_parts(path) == ()
+    assert check_mesh_file(path) == ()
 
 
 def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
