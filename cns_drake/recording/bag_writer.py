@@ -6,17 +6,12 @@ name when it is complete, and `metadata.yaml` is written last. A folder with
 
 An interrupted run leaves a part file. A later run of the same recording takes
 over the messages in this file by writing them again; see
-`cns_drake.recording.recording_folder.PartFile`.
-
-Messages are written in a thread, while the next frame is computed: compression
-takes half of a frame's time, during which other Python code can run.
+`cns_drake.recording.part_file.PartFile`.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 import io
 import json
@@ -30,20 +25,11 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
-from cns_drake.recording.recording_folder import PartFile, RecordingFolder
+from cns_drake.recording.part_file import PartFile
+from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
 from cns_drake.recording.schedule import START_NS, Schedule
 from cns_drake.recording.topic_chunks import TopicChunks, messages_by_time
-
-# Number of batches that may wait to be written: about two frames with one LiDAR
-# and traffic, so that a frame does not wait for the one before. A batch is a
-# large message with the small ones before it. A killed process loses waiting
-# batches, at most eight frames.
-_WAITING = 8
-# At most this many small messages wait for the next large one: handing a small
-# message over takes longer than making it.
-_SMALL_BYTES = 1024
-_MOST_HELD = 64
 
 
 class RecordedMessage(NamedTuple):
@@ -478,67 +464,3 @@ def take_over_frames(
     if not missing:
         write_frame()
     return frames
-
-
-class BackgroundWriter:
-    """A context manager that writes messages to a BagWriter in a thread.
-
-    Messages are written in order. Leaving the context waits until all are
-    written; leaving it by an exception drops the messages that are still
-    waiting. If writing fails, nothing more is written, and the error is raised
-    by a later `write` or on leaving.
-    """
-
-    def __init__(self, write: Callable[..., None]):
-        """Prepares the writer.
-
-        Args:
-            write: function that writes a message, such as `BagWriter.write`. It
-                is called in a second thread.
-        """
-        self._write = write
-        self._thread = ThreadPoolExecutor(1)
-        self._batches: deque[Future] = deque()
-        self._held: list[tuple[Any, ...]] = []
-
-    def __enter__(self) -> BackgroundWriter:
-        return self
-
-    def __exit__(self, exception_type: type | None, *_: object) -> None:
-        try:
-            if exception_type is None:
-                self._hand_over(0)
-        finally:
-            self._thread.shutdown(cancel_futures=True)
-
-    def write(self, *message: Any) -> None:
-        """Queues a message for writing; waits while too many are queued.
-
-        Args:
-            message: arguments for the function `write` that was given to the
-                constructor, such as those of `BagWriter.write`.
-
-        Raises:
-            Exception: the error that occurred while an earlier message was
-                written.
-        """
-        self._held.append(message)
-        size = sum([len(one) for one in message if isinstance(one, bytes)])
-        if not 0 < size < _SMALL_BYTES or len(self._held) >= _MOST_HELD:
-            self._hand_over(_WAITING)
-
-    def _hand_over(self, waiting: int) -> None:
-        """Queues held messages; waits until `waiting` batches are left."""
-        before = self._batches[-1] if self._batches else None
-        self._batches.append(
-            self._thread.submit(self._write_batch, self._held, before)
-        )
-        self._held = []
-        while len(self._batches) > waiting:
-            self._batches.popleft().result()
-
-    def _write_batch(self, batch: list[tuple], before: Future | None) -> None:
-        if before is not None:
-            before.result()  # If the batch before failed, this one fails, too.
-        for message in batch:
-            self._write(*message)

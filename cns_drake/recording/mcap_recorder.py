@@ -33,7 +33,8 @@ from cns_drake.base.drives.sensor_names import (
     check_sensor_name,
 )
 from cns_drake.recording import messages, object_messages, recorded_topics
-from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
+from cns_drake.recording.background_writer import BackgroundWriter
+from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import (
     IMU_TOPIC,
     ODOMETRY_TOPIC,

@@ -16,8 +16,8 @@ from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
+from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import (
-    BackgroundWriter,
     BagWriter,
     take_over_frames,
 )

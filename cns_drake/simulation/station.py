@@ -17,7 +17,8 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
-from cns_drake.recording.bag_writer import BackgroundWriter, BagWriter
+from cns_drake.recording.background_writer import BackgroundWriter
+from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.scenario import Scenario

@@ -36,7 +36,7 @@ from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import messages
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.recording_folder import PartFile
+from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario

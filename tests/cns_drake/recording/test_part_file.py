@@ -5,7 +5,7 @@ import os
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.recording.recording_folder import PartFile
+from cns_drake.recording.part_file import PartFile
 
 
 def written(path, *pieces, finish=True):
