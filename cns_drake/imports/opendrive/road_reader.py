@@ -18,7 +18,7 @@ import numpy as np
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.imports.opendrive import road_model
+from cns_drake.imports.opendrive import curves, road_model
 from cns_drake.imports.opendrive.things import read_things
 from cns_drake.imports.options import ImportFaults
 
@@ -398,35 +398,35 @@ def _pieces(
     return found
 
 
-def _shape(geometry: Element, length: float) -> road_model.Shape:
+def _shape(geometry: Element, length: float) -> curves.Shape:
     """Returns the curve of a `geometry` element.
 
     Raises:
         ValueError: if it has no curve, or one that is too sharp.
     """
-    shape: road_model.Shape | None = None
+    shape: curves.Shape | None = None
     for one in geometry.all("*"):
         if one.tag == "line":
-            shape = road_model.Arc(0.0)
+            shape = curves.Arc(0.0)
         elif one.tag == "arc":
-            shape = road_model.Arc(one.number("curvature"))
+            shape = curves.Arc(one.number("curvature"))
         elif one.tag == "spiral":
             ends = one.number("curvStart"), one.number("curvEnd")
             if max(map(abs, ends)) > _SHARPEST:
                 raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
-            shape = road_model.Spiral(*ends, length)
+            shape = curves.Spiral(*ends, length)
         elif one.tag == "poly3":
             v = [one.number(k) for k in "abcd"]
             # At the curve's length in the file, u is not greater than that
             # length.
-            shape = road_model.Cubic(
+            shape = curves.Cubic(
                 (0, 1, 0, 0), v, length, length, stretched=False
             )
         elif one.tag == "paramPoly3":
             u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
             by_arc = one.value("pRange", "normalized") == "arcLength"
             last = length if by_arc else 1.0
-            shape = road_model.Cubic(u, v, last, length, by_parameter=by_arc)
+            shape = curves.Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:
         raise ValueError("neither a line nor a known curve")
     if shape.sharpest > _SHARPEST:

@@ -20,9 +20,9 @@ from scipy.special import fresnel
 import shapely
 from shapely.geometry import LineString, Polygon
 
+from cns_drake.imports.opendrive.curves import Arc, Cubic, Spiral
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import RoadHeights, lane_bands
-from cns_drake.imports.opendrive.road_model import Arc, Cubic, Spiral
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.options import ImportFaults
 
