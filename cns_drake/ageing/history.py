@@ -32,7 +32,7 @@ from cns_drake.city.geometry import (
 from cns_drake.city.growth import stage_structures
 from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.placement.frontage import lines_along, lot_at
-from cns_drake.city.plants.vegetation import SPECIES
+from cns_drake.city.plants.trees import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
 from cns_drake.scene.materials import MATERIALS
 from cns_drake.transient import world_structures

@@ -22,7 +22,7 @@ from cns_drake.city.geometry import (
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import CityPlan
-from cns_drake.city.plants.vegetation import SPECIES
+from cns_drake.city.plants.trees import SPECIES
 from cns_drake.roads.carriageway import Areas
 
 # Semantic class -> the everyday word for its objects, as the stem of their

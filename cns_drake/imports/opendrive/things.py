@@ -15,7 +15,7 @@ from cns_drake.base.xml_elements import Element
 from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.vegetation import tree
+from cns_drake.city.plants.trees import tree
 from cns_drake.imports.faces import extruded
 from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import TYPES, stations

@@ -20,7 +20,7 @@ from shapely.strtree import STRtree
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.plants.vegetation import tree
+from cns_drake.city.plants.trees import tree
 from cns_drake.imports.building_years import construction_year, year_of_date
 from cns_drake.imports.faces import extruded, parts_of, sound_parts
 from cns_drake.imports.foreign_city import (

@@ -10,7 +10,7 @@ from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
 from cns_drake.city.geometry.structures import MeshShape, part_mesh
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.vegetation import SPECIES
+from cns_drake.city.plants.trees import SPECIES
 from cns_drake.scene.semantics import CLASS_IDS
 
 SEEDS = range(6)

@@ -8,7 +8,7 @@ import pytest
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.vegetation import SPECIES, STREET_TREES, mesh_names
+from cns_drake.city.plants.trees import SPECIES, STREET_TREES, mesh_names
 
 VARIANTS = [
     (name, variant)
