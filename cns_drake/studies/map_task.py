@@ -6,7 +6,7 @@ import tempfile
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies import map_truth, map_upkeep
+from cns_drake.studies import map_truth
 from evaluation.map_update.baselines import BASELINES
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.map_scores import (
@@ -60,7 +60,7 @@ def measure_maps(
     Returns:
         Method -> its scores.
     """
-    a, b = map(map_upkeep.labelled_of, (database, query))
+    a, b = map(map_truth.labelled_drive, (database, query))
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder) / "maps"
         map_truth.write_truth(a, b, maps, spacing, across_maps=True)

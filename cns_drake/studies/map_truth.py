@@ -45,7 +45,10 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
 from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
-from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulated_drive import (
+    SimulatedDrive,
+    SimulationSource,
+)
 from cns_drake.studies.exact_overlap import Sight, sights_of
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.labels import SIDES, Label
@@ -58,6 +61,7 @@ from evaluation.map_update.sessions import (
 )
 from evaluation.map_update.structures import StructureChange, write_structures
 from evaluation.results.drawing import GONE, NEW
+from evaluation.study.sources import DriveSource, RecordingSource
 
 # A surface this near to a point is its own [m].
 NEAR = 0.1
@@ -190,6 +194,18 @@ def simulate_labelled(scenario: Scenario) -> LabelledDrive:
     """
     simulated = SimulatedDrive(scenario)
     return LabelledDrive(simulated, simulated, scenario)
+
+
+def labelled_drive(source: DriveSource) -> LabelledDrive:
+    """Returns the drive of a source with its world, for exact labels.
+
+    Raises:
+        InputError: as in `open_labelled` or `simulate_labelled`.
+    """
+    if isinstance(source, SimulationSource):
+        return simulate_labelled(source.scenario)
+    assert isinstance(source, RecordingSource)
+    return open_labelled(source.path)
 
 
 def write_truth(

@@ -9,13 +9,11 @@ import numpy as np
 
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.map_truth import (
     LabelledDrive,
     is_there,
     label_points,
-    open_labelled,
-    simulate_labelled,
+    labelled_drive,
 )
 from evaluation.map_update.baselines import run_baseline
 from evaluation.map_update.labels import Label
@@ -23,7 +21,7 @@ from evaluation.map_update.scores import Labels, nearest
 from evaluation.map_update.sessions import Pair, write_session
 from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptDrive, UpkeptMap
 from evaluation.study.parts import Part
-from evaluation.study.sources import DriveSource, RecordingSource
+from evaluation.study.sources import DriveSource
 
 # Distance driven between two scans of a map, as in the task `map` [m].
 _SPACING = 5.0
@@ -84,7 +82,7 @@ def update_maps(
         kept = UpkeptMap(folder / "A", detect)
         for source in sources:
             if maintain == TRUTH:
-                labelled[:] = [labelled_of(source)]
+                labelled[:] = [labelled_drive(source)]
                 drive = labelled[0].drive
             else:
                 drive = source()
@@ -96,11 +94,3 @@ def update_maps(
             kept.add(session, stands)
             shutil.rmtree(folder / "B")
     return kept.finish()
-
-
-def labelled_of(source: DriveSource) -> LabelledDrive:
-    """Returns a drive with its world, from which exact labels can be made."""
-    if isinstance(source, SimulationSource):
-        return simulate_labelled(source.scenario)
-    assert isinstance(source, RecordingSource)
-    return open_labelled(source.path)
