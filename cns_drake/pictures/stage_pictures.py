@@ -1,4 +1,4 @@
-"""Draws pictures of a map: its stages in one view, its drives from above."""
+"""Draws a map's stages: side by side in one view, or from above with drives."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,8 +31,11 @@ _MARGIN = 40.0
 _CAMERA_HEIGHT = 1200.0
 # Red at the start and blue at the end, as in the paper.
 _COLOURS = "turbo_r"
+# Number of points at which a route is drawn.
 _POINTS = 400
+# Number of drives side by side.
 _COLUMNS = 2
+# Side of a drive's panel [inch].
 _PANEL_INCHES = 4.0
 
 

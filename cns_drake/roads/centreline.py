@@ -1,4 +1,4 @@
-"""The centrelines of roads: plane curves of straight lines and arcs."""
+"""Plane curves: the centrelines of roads, and the turns between lanes."""
 
 from dataclasses import dataclass
 import math
@@ -38,7 +38,7 @@ class _Piece:
 
 
 class Centreline:
-    """A polyline whose corners are rounded by arcs."""
+    """The centreline of a road: a polyline with corners rounded by arcs."""
 
     def __init__(self, points: ArrayLike, radii: ArrayLike) -> None:
         """Rounds the corners of a polyline by arcs.

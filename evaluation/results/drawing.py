@@ -1,4 +1,4 @@
-"""Functions and constants of all figures: colours, sizes and files."""
+"""What all figures share: colours, names of lines, and checked files."""
 
 from collections.abc import Sequence
 from pathlib import Path

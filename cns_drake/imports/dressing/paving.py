@@ -23,7 +23,9 @@ _WITHIN = 80.0
 KERB_HEIGHT = 0.12
 # The sides of a kerb reach this far down from its upper edges [m].
 _KERB_DEPTH = 0.25
+# Colour of kerbs.
 _KERB: Rgb = (0.60, 0.60, 0.58)
+# Width of an added sidewalk [m].
 _SIDEWALK = 2.0
 # Streets of these kinds have sidewalks unless their tags say otherwise.
 _WITH_SIDEWALKS = (
