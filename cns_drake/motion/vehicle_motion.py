@@ -211,7 +211,7 @@ class VehicleMotion(LeafSystem):
         self._default = plant.CreateDefaultContext()
         self._block = functools.lru_cache(maxsize=4)(self._calc_block)
         self._joints = [
-            (joint, *self._describe(joint))
+            (joint, *self._joint_motion(joint))
             for joint in map(plant.get_joint, plant.GetJointIndices(vehicle))
             if joint.num_velocities() > 0
             and joint.child_body().index() != self._base.index()
@@ -242,7 +242,7 @@ class VehicleMotion(LeafSystem):
                 prerequisites,
             )
 
-    def _describe(
+    def _joint_motion(
         self, joint: Joint
     ) -> tuple[Callable[[Moments], JointMotion], float]:
         """Returns the function for the motion of a joint, and its sign."""

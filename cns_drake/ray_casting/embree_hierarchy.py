@@ -420,7 +420,7 @@ class EmbreeHierarchy:
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
         # All threads take parts from one iterator, which yields each part once.
-        parts = iter(_divide(num_rays, self._num_threads))
+        parts = iter(_ray_ranges(num_rays, self._num_threads))
 
         def cast() -> None:
             for first, last in parts:
@@ -557,7 +557,7 @@ class EmbreeScene:
                 result[again] = second
 
 
-def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
+def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
     """Returns the ranges of rays that threads take, the largest first.
 
     Some directions meet more geometry than others, so a thread that finishes

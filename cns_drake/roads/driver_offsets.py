@@ -220,7 +220,7 @@ def _draw_offsets(
     """
     weights = _kernel()
     reach = len(weights) // 2
-    decay, gain = _process(weights, length)
+    decay, gain = _decay_and_gain(weights, length)
     noise = rng.standard_normal(len(low) + 2 * reach)
     value = float(noise[0])
     values = [value]
@@ -253,7 +253,7 @@ def _kernel() -> np.ndarray:
     return weights / weights.sum()
 
 
-def _process(weights: np.ndarray, length: float) -> tuple[float, float]:
+def _decay_and_gain(weights: np.ndarray, length: float) -> tuple[float, float]:
     """Returns the decay per step and the gain of a process to be smoothed.
 
     An Ornstein-Uhlenbeck process of length a has the covariance exp(-d / a).

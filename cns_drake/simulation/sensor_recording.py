@@ -250,13 +250,13 @@ def _describe(camera: RgbdSensor) -> RecordedCamera:
             camera.default_depth_render_camera().core(),
         )
     )
-    if _numbers(color) == _numbers(depth):
+    if _image_geometry(color) == _image_geometry(depth):
         return color
     return color._replace(depth=depth)
 
 
-def _numbers(camera: RecordedCamera) -> tuple:
-    """Returns what two cameras share if their images cover each other."""
+def _image_geometry(camera: RecordedCamera) -> tuple:
+    """Returns size, intrinsics and pose: equal if two images coincide."""
     info = camera.info
     return (
         info.width(),

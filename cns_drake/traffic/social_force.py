@@ -187,7 +187,7 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
     for i in range(len(walkers)):
         one = walkers[i]
         x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
-        rest_x, rest_y = _stop(x, y, vx, vy)
+        rest_x, rest_y = _stopping_place(x, y, vx, vy)
         off = _distance_to_path(paths, one, rest_x, rest_y)
         change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
@@ -210,7 +210,7 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
             new_y = y + 0.5 * (vy + new_vy) * STEP
             if attempt == 2 and speed == 0.0:
                 new_x, new_y = rest_x, rest_y
-            stop_x, stop_y = _stop(new_x, new_y, new_vx, new_vy)
+            stop_x, stop_y = _stopping_place(new_x, new_y, new_vx, new_vy)
             yaw = one.yaw
             row = _nearest(paths, one, new_x, new_y)
             tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
@@ -237,7 +237,9 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
 
 
 @compiled
-def _stop(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
+def _stopping_place(
+    x: float, y: float, vx: float, vy: float
+) -> tuple[float, float]:
     """Returns x and y at which a pedestrian stops if it brakes now.
 
     (x, y) is its place, and (vx, vy) its velocity.
@@ -302,7 +304,7 @@ def _is_free(
         a, b = (place[0], place[1], yaw), (x, y, other.yaw)
         if boxes_overlap(a, b, half, half):
             return False
-        x, y = _stop(x, y, other.velocity[0], other.velocity[1])
+        x, y = _stopping_place(x, y, other.velocity[0], other.velocity[1])
         a, b = (stop[0], stop[1], yaw), (x, y, other.yaw)
         if boxes_overlap(a, b, half, half):
             return False

@@ -241,7 +241,7 @@ class Follower:
             self.u.append(u)
             return
         wanted = motion.free_acceleration(car, car["top"])
-        gap, speed, line = self._ahead(traffic, car)
+        gap, speed, line = self._car_ahead(traffic, car)
         stop, gap_2, speed_2 = motion.find_prior(traffic, len(traffic.cars) - 1)
         line = min(line, stop)
         if gap_2 < gap:
@@ -264,7 +264,7 @@ class Follower:
         car["v"] = v
         self._place(traffic.streets, car)
 
-    def _ahead(
+    def _car_ahead(
         self, traffic: Traffic, car: np.void
     ) -> tuple[float, float, float]:
         """Returns gap and speed of the car ahead, and how far the stop line is.
@@ -425,8 +425,8 @@ class Tracks:
         """
         k, u, beyond = self._interval(t)
         p0, p1 = self.values[k], self.values[k + 1]
-        before, is_before = self._there(k - 1)
-        after, is_after = self._there(k + 2)
+        before, is_before = self._coordinates_at_step(k - 1)
+        after, is_after = self._coordinates_at_step(k + 2)
         step = p1 - p0
         m1 = np.where(is_after, (after - p0) / 2, step)
         m0 = np.where(is_before, (p1 - before) / 2, 2 * step - m1)
@@ -436,11 +436,13 @@ class Tracks:
         rate = (3 * a * u + 2 * b) * u + m0
         return value + beyond * rate, rate / self.dt
 
-    def _there(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates at times (...), and whether bodies are there.
+    def _coordinates_at_step(
+        self, k: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns coordinates at steps (...), and whether bodies are there.
 
         The coordinates are (..., N, D), and the second array fits them. No body
-        is there before the first time and after the last one.
+        is there before the first step and after the last one.
         """
         row = np.clip(k, 0, len(self.values) - 1)
         there = (k == row)[..., None]
@@ -736,8 +738,8 @@ class Trial:
         vehicles, walkers = self._kept()
         return TrafficPlan(
             tuple(self._kinds[k] for k in vehicles),
-            Tracks(STEP, _smooth(vehicles_at[:, vehicles])),
-            Tracks(STEP, _smooth(walkers_at[:, walkers])),
+            Tracks(STEP, _spline_values(vehicles_at[:, vehicles])),
+            Tracks(STEP, _spline_values(walkers_at[:, walkers])),
             self.left_out(),
             self._follower.positions()
             if self._follower is not None and self._follower.arrived
@@ -767,7 +769,7 @@ def begin_trial(task: _Task, rng: np.random.Generator) -> Trial:
     )
 
 
-def _smooth(values: np.ndarray) -> np.ndarray:
+def _spline_values(values: np.ndarray) -> np.ndarray:
     """Returns the values (K - F, N, D) of a cubic B-spline at its knots.
 
     Its control points are (K, N, D), at all steps; F steps are before the

@@ -207,7 +207,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             place = database.places[pose[0]]
             if len(place.cells) > 0:
                 found = self._climb(query, place, pose[1:])
-                scores[pose[0]] = self._rate(query, place, found)
+                scores[pose[0]] = self._score(query, place, found)
         return scores
 
     def relative_poses(
@@ -260,7 +260,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             _LAST_STEPS,
         )
 
-    def _rate(
+    def _score(
         self, query: LayeredScan, place: LayeredScan, found: np.ndarray
     ) -> float:
         """Returns the score of two scans, from a result of `climb`."""
@@ -296,7 +296,7 @@ def _search(
     starts = np.zeros((math.prod(shape), 4), np.int64)
     starts[:, 0], starts[:, 1] = np.divmod(np.arange(len(starts)), shape[1])
     surprise, poses = _overlaps(
-        _draw(query, _FIRST_TURNS, _FIRST_HALVINGS),
+        _coarse_maps(query, _FIRST_TURNS, _FIRST_HALVINGS),
         database.first,
         _FIRST_WEIGHTS,
         starts,
@@ -313,7 +313,7 @@ def _search(
     else:
         best = _greatest(surprise.ravel(), number)
     poses = poses[best] * _TO_SECOND
-    maps = _draw(query, _SECOND_TURNS, _SECOND_HALVINGS)
+    maps = _coarse_maps(query, _SECOND_TURNS, _SECOND_HALVINGS)
     for moves in (_SECOND_MOVES, _THIRD_MOVES):
         surprise, poses = _overlaps(
             maps, database.second, _SECOND_WEIGHTS, poses, moves
@@ -355,7 +355,7 @@ def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
     """Returns coarse maps of places as recorded, with a margin of rows."""
-    maps = [_draw(place, turns(1), halvings) for place in places]
+    maps = [_coarse_maps(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(
         np.pad(bits, ((0, 0), (margin, margin), (0, 0))),
@@ -363,7 +363,9 @@ def _maps_of_places(
     )
 
 
-def _draw(scan: LayeredScan, at: np.ndarray, halvings: int) -> CoarseMaps:
+def _coarse_maps(
+    scan: LayeredScan, at: np.ndarray, halvings: int
+) -> CoarseMaps:
     """Returns coarse maps of a scan at some headings."""
     return CoarseMaps(
         *coarse_maps(scan.cells, scan.starts, at, halvings, _MAPS)

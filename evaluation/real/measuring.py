@@ -109,7 +109,7 @@ def measure_real(
             read.
     """
     chosen = list(names) or [*shipped_methods(), *SHIPPED]
-    aligning = [one for one in chosen if _aligns(one)]
+    aligning = [one for one in chosen if _is_estimator(one)]
     recognising = [one for one in chosen if one not in aligning]
     choices: tuple[MethodChoice, ...] = ()
     if recognising:
@@ -157,7 +157,7 @@ def measure_real(
     return tables
 
 
-def _aligns(name: str) -> bool:
+def _is_estimator(name: str) -> bool:
     """Returns whether a name or a file is that of an estimator."""
     if name.endswith(".py"):
         return hasattr(run_module(Path(name)), "localise")

@@ -69,8 +69,8 @@ def write_scores(
         )
     place_files = _scan_files(database)
     query_files = _scan_files(query)
-    place_columns = _columns(place_files, columns, on_note)
-    query_columns = _columns(query_files, columns, on_note)
+    place_columns = _num_columns(place_files, columns, on_note)
+    query_columns = _num_columns(query_files, columns, on_note)
     on_note = _first_of_each_kind(on_note)
     num_ignored = 0
     descriptors, clouds = [], []
@@ -112,7 +112,7 @@ def write_scores(
     return num_ignored
 
 
-def _columns(
+def _num_columns(
     files: list[Path], columns: int | None, on_note: OnNote
 ) -> int | None:
     """Returns the number of columns of `.bin` files; None if there are none."""

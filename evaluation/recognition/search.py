@@ -67,7 +67,7 @@ class Search:
         self.query_ms = np.zeros(len(rows))
         shares = self._shares(query, rows, is_known)
         scores = np.empty(is_known.shape)
-        for number, group in self._each():
+        for number, group in self._built_groups():
             for k in self._tracked(query, rows):
                 start = process_time_ns()
                 scores[k, group] = self._score(
@@ -98,7 +98,7 @@ class Search:
             InputError: the method returns something other than poses.
         """
         found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
-        for _, group in self._each():
+        for _, group in self._built_groups():
             for row, places in enumerate(wanted):
                 here = places[(group.start <= places) & (places < group.stop)]
                 if len(here) == 0:
@@ -130,7 +130,7 @@ class Search:
         lists: list[list[np.ndarray]] = [
             [np.empty(0)] * len(self._groups) for _ in rows
         ]
-        for number, _ in self._each():
+        for number, _ in self._built_groups():
             for k in self._tracked(query, rows):
                 if not is_known[k].all():
                     continue
@@ -176,7 +176,7 @@ class Search:
             where=f"{query.name}: query at frame {queries.frames[row]}",
         )
 
-    def _each(self) -> Iterator[tuple[int, slice]]:
+    def _built_groups(self) -> Iterator[tuple[int, slice]]:
         """Yields the number and the places of each group, and builds it.
 
         The group that is in memory comes first. Nothing else may hold a

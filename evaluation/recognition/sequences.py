@@ -55,13 +55,16 @@ def along_the_way(
         np.split(filled, starts, axis=1), np.split(p_WPs, starts), strict=True
     )
     result = np.concatenate(
-        [_voted(some, of_query, travelled(p), length) for some, p in parts],
+        [
+            _mean_scores(some, of_query, travelled(p), length)
+            for some, p in parts
+        ],
         axis=1,
     )
     return np.where(is_known, result, np.nan)
 
 
-def _voted(
+def _mean_scores(
     filled: np.ndarray,
     of_query: np.ndarray,
     of_place: np.ndarray,

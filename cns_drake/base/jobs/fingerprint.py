@@ -52,7 +52,9 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
     named: list[_Module] = []
     for name in modules:
         package = name.removesuffix(".*")
-        named += [_Module(_ROOT, name)] if package == name else _in(package)
+        named += (
+            [_Module(_ROOT, name)] if package == name else _modules_of(package)
+        )
     return _digest(named, without)
 
 
@@ -141,7 +143,8 @@ def _imports_of(module: _Module) -> _Imports:
         return _find_imports(path.read_bytes(), package)
 
 
-def _in(package: str) -> Iterator[_Module]:
+def _modules_of(package: str) -> Iterator[_Module]:
+    """Yields all modules of a package, with those of its subpackages."""
     for path in _ROOT.joinpath(*package.split(".")).rglob("*.py"):
         parts = path.relative_to(_ROOT).with_suffix("").parts
         yield _Module(_ROOT, ".".join(parts).removesuffix(".__init__"))

@@ -100,7 +100,7 @@ def run_process(
         with theirs:  # The pipe then ends with the process.
             process = _start_process(theirs, job)
         try:
-            kind, text = _listen(ours, on_message, is_wanted)
+            kind, text = _last_message(ours, on_message, is_wanted)
         finally:
             status = _end_process(process)
             if status == -signal.SIGKILL:  # The killed process left its lock.
@@ -159,7 +159,7 @@ def _environment_of_jobs() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _listen(
+def _last_message(
     connection: Connection,
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
