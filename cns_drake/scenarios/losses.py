@@ -47,8 +47,9 @@ class Losses(Section):
             of the condition, so that the two drives can lack different
             structures.
         towards: another stage of the map, usually an earlier one. Only
-            structures that do not exist in that stage are removed. Structures
-            that are only lower in that stage do not change.
+            structures that do not exist in that stage are removed. A structure
+            that exists in that stage does not change, even if it has another
+            height there.
     """
 
     missing: _Part = 0.0

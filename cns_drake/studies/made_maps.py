@@ -1,4 +1,4 @@
-"""Maps that an experiment makes: aged, redrawn or imported.
+"""Maps that an experiment makes: aged, generated anew or imported.
 
 The module also makes drives through other cities, whose places are added to a
 database to make recognition harder.

@@ -421,8 +421,8 @@ def evaluation_sets(
     Returns:
         The list of databases, and the list of queries. Both contain a
         dictionary for each drive: number of a cloud -> its file, northing and
-        easting. An entry of the second list also contains, for each other
-        drive, the numbers of the clouds that match the query.
+        easting. In the second list, the entry of a cloud also contains, for
+        each other drive, the numbers of the clouds that match this cloud.
     """
     trees = [cKDTree(run.positions) for run in runs]
 

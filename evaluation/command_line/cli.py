@@ -218,8 +218,8 @@ def pr(
             two cities generated along the same streets.
         truth: What makes a place a match of a query. With radius, a match lies
             within --radius of the query. With overlap:PART, such as
-            overlap:0.5, a match's scan shows at least PART of what the query's
-            scan shows, at any distance.
+            overlap:0.5, a match can lie at any distance, and its scan shows at
+            least PART of what the query's scan shows.
         overlaps: CSV file to write: the overlap of each query with each place.
             Needs --truth overlap:PART.
         exact_overlaps: File with exact overlaps, from cns-drake export --format

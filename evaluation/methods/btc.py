@@ -105,8 +105,9 @@ class BtcConfig(MethodConfig):
         suppression_radius: radius within which only the keypoint with the most
             layers is used [m]; [O] 2.
         max_keypoints: largest number of keypoints per place; [O] 500.
-        num_neighbours: number of nearest keypoints, including the keypoint
-            itself, that form triangles with each keypoint; [O] 10.
+        num_neighbours: number of keypoints from which the triangles of a
+            keypoint are formed: the keypoint itself and those nearest to it;
+            [O] 10.
         side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.
         side_resolution: step to which side lengths are rounded in the hash

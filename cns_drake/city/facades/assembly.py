@@ -50,8 +50,8 @@ class Site:
     def outline(self) -> np.ndarray:
         """Corners (N, 2) of the footprint, counter-clockwise [m].
 
-        The first two corners are the ends of the front. The corners of a
-        rectangle are rounded inwards to whole centimetres.
+        The first two corners are the ends of the front. If the footprint is a
+        rectangle, its corners are rounded inwards to whole centimetres.
         """
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)

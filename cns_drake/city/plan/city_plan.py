@@ -96,8 +96,8 @@ class RowPlan(_Model):
     Attributes:
         setback: distance from the inner edge of the sidewalk to the building
             fronts [m].
-        archetypes: weight of each archetype, by name, in the random choice,
-            such as `{house: 3, office: 1}`.
+        archetypes: names of archetypes, each with its weight in the random
+            choice, such as `{house: 3, office: 1}`.
         width: smallest and largest width of a lot [m]. The width of each lot is
             sampled between these limits.
         depth: smallest and largest depth of a lot [m].
@@ -152,8 +152,8 @@ class ParkingPlan(_Model):
     Attributes:
         start: `[x, y]` of one end of the row, on the side from which cars enter
             [m].
-        end: `[x, y]` of the other end of this side [m]. Seen from `start`, the
-            bays lie on the left.
+        end: `[x, y]` of the other end of the row, on the same side [m]. Seen
+            from `start`, the bays lie on the left.
         bay: width and depth of a bay [m].
         fill: share of the bays that have a car.
     """
@@ -168,7 +168,7 @@ class ScatterPlan(_Model):
     """Plants or objects at random places on a district's open ground.
 
     Attributes:
-        objects: weight of each object, by name, in the random choice.
+        objects: names of objects, each with its weight in the random choice.
         spacing: smallest distance between two objects [m].
         fill: share of the possible places that get an object.
         within: corners of an area [m]. The objects stand only there.
@@ -192,7 +192,7 @@ class LinePlan(_Model):
     """Objects along a line, such as an avenue of trees, a fence or benches.
 
     Attributes:
-        objects: weight of each object, by name, in the random choice.
+        objects: names of objects, each with its weight in the random choice.
         points: points of the line [m]. The objects face its right side.
         spacing: smallest and largest distance between two objects [m]. Without
             `spacing`, each straight part of the line becomes one object of the
@@ -238,15 +238,15 @@ class StreetPlan(_Model):
     """The objects on the sidewalks in front of a district.
 
     Attributes:
-        trees: weight of each tree species, by name, in the random choice. By
-            default there are no trees.
+        trees: names of tree species, each with its weight in the random choice.
+            By default there are no trees.
         tree_spacing: smallest and largest distance between neighbouring trees
             [m].
         tree_gaps: share of the trees that are left out at random.
         lamp: name of the object to use as street lamp.
         lamp_spacing: distance between neighbouring lamps [m].
-        furniture: weight of each object besides trees and lamps, such as a
-            bench, by name, in the random choice.
+        furniture: names of objects other than trees and lamps, such as benches,
+            each with its weight in the random choice.
         furniture_spacing: smallest and largest distance between neighbouring
             pieces of furniture [m].
     """
@@ -317,8 +317,8 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]`, the smallest and largest x and y of the
             world [m].
         water_level: height of the water's surface [m].
-        cars: weight of each car model, by name, in the random choice of parked
-            cars.
+        cars: names of car models, each with its weight in the random choice of
+            parked cars.
         street: objects on sidewalks, in front of districts without a `street`
             of their own.
         medians: objects on the medians of roads; only the fields `trees` and

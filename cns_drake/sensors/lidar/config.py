@@ -72,12 +72,12 @@ class LidarSection(Mount):
             scan is measured from one pose.
         returns: model of the returns: `ideal`, or `calibrated` with the losses,
             errors and intensities of the unit's data sheet.
-        echoes: which echoes of a beam are reported, with calibrated returns.
-            `dual` reports the strongest and the last one. Fog has an echo only
-            in beams without any other echo.
+        echoes: which echoes of a beam are reported. `dual` reports the
+            strongest and the last one. Fog has an echo only in beams without
+            any other echo. Only with calibrated returns.
         unit_seed: seed of the errors in the ranges, angles and gains of an
-            individual unit's lasers, with calibrated returns. Use the same seed
-            in all drives with the same unit.
+            individual unit's lasers. Use the same seed in all drives with the
+            same unit. Only with calibrated returns.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
             drive must be a multiple of this rate. If the lasers of a unit fire
             at a fixed rate, a slower revolution has more columns.
