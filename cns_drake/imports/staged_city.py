@@ -352,13 +352,14 @@ def grow(
 
     In the first stage, buildings that no longer exist today stand in place of
     the structures that replaced them. Some of the other buildings, sampled at
-    random, are missing or lower. Whether and how a building differs depends
-    only on the seed and the building's name, and not on changes elsewhere in
-    the file.
+    random, are missing, or lower than in the last stage. Whether and how a
+    building differs depends only on the seed and the building's name, and not
+    on changes elsewhere in the file.
 
     Args:
         city: the city, with one stage.
-        part: share of the buildings that are missing or lower.
+        part: share of the buildings that are missing or lower in the first
+            stage.
         seed: seed of the random draws.
 
     Returns:

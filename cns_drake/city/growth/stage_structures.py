@@ -37,7 +37,7 @@ from cns_drake.city.plan.stages import LotUse, Stages
 def younger_plant(model: Model, height: float) -> Model:
     """Returns a plant scaled down to a height above z = 0 [m].
 
-    A plant that is already lower is returned unchanged.
+    A plant that is not higher than this is returned unchanged.
     """
     meshes = (part_mesh(part, model.meshes) for part in model.parts)
     top = max(mesh.vertices[:, 2].max() for mesh in meshes)
