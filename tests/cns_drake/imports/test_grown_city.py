@@ -111,7 +111,7 @@ def test_a_city_without_years_has_two_stages_and_two_drives(tmp_path):
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
-        (["--grow", "0.3", "--plain"], "--grow: --plain"),
+        (["--grow", "0.3", "--plain"], "--grow: not with --plain"),
         (["--grow", "0.3", "--years", "1950", "1980"], "--grow: --years"),
     ],
 )

@@ -191,7 +191,7 @@ def test_tcr_table(capsys, towns):
         "TCR_sym ",
         "TCR town_02 -> town_01",
         "where both drove",
-        "routes alone",
+        "TCR_sym of only the routes",
     ):
         assert text in out
 
