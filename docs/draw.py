@@ -449,11 +449,12 @@ def upkeep(
             for condition, rows in of_condition.items()
         }
         measured = {one.method for some in found.values() for one in some}
-        here = [one for one in METHOD_STYLES if one in measured]
-        shown.update(here)
+        shown |= measured - {""}
+        # What a fleet notices depends on no method.
+        here = [one for one in (*METHOD_STYLES, "") if one in measured]
         for condition, some in found.items():
             for one in some:
-                colour = METHOD_STYLES[one.method][0]
+                colour = METHOD_STYLES[one.method][0] if one.method else INK
                 y = list(conditions).index(condition)
                 y += 0.7 * ((here.index(one.method) + 0.5) / len(here) - 0.5)
                 ends = one.interval.low, one.interval.high
