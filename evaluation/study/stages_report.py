@@ -300,7 +300,7 @@ class _CityReport:
             )
         )
         self._sessions = list(self._pairs_of_sessions())
-        measured += self._sessions
+        measured += [together for _, together in self._sessions]
         self._measured = {
             (*one.names, one.factors[STAGE]): one for one in measured
         }
@@ -346,17 +346,17 @@ class _CityReport:
         """Returns a pair as it is measured, or (stage `last`) its control."""
         return self._measured.get((pair[0].name, pair[1].name, stage))
 
-    def _pairs_of_sessions(self) -> Iterator[Pair]:
-        """Yields a pair for each earlier stage with several drives.
+    def _pairs_of_sessions(self) -> Iterator[tuple[Recordings, Pair]]:
+        """Yields two pairs for each earlier stage with several drives.
 
-        The database of the pair consists of the places of all these drives.
-        The query is the drive through the last stage.
+        The database is the first of these drives, and then the places of all of
+        them. The query is the drive through the last stage.
 
         Raises:
             InputError: two of these drives are in different worlds.
         """
-        for first, _ in self._city.change_pairs():
-            drives = self._city.sessions(first.stage)
+        for single in self._city.change_pairs():
+            drives = self._city.sessions(single[0].stage)
             if len(drives) == 1:
                 continue
             # Recordings that do not exist yet are of one map.
@@ -370,7 +370,7 @@ class _CityReport:
             for pair in recorded_comparisons(
                 self._city, [condition], _SEED, lambda text: None
             ):
-                yield replace(pair, names=(names, pair.query.name))
+                yield single, replace(pair, names=(names, pair.query.name))
 
     def _further_descriptors(self) -> dict[str, tuple[Further, ...]]:
         """Returns drive -> its descriptors that second runs need."""
@@ -481,26 +481,14 @@ class _CityReport:
                 report.tracks[name] = result_tables.DriveTrack(
                     drive.stamps_ns, drive.X_WS
                 )
-        for together in self._sessions:
-            number = 1 + len(together.beside)
-            first = next(
-                one
-                for one, _ in self._city.change_pairs()
-                if one.name == together.database.name
-            )
-            pair = first, self._city.last
+        for pair, together in self._sessions:
             own = self._measured_or_control(pair)
             assert own is not None
             report.sessions += self._outcomes(pair, own.parts["place"])
+            number = 1 + len(together.beside)
+            stages = f"{pair[0].stage} ({number} drives)", pair[1].stage
             report.sessions += [
-                replace(
-                    one,
-                    pair=(
-                        city.name,
-                        f"{first.stage} ({number} drives)",
-                        one.pair[2],
-                    ),
-                )
+                replace(one, pair=(city.name, *stages))
                 for one in self._outcomes(pair, together.parts["place"])
             ]
         if compared:
