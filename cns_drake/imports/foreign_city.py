@@ -26,6 +26,8 @@ Rgb = tuple[float, float, float]
 SHARPEST_TURN_DEG = 125.0
 # A roof of clay tiles.
 RED_ROOF = Finish((0.55, 0.30, 0.24), "brick")
+# Lane marks and zebra crossings.
+WHITE_PAINT = Finish((0.86, 0.86, 0.84), "markings")
 _GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
 WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)

@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiLineString
 
-from cns_drake.city.geometry import Finish
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import (
+    WHITE_PAINT,
     Imported,
     Street,
     ends_at_nodes,
@@ -31,7 +31,6 @@ _DASH_HEIGHT = 0.01
 # Length before a junction that stays free, in addition to half the street's
 # width [m].
 _BEFORE_JUNCTION = 4.0
-_WHITE = Finish((0.86, 0.86, 0.84), "markings")
 
 
 def lane_marks(
@@ -65,7 +64,7 @@ def lane_marks(
                     "road",
                     "Lane mark",
                     {"paint": np.concatenate(dashes)},
-                    {"paint": _WHITE},
+                    {"paint": WHITE_PAINT},
                 )
 
 

@@ -21,6 +21,7 @@ from cns_drake.imports import faces
 from cns_drake.imports.foreign_city import (
     LAWN,
     WATER,
+    WHITE_PAINT,
     Imported,
     Rgb,
     Street,
@@ -52,7 +53,6 @@ _BESIDE_BRIDGE = 2.0
 _SIDEWALK = 2.0
 # Height of sidewalks above the street [m].
 KERB_HEIGHT = 0.12
-_WHITE = Finish((0.86, 0.86, 0.84), "markings")
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
 # Length of the stripes [m].
@@ -377,7 +377,7 @@ def crossing_stripes(
                 "road",
                 "Crossing",
                 {"stripes": np.concatenate(surface)},
-                {"stripes": _WHITE},
+                {"stripes": WHITE_PAINT},
             )
 
 
