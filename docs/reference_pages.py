@@ -102,6 +102,7 @@ _FILLED_IN = {
     (Experiment, "methods"): "all that ship",
     (Experiment, "protocol"): "`fair`",
     (Experiment, "baseline"): "the first values",
+    (Fleet, "seed"): "the condition's seed",
 }
 
 

@@ -28,7 +28,7 @@ Scheduler = Annotated[
         help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, which "
         "runs the jobs on several machines. All machines need access to the "
         "output folder under the same path. By default the value of the "
-        "environment variable DASK_SCHEDULER_ADDRESS, if there is one.",
+        "environment variable DASK_SCHEDULER_ADDRESS, if this variable is set.",
     ),
 ]
 Methods = Annotated[
@@ -48,15 +48,15 @@ MethodSettings = Annotated[
         metavar="METHOD.NAME=VALUE",
         help="New value for a setting of a method, such as btc.candidates=20. "
         "Separate the numbers of a list by commas. If only one method runs, "
-        "you may leave out its name: candidates=20. May be repeated.",
+        "you may leave out the method's name: candidates=20. May be repeated.",
     ),
 ]
 Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Whether to measure the time and memory of each method as well. "
-        "The measured costs differ from run to run.",
+        help="Whether to also measure the time and memory that each method "
+        "needs. The measured costs differ from run to run.",
     ),
 ]
 Tables = Annotated[

@@ -118,12 +118,13 @@ def export(
     map-update compares the labels of your own change detector with this ground
     truth.
 
-    The format map-sessions has the same maps without labels, from recordings
-    whose world is unknown, such as real drives. Before cns-eval map-update can
-    use these maps, add ground truth of your own: A/truth.npy and B/truth.npy.
+    The format map-sessions contains the same maps without labels, from
+    recordings whose world is unknown, such as real drives. Before cns-eval
+    map-update can use these maps, add ground truth of your own: A/truth.npy and
+    B/truth.npy.
 
-    The format bev-images has a bird's-eye image and a pose of each scan of a
-    recording or of a real drive. cns-eval real reads this format.
+    The format bev-images contains a bird's-eye image and a pose for each scan
+    of a recording or of a real drive. cns-eval real reads this format.
 
     The format film shows the same stretch of a shipped drive or of a scenario
     file in each stage of the city: first in one shot per stage from behind the
@@ -149,27 +150,28 @@ def export(
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with --format kitti.
-        sequence: Number of the exported drive, which names its folder
+        sequence: Number NN of the exported drive, whose folder is called
             sequences/NN. By default the digits at the end of the drive's name.
             Only with --format kitti.
         spacing: Distance that the car drives between two clouds of training
-            data, by default 10, or between two scans of a map, by default 1
-            [m]. A smaller distance makes a denser map.
+            data (by default 10) or between two scans of a map (by default 1)
+            [m]. The smaller the distance, the denser the map.
         held_out: Drive that is used for evaluation only, and never for
             training, even if DRIVE or --vary names it. May be repeated. Only
             with --format pointnetvlad or overlap.
         scans: Number of consecutive scans that are merged into each cloud (a
             submap). Only with --format pointnetvlad.
-        max_range: Leave out points of training data that are farther than this
-            along x, y or z in the LiDAR's frame [m]. By default 50, or 100 for
-            overlap-table.
+        max_range: Largest absolute x, y and z of a point of training data in
+            the LiDAR's frame [m]. Points beyond this limit are left out. By
+            default 50, or 100 for overlap-table.
         seconds: Length of the whole film, with all of its shots [s].
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
             default, the stretch begins where the road ahead is straightest.
-        traffic: Number of moving vehicles in the film, and also of pedestrians.
-            By default as the scenario says, or, if the scenario has no traffic,
-            up to 60, as far as the streets have room.
+        traffic: Number of moving vehicles in the film. The same number of
+            pedestrians is added. By default the traffic of the scenario; if the
+            scenario has none, up to 60 vehicles, as many as the streets have
+            room for.
     """
     values: dict[str, Any] = {
         "lidar": lidar,

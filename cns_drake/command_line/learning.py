@@ -43,12 +43,12 @@ def train(
     packages of the extra `train` (JAX).
 
     Args:
-        output: File for the weights. The training curve is written to FILE.png,
-            and the state of the training to FILE.npz.training, from which the
-            same command resumes after an interruption.
-        minutes: Approximate computing time on one core in minutes, from which
-            the numbers of cities and steps follow. The training ends after
-            these steps, not after exactly this time.
+        output: File for the weights. The training curve is written to FILE.png.
+            The state of the training is written to FILE.npz.training; after an
+            interruption, the same command resumes from this file.
+        minutes: Approximate computing time on one core in minutes. The numbers
+            of cities and of training steps follow from this time. The training
+            ends after these steps, even if they take more or less time.
         cities: Number of cities to train on; by default the number follows from
             --minutes.
         steps: Number of training steps; by default the number follows from
@@ -56,17 +56,17 @@ def train(
         seed: Seed of all random choices. Another seed gives other cities and
             other weights.
         without: Kind of variation to leave out of the training, in order to
-            measure what each kind contributes: change (changes of the city
-            between drives); returns (weather, and the losses and errors of a
-            LiDAR's data sheet); or driver (wandering in the lane, and lane
-            changes). May be repeated.
+            measure what this kind contributes. change: the city changes between
+            drives. returns: weather, and the losses and errors of a real LiDAR.
+            driver: the car wanders in its lane and changes lanes. May be
+            repeated.
         drawn_streets: Generate random streets as well, instead of using the
             streets of the shipped maps. The shipped maps can then serve as a
             test, because the training has never seen their streets.
-        graded: Train with exact overlaps: the more of a query's scan a place
-            shows, the higher its target rank. Without --graded, every place
-            within 7.5 m of a query is an equally good match. Exact overlaps
-            make the training about 1.5 times as long.
+        graded: Train with exact overlaps, so that a place ranks higher if it
+            shows more of the query's scan. Without --graded, all places within
+            7.5 m of a query are equally good matches. With --graded, the
+            training takes about 1.5 times as long.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -192,27 +192,29 @@ def import_city(
         year_attribute: Name of the attribute in the file that contains each
             building's year of construction. By default the command tries the
             usual names.
-        undated: Where buildings without a year of construction appear: from the
-            first stage on (first), only in the last stage (last), or in no
+        undated: Stages that contain the buildings without a year of
+            construction: all stages (first), only the last stage (last), or no
             stage (never).
-        lod: Level of detail (LoD) of the buildings in CityJSON to read, such as
-            1.2; by default the highest level of each building.
-        seed: Seed of all random choices: the buildings that are missing or
-            lower in the first stage (--grow), and the details that are added to
+        lod: Level of detail (LoD) at which buildings are read from CityJSON,
+            such as 1.2; by default the highest level that each building has.
+        seed: Seed of all random choices: which buildings change between the
+            first stage and today (--grow), and which details are added to
             buildings and streets. For an OpenDRIVE file, which has no
             buildings, the whole city depends on the seed.
         along: CSV file with the path of a drive of your own: columns x and y in
             the frame of the map [m]. This drive replaces the two drives that
             the command otherwise makes.
-        within: Leave out structures that are farther than this from the drives
-            [m], to save memory. By default, no structure is left out.
+        within: Greatest distance of structures from the drives [m]. Structures
+            beyond this distance are left out, to save memory. By default, no
+            structure is left out.
         drive_on: Side of the street on which cars drive; by default the side
             that the file names, or right if the file names none.
-        grow: Add a first stage in which this share of the buildings, sampled at
-            random, is missing or lower, from 0.01 to 0.9; by default 0.3. For
-            an OpenDRIVE file, the buildings in the east are missing instead, by
-            default 0.35 of all. Not with --years or --plain, which add no such
-            stage.
+        grow: Share of the buildings that change between an added first stage
+            and today, from 0.01 to 0.9; by default 0.3. In the first stage,
+            these buildings, sampled at random, are missing or lower than today.
+            For an OpenDRIVE file, the buildings in the east are missing
+            instead, and the default is 0.35. Not with --years or --plain, which
+            add no such stage.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Only OpenDRIVE files, which contain no
             buildings, still get buildings along their roads.

@@ -40,7 +40,7 @@ Traffic = Annotated[
         max=2000,
         metavar="N",
         help="Number of moving vehicles. The same number of pedestrians is "
-        "added. By default as the scenario says.",
+        "added. By default the traffic of the scenario.",
     ),
 ]
 Recording = Annotated[
@@ -69,10 +69,10 @@ Vary = Annotated[
     str | None,
     typer.Option(
         metavar="NAME|FILE.yaml",
-        help="Name of a shipped experiment, or experiment file, whose drives "
-        "are added to the drives that you name. The command writes the "
-        "experiment's scenario files to <output>/scenarios, and its generated "
-        "cities to <output>/cities.",
+        help="Shipped experiment, or experiment file, whose drives are added "
+        "to the drives that you name. The command writes the experiment's "
+        "scenario files to <output>/scenarios, and its generated cities to "
+        "<output>/cities.",
     ),
 ]
 Maps = Annotated[

@@ -27,8 +27,8 @@ Returns = Annotated[
     typer.Option(
         help="Model of the LiDAR's returns. ideal returns are exact; "
         "calibrated returns have the noise, the losses and the intensities of "
-        "the LiDAR's data sheet. By default the model that the scenario sets, "
-        "or ideal if there is none."
+        "the LiDAR's data sheet. By default the model that the scenario sets; "
+        "without a scenario, ideal."
     ),
 ]
 DriveNames = Annotated[
@@ -44,8 +44,8 @@ Fog = Annotated[
     float | None,
     typer.Option(
         metavar="METRES",
-        help="Visibility in fog [m]; the smaller, the denser the fog. Fog, "
-        "rain and snowfall switch on calibrated returns.",
+        help="Visibility in fog [m]; a lower visibility means denser fog. "
+        "Fog, rain and snowfall switch on calibrated returns.",
     ),
 ]
 Rain = Annotated[
@@ -173,19 +173,20 @@ def simulate(
         transient: Temporary changes to the city, such as snow=0.25,leaves=0.15.
             The switches are: snow, the depth of the snow [m]; leaves, the share
             of leaves that trees keep; parked_cars, scaffolds, works, furniture
-            and roadsides, the share of each that is changed or added, from 0 to
-            1; height_limit, the greatest height of buildings and plants [m];
-            and seed, another integer for other random changes. May be repeated.
+            and roadsides, which share of these things is changed or added, from
+            0 to 1; height_limit, the greatest height of buildings and plants
+            [m]; and seed, an integer that selects the random changes. May be
+            repeated.
         driver: Model of the driver. With real, the car wanders in its lane and
             changes lanes, as in published data sets. With none, the car stays
-            in the middle of its lane. By default as the scenario says.
+            in the middle of its lane. By default the driver of the scenario.
         ride: Class of the road surface after ISO 8608, from A (new) to E (very
             poor), which shakes the car on its springs. With none, the car does
-            not shake. By default as the scenario says.
-        imu_rate: Sampling rate of the IMU [Hz]; by default as the scenario
-            says.
-        camera: Add a camera that looks ahead: width and height of its images in
-            pixels, and images per second, such as 640x480@2. The camera also
+            not shake. By default the class that the scenario sets.
+        imu_rate: Sampling rate of the IMU [Hz]; by default the rate that the
+            scenario sets.
+        camera: Add a camera that looks ahead, such as 640x480@2: width and
+            height of an image in pixels, and images per second. The camera also
             records depth images and images of semantic classes.
     """
     with uninterrupted():
@@ -263,8 +264,8 @@ def scan(
         pose: Pose of the LiDAR in the world: position, then roll, pitch and yaw
             [m, rad].
         output: File for the scan; its name ends in .pcd, .bin or .npy.
-        seed: Seed of the random noise and weather. Other seeds give other
-            errors with the same statistics.
+        seed: Seed of the random noise and weather. A different seed gives
+            different errors with the same statistics.
         model_path: Folder with model:// files of the world, which is searched
             before the folders in the environment variables GZ_SIM_RESOURCE_PATH
             and SDF_PATH. May be repeated.

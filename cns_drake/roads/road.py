@@ -92,11 +92,12 @@ class JunctionEntry(_Model):
 
     Attributes:
         position: `[x, y]` of the point where the centrelines meet [m].
-        height: height z of the junction [m]. Its whole area is level.
-        kerb_radius: radius of the kerb round each corner [m]. At a dead end,
+        height: height z of the junction [m]. The whole area of the junction is
+            level.
+        kerb_radius: radius of the kerb round each corner [m]; at a dead end,
             the radius of the disc in which the road ends.
-        dead_end: whether this is the dead end of its only road. Traffic cannot
-            go on there.
+        dead_end: whether the junction is a dead end, which has only one road,
+            and where traffic cannot go on.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)

@@ -39,13 +39,14 @@ class Losses(Section):
     """What is missing from the city of a drive.
 
     Attributes:
-        missing: share of the buildings and plants to remove, from 0 to 1: those
-            nearest to a place that the seed of the condition selects.
-        scattered: name of a class -> share of the structures of this class that
-            are removed at random all over the map, in addition to those of
-            `missing`, such as `{pole: 0.3}`. The key `seed` replaces the seed
-            of the condition, so that the two drives can lack different
-            structures.
+        missing: share of the buildings and plants to remove, from 0 to 1. The
+            structures nearest to a place that the seed of the condition selects
+            are removed.
+        scattered: structures to remove at random all over the map, in addition
+            to those of `missing`: for each class that you name, the share of
+            its structures to remove, such as `{pole: 0.3}`. The key `seed`
+            replaces the seed of the condition, so that the two drives can lack
+            different structures.
         towards: another stage of the map, usually an earlier one. Only
             structures that do not exist in that stage are removed. A structure
             that exists in that stage does not change, even if it has another

@@ -116,7 +116,7 @@ class RideConfig(Section):
             `E` (very poor), which shakes the vehicle; `none` keeps the vehicle
             steady.
         seed: seed of the random bumps of the road. Drives with the same seed
-            meet the same bumps.
+            have the same bumps.
         crossfall: sideways slope of the road, down to the car's right [m/m];
             0.025 is usual where cars keep right. Needs a `roughness` other than
             `none`.
@@ -144,9 +144,9 @@ class DriverConfig(Section):
 
     Attributes:
         wander: standard deviation of the car's lateral offset from the middle
-            of its lane [m], where the road is wide enough. Between the paths of
-            two such drives, the lateral offset has 1.4 times this standard
-            deviation.
+            of its lane [m], where the road is wide enough. The offset between
+            the paths of two such drives has a standard deviation 1.4 times as
+            large.
         wander_length: distance along the road after which the autocorrelation
             of the lateral offset (`wander`) has fallen to 1/e [m].
         lane_changes: average number of changes to a neighbouring lane per
@@ -258,8 +258,8 @@ class TransientConfig(Section):
             cars, 30 % have left, 20 % stand elsewhere in their bay, and all
             others are replaced by another car.
         leaves: share of the leaves and needles that remain on plants; 0 is
-            winter. Wood stays. A shrub without wood keeps a tenth of its
-            leaves, as twigs.
+            winter. Wood stays. A shrub that has only leaves keeps a tenth of
+            them, as twigs.
         snow: depth of the snow within 120 m of the drive, on surfaces that face
             the sky [m]. Roads are cleared, and banks of snow lie along their
             kerbs.
@@ -275,9 +275,9 @@ class TransientConfig(Section):
             or parked cars. Only the cars depend on the seed; all other added
             objects are the same in every drive.
         height_limit: greatest height of buildings and plants above their lowest
-            point [m]. Buildings that are at least 2.5 m (a storey) higher are
-            cut off at this height, and get a flat roof; higher plants are
-            scaled down. Default: no limit.
+            point [m]. Buildings that exceed this height by at least 2.5 m (a
+            storey) are cut off there, and get a flat roof; plants that exceed
+            it are scaled down. By default no limit.
     """
 
     seed: int = Field(default=1, ge=0)

@@ -110,11 +110,11 @@ class Fleet(Section):
     years, so a larger fleet contains the drives of a smaller one.
 
     Attributes:
-        cars: number of drives a year.
+        cars: number of drives per year.
         years: number of years. The first drives take place this number of years
             before the query, and the last drives one year before the query.
         length: smallest length of a route [m].
-        seed: seed of the random choices; by default the seed of the condition.
+        seed: seed of the random choices.
     """
 
     cars: int = Field(ge=1, le=1000, strict=True)

@@ -134,9 +134,10 @@ class MadeMap(Section):
         import_file: file of a real city to import, in the folder `files` of the
             experiment.
         sha256: SHA-256 digest of the imported file, so that everyone imports
-            the same one.
-        grow: share of the imported buildings, sampled at random, that are
-            missing or lower in the first stage.
+            the same file.
+        grow: share of the imported buildings, sampled at random, that change
+            between the first stage and today: in the first stage they are
+            missing, or lower than today.
         plain: whether to leave out the windows, roofs and kerbs that the file
             does not contain. By default they are sampled at random, as by
             `cns-drake import`.
@@ -185,7 +186,7 @@ class Experiment(Section):
     Attributes:
         name: name of the experiment in all tables.
         about: the question in words.
-        maps: maps to use: names of shipped ones, folders of maps, folders of
+        maps: maps to use: names of shipped maps, folders of maps, folders of
             recordings, or maps to make. By default the shipped maps.
         files: folder with the files of real cities that `maps` import.
         drives: which drives of a map are compared. `same-route`: the last drive
@@ -209,7 +210,7 @@ class Experiment(Section):
             sets the levels of a case, the weakest first. Each case is measured
             by itself and compared with the case `none`, which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
-            default all. A case that lacks a level is measured at its last level
+            default all. A case with fewer levels is measured at its last level
             instead.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
@@ -232,7 +233,7 @@ class Experiment(Section):
         charts: charts to show on the page of the experiment.
         quick: fields to replace if `--quick` is given. `tasks`, `methods` and
             lists are replaced as a whole; in other mappings, only the fields
-            that you name.
+            that you name are replaced.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][\w.-]*$")]

@@ -218,8 +218,8 @@ def pr(
             two cities generated along the same streets.
         truth: What makes a place a match of a query. With radius, a match lies
             within --radius of the query. With overlap:PART, such as
-            overlap:0.5, a match can lie at any distance, and its scan shows at
-            least PART of what the query's scan shows.
+            overlap:0.5, a match can lie at any distance, and the scan of the
+            match shows at least PART of what the query's scan shows.
         overlaps: CSV file to write: the overlap of each query with each place.
             Needs --truth overlap:PART.
         exact_overlaps: File with exact overlaps, from cns-drake export --format
@@ -229,18 +229,19 @@ def pr(
             car had another heading. By default as --protocol says.
         tilt_queries: Greatest angle of the random roll and pitch by which each
             query is tilted [deg]. By default as --protocol says.
-        hide_sector: Width of a random sector in which each query's points are
-            removed [deg], as if a truck beside the car occluded them.
+        hide_sector: Angular width of the sector, in a random direction, in
+            which the points of each query are removed [deg], as if a truck
+            beside the car occluded them.
         seed: Seed of the random yaws, tilts and occluded sectors of the
             queries.
         output: Folder for the tables results.csv and queries.csv, which have
             the columns of a study's tables; created if it does not exist.
         scores: CSV file for the score of each pair of a query and a place. Use
-            this option for scans without poses: DATABASE and QUERY are folders
-            with .bin, .pcd, .npy or .ply files, and no results are computed.
-            Every query is compared with every place, even if the method usually
-            skips some places to save time. If the method rejects a place, the
-            score is empty.
+            this option for scans without poses: DATABASE and QUERY are then
+            folders with .bin, .pcd, .npy or .ply files, and no results are
+            computed. Every query is compared with every place, even if the
+            method usually skips some places to save time. The score of a place
+            that the method rejects is empty.
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)
@@ -436,12 +437,12 @@ def compare(
     command ranks the methods in these tables and in the shipped tables by their
     means over the conditions that all tables share.
 
-    Each mean has a 95 % t interval over maps if there are at least four maps,
-    or over conditions if there are one map and at least four conditions. If
-    each table has a queries.csv next to it, the command also prints the
-    difference in AUC between any two methods, with a p-value that is corrected
-    for the number of differences by Holm's method. With --rankings, the command
-    prints Kendall's tau between the rankings of any two tables.
+    From four maps on, each mean has a 95 % t interval over maps. With one map,
+    the interval is over conditions, if there are at least four of them. If each
+    table has a queries.csv next to it, the command also prints the difference
+    in AUC between any two methods, with a p-value that is corrected for the
+    number of differences by Holm's method. With --rankings, the command prints
+    Kendall's tau between the rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.

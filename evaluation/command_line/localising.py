@@ -56,8 +56,8 @@ def localise(
     Each scan of QUERY is aligned to MAP by registration, from an initial guess
     of the scan's pose: the ground-truth pose, moved by --start in a random
     direction and rotated by --start-turn about a random axis. With --track, the
-    initial guess follows from the estimated pose of the previous scan instead.
-    The results are pose errors and success rates.
+    initial guess is instead the estimated pose of the previous scan, moved by
+    the odometry. The results are pose errors and success rates.
 
     MAP and QUERY are drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
     odometry, CNS) or point clouds (.pcd .ply .npy .bin). If MAP is a drive, its
@@ -94,12 +94,12 @@ def localise(
             in the TUM format: time [s], x y z and a quaternion x y z w.
         frame: Frame whose poses --estimate contains: the LiDAR's (lidar) or the
             vehicle's (base_link).
-        time_offset: Time to add to the times of --estimate [s], if they come
-            from another clock than the times of the drive.
-        output: Folder for the tables results.csv and queries.csv, which have
-            the columns of a study's tables, for localisation.csv, with all
-            values of each query, and for a picture with --track; created if it
-            does not exist.
+        time_offset: Time to add to the times of --estimate [s], if these times
+            come from another clock than the times of the drive.
+        output: Folder for the results; created if it does not exist. The tables
+            results.csv and queries.csv have the columns of a study's tables;
+            localisation.csv contains all values of each query. With --track,
+            the folder also contains a picture.
     """
     import math
 

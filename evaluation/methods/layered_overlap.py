@@ -81,8 +81,9 @@ class LayeredOverlapConfig(MethodConfig):
             which compares maps cell by cell.
         weights: weights of a common cell in the score, by layer: low, middle
             and high points, poles, kerbs.
-        least_cells: number that the score adds to each scan's weighted number
-            of filled cells, so that two nearly empty scans do not look alike.
+        least_cells: number that the score adds to the weighted number of filled
+            cells of each scan, so that two nearly empty scans do not look
+            alike.
     """
 
     cell: PositiveFloat = 0.5

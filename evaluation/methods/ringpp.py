@@ -47,17 +47,17 @@ class RingPlusPlusConfig(MethodConfig):
 
     Attributes:
         half_width: half the side of the square map from above [m]. The protocol
-            uses points up to 100 m away; RING++ leaves out those beyond this
-            square.
-        crop: which points of the map are used: `square` uses all of them,
-            `round` only those within `half_width` of its centre. If the LiDAR
-            is rotated, a square contains other points than before, but a circle
-            contains the same points.
+            uses points up to 100 m away; RING++ leaves out the points beyond
+            this square.
+        crop: which points of the map are used: `square` uses all points,
+            `round` only the points within `half_width` of the map's centre. If
+            the LiDAR is rotated, a square contains other points than before,
+            but a circle contains the same points.
         min_height: smallest height above the ground of a point that is used
             [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
         max_height: largest height above the ground of a point that is used [m];
             the authors have z < 10 m for a LiDAR at 1.73 m.
-        height_unit: number by which heights are divided where the shape around
+        height_unit: length by which heights are divided before the shape around
             a point is described [m]. Horizontal coordinates are divided by
             `half_width`.
         neighbours: number of nearest points, including the point itself, that

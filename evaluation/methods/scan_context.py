@@ -57,7 +57,7 @@ class ScanContextConfig(MethodConfig):
             `augmented-polar` adds two copies, as seen from positions at the
             distance `lateral_shift` to the left and to the right;
             `augmented-cart` adds one copy, as seen by a car in the opposite
-            direction. The default is the one that [T] calls A-PC.
+            direction. [T] calls the default A-PC.
         voxel_size: side of the voxels to which each cloud is first downsampled
             [m]; [T] 0.5.
         rings: number of rings of the polar context; [T], [C] 20.
@@ -76,8 +76,8 @@ class ScanContextConfig(MethodConfig):
         lateral_shift: distance by which the variant `augmented-polar` shifts
             the copies of a place to each side [m]; [T] 2.
         candidates: number of contexts that the search in the KD-tree returns;
-            [E] 50. If each place has n contexts, the search returns n times
-            this number.
+            [E] 50. If each place has n contexts, the search returns n *
+            `candidates` contexts.
         search_ratio: share of all shifts of the context that are compared,
             around the shift that fits the aligning key best; [C] 0.1.
     """

@@ -57,8 +57,8 @@ _FIELDS: Options = {
             "max_range",
             float,
             RECORDED_PROTOCOL.max_range,
-            "Leave out points that are farther than this along x, y or z in "
-            "the LiDAR's frame [m].",
+            "Largest absolute x, y and z of a point in the LiDAR's frame [m]. "
+            "Points beyond this limit are left out.",
             None,
         ),
         (
@@ -74,11 +74,12 @@ _FIELDS: Options = {
             "exclude_recent",
             float | None,
             None,
-            "Measure loop closure: compare each drive with itself as well. "
-            "Give the shortest time between a place and a query of the same "
-            "drive [s], such as 30; more recent places are excluded. Every "
-            "method then scores all places that remain, even scan-context++, "
-            "which otherwise scores only a few candidates.",
+            "Measure loop closure: also compare each drive with itself. S is "
+            "the shortest time between a place and a query of the same drive "
+            "[s], such as 30: a query is compared only with places that the "
+            "car passed at least S before. Every method then scores all "
+            "places that remain, even scan-context++, which otherwise scores "
+            "only a few candidates.",
             "S",
         ),
     )
@@ -89,10 +90,10 @@ _GATE: Options = {
             bool,
             typer.Option(
                 "--gate",
-                help="Use geometric verification: reject a top-ranked place if "
-                "the method's own pose estimate puts the query farther than "
-                "--radius from this place. Methods without pose estimates are "
-                "not affected.",
+                help="Use geometric verification: reject a top-ranked place "
+                "if the method's own pose estimate puts the query farther "
+                "than --radius from that place. Methods without pose "
+                "estimates are not affected.",
             ),
         ],
         False,

@@ -193,7 +193,8 @@ class LinePlan(_Model):
 
     Attributes:
         objects: names of objects, each with its weight in the random choice.
-        points: points of the line [m]. The objects face its right side.
+        points: points of the line [m]. The objects face to the right of the
+            line's direction.
         spacing: smallest and largest distance between two objects [m]. Without
             `spacing`, each straight part of the line becomes one object of the
             same length, such as a fence or a hedge. Long or steep parts become
@@ -323,8 +324,8 @@ class CityPlan(_Model):
             of their own.
         medians: objects on the medians of roads; only the fields `trees` and
             `tree_spacing` are used. By default the same objects as in `street`.
-        districts: districts of the city. If two overlap, the first in the list
-            gets the ground.
+        districts: districts of the city. If two districts overlap, the first in
+            the list gets the ground.
     """
 
     seed: int = Field(ge=0)

@@ -73,9 +73,10 @@ class Stages(_Model):
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in
             quotes, such as `"01"`.
-        lots: use of a lot before its building exists (`car_park`, `market`,
-            `garden`, `yard` or `empty`) -> names of the buildings whose lots
-            have this use. By default the use of a lot depends on its size.
+        lots: how lots are used before their buildings exist. Each use
+            (`car_park`, `market`, `garden`, `yard` or `empty`) has a list of
+            the buildings whose lots are used so. By default the use of a lot
+            depends on the lot's size.
     """
 
     stages: dict[StageName, Stage]

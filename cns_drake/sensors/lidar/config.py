@@ -33,8 +33,8 @@ class WeatherConfig(Section):
     The notes on calibrated returns list the limits of the model.
 
     Attributes:
-        visibility: meteorological visibility in fog [m]; the smaller, the
-            denser the fog. By default there is no fog.
+        visibility: meteorological visibility in fog [m]; a lower visibility
+            means denser fog. By default there is no fog.
         rain: rain rate [mm/h].
         snowfall: snowfall rate, as melted water [mm/h].
     """
@@ -59,28 +59,28 @@ class LidarSection(Mount):
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         range_noise: standard deviation of a Gaussian error of the range [m].
-            The limits `min_range` and `max_range` apply to the range with this
-            error. Only with ideal returns.
+            The limits `min_range` and `max_range` apply to the range that
+            contains this error. Only with ideal returns.
         dropout: probability that a return is lost. Only with ideal returns.
         faint_dropout: additional loss of faint returns: a return of intensity I
-            (from 0 to 1) is lost with a probability of this value times (1 -
+            (from 0 to 1) is lost with the probability `faint_dropout` * (1 -
             I). Only with ideal returns.
         motion_distortion: whether the motion of the LiDAR during a revolution
             distorts the scan, as in real units. Each column is then measured
-            from the pose of the LiDAR at its own firing time, `stamp + t`, and
-            expressed in the LiDAR's frame at that time. Otherwise the whole
-            scan is measured from one pose.
+            from the LiDAR's pose at the firing time of this column, `stamp +
+            t`, and expressed in the LiDAR's frame at that time. By default the
+            whole scan is measured from one pose.
         returns: model of the returns: `ideal`, or `calibrated` with the losses,
             errors and intensities of the unit's data sheet.
         echoes: which echoes of a beam are reported. `dual` reports the
-            strongest and the last one. Fog has an echo only in beams without
+            strongest and the last echo. Fog has an echo only in beams without
             any other echo. Only with calibrated returns.
         unit_seed: seed of the errors in the ranges, angles and gains of an
             individual unit's lasers. Use the same seed in all drives with the
             same unit. Only with calibrated returns.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
             drive must be a multiple of this rate. If the lasers of a unit fire
-            at a fixed rate, a slower revolution has more columns.
+            at a fixed rate, a lower `rate` gives a revolution more columns.
         layout: driver or program whose format the recorded points have.
     """
 
