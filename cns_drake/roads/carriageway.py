@@ -169,10 +169,10 @@ def make_areas(
             bays[name, "left"] = _band(road, edge, far, _BAY_CLEARANCE)
     wide = [r for r in roads.values() if 0 < r.median < r.length]
     medians = unary_union([_median(road) for road in wide])
-    without_bays = _union_without_slits(
-        [*lanes.values(), *junction_areas.values()]
+    without_bays = union_without_slits(
+        [*lanes.values(), *junction_areas.values()], _SEAM
     )
-    carriageway = _union_without_slits([without_bays, *bays.values()])
+    carriageway = union_without_slits([without_bays, *bays.values()], _SEAM)
     walks = [
         lanes[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
         for name, road in roads.items()
@@ -181,12 +181,12 @@ def make_areas(
         arms = [r for r in roads.values() if name in (r.start, r.end)]
         width = min(road.sidewalk for road in arms)
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
-    outline = _simplified(_union_without_slits(walks))
+    outline = _simplified(union_without_slits(walks, _SEAM))
     return Areas(
-        carriageway=_multi(carriageway.difference(medians)),
-        lane_area=_multi(without_bays.difference(medians)),
-        sidewalks=_multi(outline.difference(carriageway)),
-        medians=_multi(medians),
+        carriageway=_polygons_only(carriageway.difference(medians)),
+        lane_area=_polygons_only(without_bays.difference(medians)),
+        sidewalks=_polygons_only(outline.difference(carriageway)),
+        medians=_polygons_only(medians),
         parking_bays=bays,
     )
 
@@ -220,19 +220,26 @@ def _simplified(area: BaseGeometry) -> BaseGeometry:
         ) from error
 
 
-def _union_without_slits(parts: Iterable[BaseGeometry]) -> BaseGeometry:
-    """Returns the union of areas, with the slits between neighbours closed."""
-    grown = unary_union(
-        [part.buffer(_SEAM, join_style="mitre") for part in parts]
-    )
-    joined = grown.buffer(-_SEAM, join_style="mitre")
+def union_without_slits(
+    parts: Iterable[BaseGeometry], seam: float
+) -> BaseGeometry:
+    """Returns the union of areas, with the slits between neighbours closed.
+
+    Slits are closed up to a width of 2 `seam` [m].
+    """
+    # GEOS divides by zero at edges that fold back, but its result is right.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = unary_union(
+            [part.buffer(seam, join_style="mitre") for part in parts]
+        )
+        joined = grown.buffer(-seam, join_style="mitre")
     if joined.is_valid:
         return joined
     # At a sharp corner, GEOS may return an outline that crosses itself.
     return make_valid(joined, method="structure", keep_collapsed=False)
 
 
-def _multi(area: BaseGeometry) -> MultiPolygon:
+def _polygons_only(area: BaseGeometry) -> MultiPolygon:
     """Returns an area as a MultiPolygon."""
     pieces = getattr(area, "geoms", [area])
     full = [p for p in pieces if isinstance(p, Polygon) and not p.is_empty]

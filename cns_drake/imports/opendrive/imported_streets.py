@@ -6,7 +6,7 @@ instead, and this module adds such tapers.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,7 @@ from cns_drake.city.ground.streets import (
 )
 from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
-from cns_drake.roads.carriageway import Areas
+from cns_drake.roads.carriageway import Areas, union_without_slits
 
 # Least and greatest width of a step [m].
 _STEP = (0.02, 2.0)
@@ -189,28 +189,34 @@ class ImportedStreets:
             for gap in _enclosed_gaps(shapely.union_all(level))
             if gap.intersects(junctions) and not gap.intersects(islands)
         ]
-        road = _union_without_slits([*alike["road"], *gaps])
-        parking = _simple(shapely.union_all(alike["parking"]).difference(road))
+        road = _simplified(union_without_slits([*alike["road"], *gaps], _SEAM))
+        parking = _simplified(
+            shapely.union_all(alike["parking"]).difference(road)
+        )
         paved = road.union(parking)
-        path = _simple(shapely.union_all(alike["sidewalk"]).difference(paved))
+        path = _simplified(
+            shapely.union_all(alike["sidewalk"]).difference(paved)
+        )
         paved = paved.union(path)
-        other = _simple(
+        other = _simplified(
             shapely.union_all(alike["other-ground"]).difference(paved)
         )
-        whole = _union_without_slits([paved, other])
+        whole = _simplified(union_without_slits([paved, other], _SEAM))
         tapers = kerb_tapers(whole)
-        whole = _union_without_slits([whole, *tapers])
-        carriageway = _cut_at_tiles(_multi(whole))
-        medians = _simple(shapely.union_all(alike["median"]))
-        medians = _multi(medians.difference(carriageway))
-        walks = _simple(shapely.union_all(alike["walk"]))
+        whole = _simplified(union_without_slits([whole, *tapers], _SEAM))
+        carriageway = _cut_at_tiles(_without_slivers(whole))
+        medians = _simplified(shapely.union_all(alike["median"]))
+        medians = _without_slivers(medians.difference(carriageway))
+        walks = _simplified(shapely.union_all(alike["walk"]))
         taken = carriageway.union(medians)
         # A carriageway without a sidewalk, as in junctions, has a kerb that
         # takes ground, too.
         kerbs = kerb_area(carriageway.difference(medians))
         walks = walks.union(snap(kerbs.difference(kerbless)))
-        sidewalks = _multi(snap(walks.difference(taken)))
-        self.areas = Areas(carriageway, _multi(road), sidewalks, medians)
+        sidewalks = _without_slivers(snap(walks.difference(taken)))
+        self.areas = Areas(
+            carriageway, _without_slivers(road), sidewalks, medians
+        )
         self.junctions = shapely.union_all([junctions, *gaps])
         self.coverings = [
             parking_bays(parking),
@@ -219,7 +225,7 @@ class ImportedStreets:
         ]
         taken = taken.union(sidewalks)
         margins = shapely.union_all(alike["margins"]).difference(taken)
-        self.margins = _multi(snap(margins))
+        self.margins = _without_slivers(snap(margins))
 
 
 def lane_polygon(band: LaneBand) -> BaseGeometry:
@@ -250,17 +256,8 @@ def _enclosed_gaps(lanes: BaseGeometry) -> list[Polygon]:
     ]
 
 
-def _union_without_slits(parts: Iterable[BaseGeometry]) -> BaseGeometry:
-    """Returns the union of areas, with slits between neighbours closed."""
-    # GEOS divides by zero at edges that fold back, but its result is right.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        grown = shapely.union_all(
-            [part.buffer(_SEAM, join_style="mitre") for part in parts]
-        )
-        return _simple(grown.buffer(-_SEAM, join_style="mitre"))
-
-
-def _simple(area: BaseGeometry) -> BaseGeometry:
+def _simplified(area: BaseGeometry) -> BaseGeometry:
+    """Returns an area on the grid, without unnecessary vertices."""
     return snap(snap(area).simplify(_SIMPLIFY))
 
 
@@ -287,10 +284,11 @@ def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
         Polygon(cut(one.exterior), [cut(hole) for hole in one.interiors])
         for one in area.geoms
     ]
-    return _multi(snap(MultiPolygon(cut_open)))
+    return _without_slivers(snap(MultiPolygon(cut_open)))
 
 
-def _multi(area: BaseGeometry) -> MultiPolygon:
+def _without_slivers(area: BaseGeometry) -> MultiPolygon:
+    """Returns the polygons of an area, except slivers."""
     return MultiPolygon(polygons_of(area))
 
 
