@@ -36,12 +36,10 @@ import yaml
 from cns_drake import Scenario, load_scenario, make_station
 from cns_drake.ageing.aged_pictures import air_view
 from cns_drake.motion.road_profile import RoadProfile
-from cns_drake.pictures.stage_pictures import (
-    draw_drives,
-    draw_stages,
-    load_views,
-)
-from cns_drake.pictures.stage_scene import StageScene, View
+from cns_drake.pictures.aerial_pictures import draw_drives
+from cns_drake.pictures.camera_views import View, load_views
+from cns_drake.pictures.stage_pictures import draw_stages
+from cns_drake.pictures.stage_scene import StageScene
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder

@@ -1,28 +1,20 @@
-"""A stage of a city, of which images and scans can be made.
-
-Images are rendered by casting rays, without a GPU or a display.
-"""
+"""Renders images of a stage by casting rays, without a GPU or a display."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, model_validator
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
+from cns_drake.pictures.camera_views import View
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     read_perception_geometry,
 )
 from cns_drake.scene.world import load_world
-
-_Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Place = tuple[_Coordinate, _Coordinate, _Coordinate]
 
 _SUN_W = np.array([0.45, -0.55, 0.70]) / np.linalg.norm([0.45, -0.55, 0.70])
 _SUN_RGB = np.array([1.00, 0.95, 0.86])
@@ -33,63 +25,6 @@ _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 HAZE_LENGTH = 1200.0
 _FAR = 5000.0
 _DEFAULT_RGB = (0.7, 0.7, 0.7)
-
-
-class View(BaseModel):
-    """The position and direction of a camera.
-
-    Attributes:
-        position: position of the camera in W [m].
-        target: point in W that is in the centre of the picture [m].
-        fov_y_deg: vertical field of view [deg].
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    position: Place
-    target: Place
-    fov_y_deg: float = Field(default=50.0, ge=0.1, le=179.0)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _names_its_unit(cls, values: Any) -> Any:
-        if isinstance(values, dict) and "fov_y" in values:
-            raise ValueError("fov_y: this field is now fov_y_deg")
-        return values
-
-    @model_validator(mode="after")
-    def _looks_somewhere(self) -> View:
-        if np.linalg.norm(np.subtract(self.target, self.position)) < 1e-3:
-            raise ValueError("position and target are the same")
-        return self
-
-    def pose(self) -> RigidTransform:
-        """Returns the pose X_WC of the camera, with x forward, y left, z up."""
-        return look_at(self.position, self.target)
-
-    def project(
-        self, p_WQset: np.ndarray, width: int, height: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns where points are in the picture of the camera.
-
-        Points outside the picture are left out, but not points that an object
-        hides.
-
-        Args:
-            p_WQset: (N, 3) points in W [m].
-            width, height: size of the picture [pixels].
-
-        Returns:
-            (M, 2) positions in the picture, from its upper left corner
-            [pixels]; the indices (M,) of these points.
-        """
-        scale = height / 2 / np.tan(np.deg2rad(self.fov_y_deg) / 2)
-        p_C = (self.pose().inverse() @ p_WQset.T).T
-        ahead = np.flatnonzero(p_C[:, 0] > 0.1)
-        slopes = p_C[ahead, 1:] / p_C[ahead, :1]
-        pixels = np.array([width, height]) / 2 - scale * slopes
-        inside = ((pixels > 0) & (pixels < [width, height])).all(axis=1)
-        return pixels[inside], ahead[inside]
 
 
 class StageScene:
@@ -139,22 +74,6 @@ class StageScene:
             fov_y_deg=view.fov_y_deg,
             haze_length=haze_length,
         )
-
-
-def look_at(p_WC: ArrayLike, p_WT: ArrayLike) -> RigidTransform:
-    """Returns the pose X_WC of an upright camera at C that looks at T.
-
-    The camera frame is x forward, y left, z up.
-    """
-    forward = np.asarray(p_WT, dtype=float) - np.asarray(p_WC, dtype=float)
-    forward /= np.linalg.norm(forward)
-    left = np.cross([0.0, 0.0, 1.0], forward)
-    if np.linalg.norm(left) < 1e-6:  # If it looks straight down, north is up.
-        left = np.array([-1.0, 0.0, 0.0])
-    left /= np.linalg.norm(left)
-    up = np.cross(forward, left)
-    R_WC = RotationMatrix(np.column_stack([forward, left, up]))
-    return RigidTransform(R_WC, p_WC)
 
 
 def render(

@@ -5,7 +5,9 @@ from pathlib import Path
 
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.pictures import stage_pictures
+from cns_drake.pictures.aerial_pictures import draw_drives
+from cns_drake.pictures.camera_views import load_views
+from cns_drake.pictures.stage_pictures import draw_stages
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -82,9 +84,7 @@ def picture_drives(
 ) -> None:
     """Draws the drives of a map from above, and writes the image file."""
     scenarios = [one.scenario for one in drives]
-    stage_pictures.draw_drives(
-        {s.name.replace("_", " "): s for s in scenarios}, picture
-    )
+    draw_drives({s.name.replace("_", " "): s for s in scenarios}, picture)
 
 
 def picture_stages(
@@ -92,8 +92,8 @@ def picture_stages(
 ) -> None:
     """Draws a street of a map in its first and its last stage."""
     views, *stages = (one.path for one in read)
-    stage_pictures.draw_stages(
+    draw_stages(
         {stage.stem.replace("_", " "): stage for stage in stages},
-        stage_pictures.load_views(views)["street"],
+        load_views(views)["street"],
         picture,
     )

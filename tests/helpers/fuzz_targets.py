@@ -19,7 +19,7 @@ from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_drive
 from cns_drake.imports.cityjson import import_cityjson
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.pictures.stage_pictures import load_views
+from cns_drake.pictures.camera_views import load_views
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.repair import repair_mcap
 from cns_drake.recording.schedule import FRAME_PERIOD

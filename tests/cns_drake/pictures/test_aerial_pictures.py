@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cns_drake.pictures.stage_pictures import draw_drives, view_from_above
+from cns_drake.pictures.aerial_pictures import draw_drives, view_from_above
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_drives
 

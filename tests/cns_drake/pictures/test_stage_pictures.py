@@ -7,8 +7,9 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.pictures.stage_pictures import draw_stages, load_views
-from cns_drake.pictures.stage_scene import look_at, render
+from cns_drake.pictures.camera_views import load_views, look_at
+from cns_drake.pictures.stage_pictures import draw_stages
+from cns_drake.pictures.stage_scene import render
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.perception_geometry import PerceptionGeometry

@@ -1,0 +1,110 @@
+"""Draws the drives of a map from above."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+import numpy as np
+
+from cns_drake.pictures.camera_views import View
+from cns_drake.pictures.figure_files import save_figure
+from cns_drake.pictures.stage_scene import StageScene
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
+
+# Side of a picture from above [pixels].
+_SIDE = 600
+# Margin around the routes [m].
+_MARGIN = 40.0
+# Height of the camera: so high that towers hardly lean [m].
+_CAMERA_HEIGHT = 1200.0
+# Red at the start and blue at the end, as in the paper.
+_COLOURS = "turbo_r"
+# Number of points at which a route is drawn.
+_POINTS = 400
+# Number of drives side by side.
+_COLUMNS = 2
+# Side of a drive's panel [inch].
+_PANEL_INCHES = 4.0
+
+
+def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
+    """Draws drives in two columns of panels, seen from above, with north up.
+
+    All panels show the same part of the world, so that they can be compared.
+
+    Args:
+        scenarios: title -> scenario of each drive.
+        path: file of the picture; its ending determines the format.
+
+    Raises:
+        InputError: a drive cannot be planned, a world cannot be loaded, or the
+            picture cannot be written.
+    """
+    drives = {}
+    for title, scenario in scenarios.items():
+        trajectory = plan_drive(scenario)
+        times = np.linspace(0.0, trajectory.duration, _POINTS)
+        drives[title] = np.array(
+            [trajectory.pose(t).translation() for t in times]
+        )
+    view = view_from_above(np.concatenate(list(drives.values())))
+    rows = -(-len(drives) // _COLUMNS)
+    columns = min(len(drives), _COLUMNS)
+    figure = Figure(
+        figsize=(columns * _PANEL_INCHES, rows * (_PANEL_INCHES + 0.25)),
+        layout="constrained",
+    )
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in panels:
+        axes.set_axis_off()
+    pictures: dict[tuple, np.ndarray] = {}
+    for axes, (title, positions) in zip(panels, drives.items(), strict=False):
+        scenario = scenarios[title]
+        world = (scenario.world_file, scenario.without)
+        if world not in pictures:
+            pictures[world] = StageScene(*world).photograph(
+                view, _SIDE, _SIDE, haze_length=np.inf
+            )
+        axes.imshow(pictures[world])
+        axes.set_title(title)
+        _draw_route(axes, view, positions)
+    save_figure(figure, path, dpi=150)
+
+
+def view_from_above(positions: np.ndarray) -> View:
+    """Returns a view straight down that shows all positions (N, 3) [m]."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    x, y, z = (low + high) / 2
+    half = (high - low)[:2].max() / 2 + _MARGIN
+    return View(
+        position=(x, y, z + _CAMERA_HEIGHT),
+        target=(x, y, z),
+        fov_y_deg=float(np.rad2deg(2 * np.arctan2(half, _CAMERA_HEIGHT))),
+    )
+
+
+def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
+    """Draws a route through positions (N, 3) [m], from red to blue."""
+    # Slightly above the car, so that the line lies over everything that is
+    # drawn.
+    pixels, _ = view.project(positions, _SIDE, _SIDE)
+    segments = list(np.stack([pixels[:-1], pixels[1:]], axis=1))
+    # The line gets thinner, so that a street that is driven twice shows both
+    # lines.
+    widths = np.linspace(5.0, 2.0, len(segments))
+    # A white rim distinguishes the line from roofs of the same colour.
+    axes.add_collection(
+        LineCollection(segments, colors="white", linewidths=widths + 1.5)
+    )
+    line = LineCollection(segments, cmap=_COLOURS, linewidths=widths)
+    line.set_array(np.linspace(0.04, 0.92, len(segments)))
+    line.set_clim(0, 1)
+    axes.add_collection(line)
+    for place, marker in ((pixels[0], "o"), (pixels[-1], "s")):
+        axes.plot(
+            *place, marker, markersize=8, markerfacecolor="white",
+            markeredgecolor="black",
+        )  # fmt: skip
