@@ -5,11 +5,12 @@ robust:
 
 1. Each drive is checked against itself where it passes a place again, and
    straightened if it has drifted.
-2. A first guess is made. It is the identity if both drives name the same datum
-   or frame. Otherwise, or if that fails, it comes from places that look alike.
+2. The first guess of the pose between the two worlds is the identity, if both
+   drives name the same datum or frame. Otherwise, or if the identity fails,
+   the guess comes from places that look alike.
 3. Submaps are registered along the source's path, outwards from where the guess
-   holds. Each registration starts from its neighbour's result, so that drift
-   does not add up.
+   holds. Each registration starts from the result at the neighbouring submap,
+   so that drift does not add up.
 4. The source is moved as a rigid whole if the loops (registered pairs of
    submaps) agree on one pose; otherwise a pose graph bends its path. The target
    stays fixed.
@@ -74,13 +75,14 @@ class AlignmentReport:
     """The alignment of two drives.
 
     Attributes:
-        held: name of the drive that stays fixed; its world is the common one.
+        held: name of the drive that stays fixed. The common world is the world
+            of this drive.
         moved: name of the other drive.
         frames: names of the original world frames of the fixed and of the moved
             drive.
         guess: source of the first guess.
-        candidates: number of pairs of places that look alike; None if they were
-            not needed for the guess.
+        candidates: number of pairs of places that look alike; None if the guess
+            did not need such pairs.
         attempts: number of registrations that were tried.
         loops: number of registrations that fit; each is a loop.
         inliers: number of loops that agree with the result.
@@ -90,13 +92,13 @@ class AlignmentReport:
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
         move: how far the middle frame of the moved drive was moved along x, y,
             z [m].
-        turn_deg: angle by which that frame was rotated about the vertical
+        turn_deg: angle by which the middle frame was rotated about the vertical
             [deg].
         bend: greatest difference between the move of a frame and that of the
             middle frame [m].
-        straightened: for the fixed and the moved drive, the error where the
-            drive passes a place again (upper quartile), before this error was
-            corrected [m]; 0 for a drive that was not corrected.
+        straightened: for the fixed and the moved drive, the upper quartile of
+            the errors where the drive passes a place again, before the
+            correction [m]; 0 for a drive that was not corrected.
         ground: height of the ground that was subtracted from both drives'
             heights [m].
     """
@@ -393,8 +395,8 @@ def make_consistent(drive: Drive) -> tuple[Submaps, float]:
     places which the drive passes more than once.
 
     Returns:
-        The submaps; and the error at such places before the correction (upper
-        quartile) [m], or 0 without a correction.
+        The submaps, and the upper quartile of the errors at such places before
+        the correction [m]; 0 without a correction.
 
     Raises:
         InputError: if a scan cannot be read.

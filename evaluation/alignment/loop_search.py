@@ -32,7 +32,7 @@ _ANOTHER_GUESS = 1.0
 
 @dataclass(frozen=True)
 class Loop:
-    """A keyframe of a source drive, registered to one of a target drive.
+    """A keyframe of a source drive, registered to a keyframe of a target.
 
     Attributes:
         source: keyframe K of the source.
@@ -51,7 +51,7 @@ class Loop:
 def register_keyframe(
     source: Submaps, target: Submaps, k: int, place: int, X_LK: np.ndarray
 ) -> Loop | None:
-    """Registers a keyframe of the source to one of the target.
+    """Registers a keyframe of the source to a keyframe of the target.
 
     Args:
         source: a drive.
@@ -147,7 +147,7 @@ class LoopSearch:
 
         Args:
             k: number of the keyframe.
-            X_TK: (4, 4) guess of its pose.
+            X_TK: (4, 4) guess of the keyframe's pose in T.
 
         Returns:
             Whether a loop was found.
@@ -229,11 +229,11 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
     """Returns the loops between keyframes of the same drive.
 
-    A loop connects a keyframe with an earlier one that is at most 10 m away,
-    seen from above, although at least 50 m of path lie between them. If there
-    are several such earlier keyframes, the closest one is used. At
-    most `most` pairs of keyframes, evenly spread over the drive, are
-    registered. A pair that cannot be registered makes no loop.
+    A loop connects a keyframe with an earlier keyframe at most 10 m away (seen
+    from above), if at least 50 m of path lie between the two keyframes. If
+    there are several such earlier keyframes, the closest one is used. At most
+    `most` pairs of keyframes, evenly spread over the drive, are registered. A
+    pair that cannot be registered makes no loop.
     """
     pairs = []
     for k in range(len(drive)):

@@ -1,10 +1,10 @@
 """Registration of one cloud to another, from a rough guess.
 
 Point-to-plane ICP (Chen and Medioni 1991) of small_gicp: each point is paired
-with the nearest point of the other cloud, and its distance to the plane of that
-point is minimised. The maximum correspondence distance shrinks from stage to
-stage: a large distance lets a poor initial guess converge, and a small distance
-excludes wrong pairs at changed parts.
+with the nearest point of the other cloud, and the distances between the points
+and the planes of their partners are minimised. The maximum correspondence
+distance shrinks from stage to stage: a large distance lets a poor initial guess
+converge, and a small distance excludes wrong pairs at changed parts.
 """
 
 from dataclasses import dataclass
@@ -81,10 +81,11 @@ class Registration:
     Attributes:
         X_TS: (4, 4) pose of S in T.
         fitness: share of a cloud's points that have a counterpart in the other
-            cloud. It is the greater share of the two clouds, because one of
-            them may show much that was built or torn down in between.
-        structure: the same share for upright points only, because flat ground
-            fits nearly everywhere.
+            cloud. Of the shares of the two clouds, the greater one counts,
+            because one cloud may show much that was built or torn down in
+            between.
+        structure: the same share, but only of the points on upright surfaces,
+            because flat ground fits nearly everywhere.
         covariance: (6, 6) covariance of a small motion of S in T: rotation
             [rad], translation [m].
     """

@@ -10,8 +10,8 @@ poses at the same times, p_i and q_i their positions:
   parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
   prints it as `rmse`.
 - Drift over 100 m: the length and the angle of (Y_i^-1 Y_j)^-1 (X_i^-1 X_j),
-  for every tenth pose i. Pose j is the first one that lies more than 100 m of
-  true path after pose i. A. Geiger et al., Are we ready for autonomous
+  for every tenth pose i. Pose j is the first pose that lies more than 100 m of
+  ground-truth path after pose i. A. Geiger et al., Are we ready for autonomous
   driving?, CVPR 2012, and the development kit of KITTI odometry, which divides
   by the 100 m and calls the mean the translation error [%].
 """
@@ -174,7 +174,7 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns the distances (N,) of estimated positions from true ones [m].
+    """Returns distances (N,) of estimated from ground-truth positions [m].
 
     The estimated positions are first moved and rotated so that they fit best.
 
@@ -204,8 +204,9 @@ def segment_errors(
 
     Returns:
         For each segment of 100 m: (K,) index of its first pose; (K,) index of
-        its last pose; and (K, 4, 4) error, the true last pose in the frame of
-        the estimated last pose if both first poses are made equal.
+        its last pose; and (K, 4, 4) error: the ground-truth last pose, in the
+        frame of the estimated last pose, after both first poses were made
+        equal.
     """
     along = travelled(X[:, :3, 3])
     starts = np.arange(0, len(X), _STEP)

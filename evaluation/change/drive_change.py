@@ -280,7 +280,7 @@ def same_stage_partner(
 ) -> DriveMap:
     """Returns which of two drives is in the control's stage.
 
-    It is the drive whose route the control does not follow.
+    This is the drive whose route the control does not follow.
 
     Raises:
         InputError: one of them is no drive, they are not in one world, or the

@@ -9,7 +9,7 @@ that the largest value in the image is 255.
 The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
 their images of KITTI makes other images than these. The rules above were found
 from the images themselves, on five scans of KITTI 00; there, the correlation of
-pixels is 0.86. One of these rules is that indices are cut off towards zero, so
+pixels is 0.86. One of these rules is that indices are rounded towards zero, so
 that the middle row and the middle column are twice as wide as the others.
 """
 
@@ -56,11 +56,11 @@ def count_image(points: np.ndarray) -> np.ndarray:
 
 
 def image_points(image: np.ndarray) -> np.ndarray:
-    """Returns a cloud (N, 3) whose image is the given one [m].
+    """Returns a cloud (N, 3) [m] that `count_image` turns into a given image.
 
     A pixel that is not zero becomes a column of one point in each voxel, at
-    heights of 0.2 m, 0.6 m and so on. From the cloud of an image of 151 pixels,
-    `count_image` makes the same image. Images of other programs can have more
+    heights of 0.2 m, 0.6 m and so on. The image that `count_image` makes is the
+    same if `image` has 151 x 151 pixels. Images of other programs can have more
     than ten different values; these are rounded.
 
     Args:

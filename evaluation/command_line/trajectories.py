@@ -23,7 +23,7 @@ def compare_paths(
     Args:
         first: drive A.
         second: drive B.
-        when: whether to align them to one world before.
+        when: whether to first align the drives to one world.
         json: whether to print JSON.
     """
     from evaluation.drives.comparison import compare_drives

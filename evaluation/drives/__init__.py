@@ -35,11 +35,11 @@ def open_drive(
             chooses the LiDAR.
         lidar: name of the LiDAR to read, if the recording has several.
         columns: number of float32 values per point in `.bin` files of KITTI and
-            MulRan; by default it is guessed from the values.
+            MulRan; by default the number is guessed from the values.
 
     Raises:
-        InputError: if nothing there can be read as a drive, or it has no
-            such LiDAR.
+        InputError: if nothing at `path` can be read as a drive, or the drive
+            has no such LiDAR.
 
     Example:
         from evaluation import open_drive

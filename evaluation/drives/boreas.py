@@ -7,7 +7,7 @@
 The time of a scan is the middle of the scan; the time of a point is relative to
 this time, in seconds. Angles describe the rotation of the world in the LiDAR's
 frame S, as in the data set's development kit: Rz(yaw) Ry(pitch) Rx(roll) is
-R_SW. All drives share W, with its axes east, north and up. In the first
+R_SW. All drives share W, whose axes point east, north and up. In the first
 releases W was the UTM grid.
 """
 

@@ -1,7 +1,7 @@
 """How the paths of two drives differ: offsets, lanes, headings, speeds.
 
-Two drives along one route differ because of their drivers. The quantities here
-serve to compare real drives with simulated ones.
+Two drives along one route differ because of their drivers. These quantities
+serve to compare real drives with simulated drives.
 """
 
 from dataclasses import asdict, dataclass
@@ -79,8 +79,8 @@ class DriveComparison:
             absolute offset in the same direction [m].
         other_lane: share of the stations met in the same direction at which
             the offset exceeds `LANE_OFFSET`.
-        episode_50, episode_90: quantiles of the length of a stretch in another
-            lane [m].
+        episode_50, episode_90: quantiles of the length of the stretches in
+        another lane [m].
         wander: standard deviation of the offset in the same lane [m].
         wander_length: distance along A at which the correlation of the offset
             in the same lane has fallen to 1/e [m].

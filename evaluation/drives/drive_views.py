@@ -86,7 +86,8 @@ class CountedDrive(MovedDrive):
     """A view of a drive that counts the points that are not finite.
 
     Attributes:
-        num_ignored: number of such points in the scans that were read.
+        num_ignored: number of points that are not finite, in the scans that
+            were read.
     """
 
     def __init__(self, drive: Drive):
@@ -105,7 +106,7 @@ class CountedDrive(MovedDrive):
 
 
 class RecentScans(DriveView):
-    """A view of a drive that keeps its last scans in memory.
+    """A view of a drive that keeps recently read scans in memory.
 
     Each scan is read from the drive only once if a program asks for scans in
     increasing order, or goes back by fewer scans than are kept.

@@ -1,10 +1,10 @@
-"""Drives of the HeLiPR data set (Jung et al., IJRR 2024), any of its LiDARs.
+"""Drives of the HeLiPR data set (Jung et al., IJRR 2024), with any LiDAR.
 
     SEQ/LiDAR/{Ouster,Velodyne,Avia,Aeva}/<ns>.bin   packed records
     SEQ/LiDAR_GT/{LiDAR}_gt.txt           ns x y z qx qy qz qw of X_LS
     SEQ/LiDAR_GT/global_{LiDAR}_gt.txt    the same in the UTM grid
 
-Poses are those of the LiDAR itself, one for each scan.
+Each scan has a pose, which is that of the LiDAR itself.
 """
 
 from functools import partial
@@ -72,9 +72,9 @@ _LONGEST_GAP_NS = 1_000_000_000
 class HeliprDrive(FileDrive):
     """The scans of one LiDAR of HeLiPR on a drive.
 
-    If there is a file `LiDAR_GT/global_<lidar>_gt.txt`, the poses come from it,
-    and W has the axes of the UTM grid but an origin near the drives (see
-    `evaluation.drives.scan_files.to_world`). Otherwise the poses come from
+    If there is a file `LiDAR_GT/global_<lidar>_gt.txt`, the poses come from
+    this file, and W has the axes of the UTM grid but an origin near the drives
+    (see `evaluation.drives.scan_files.to_world`). Otherwise the poses come from
     `LiDAR_GT/<lidar>_gt.txt`, and W is the frame of this file. Points without a
     return are left out.
     """
@@ -133,7 +133,7 @@ def read_scan(lidar: str, path: Path, stamp_ns: int = 2**63) -> np.ndarray:
             depends.
 
     Raises:
-        ValueError: if the file is not of that LiDAR.
+        ValueError: if the file does not have the format of that LiDAR.
         InputError: if the file cannot be read.
     """
     dtype = _RECORDS[lidar]

@@ -11,12 +11,12 @@ from evaluation.drives.sampling import sample_frames
 class JoinedDrive(Drive):
     """The scans of several drives, one drive after the other.
 
-    Only one drive at a time is open, because a simulated one holds its world
+    Only one drive at a time is open, because a simulated drive keeps its world
     in memory.
 
     Attributes:
-        starts: (P + 1,) first frame of each of the P drives; the number of all
-            frames at the end.
+        starts: (P + 1,) first frame of each of the P drives, and last the
+            number of all frames.
         keep: which frames are kept in a map, see
             `evaluation.recognition.keeping.kept_places`.
     """

@@ -1,4 +1,4 @@
-"""Drives of the KITTI odometry benchmark, and of others in its layout.
+"""Drives of the KITTI odometry benchmark, and others in its layout.
 
     sequences/NN/velodyne/%06d.bin   float32 x y z reflectance
     sequences/NN/times.txt           seconds
@@ -9,7 +9,7 @@ C is the frame of the left grey camera (x right, y down, z forward), C0 is C at
 the first scan, and S is the frame of the LiDAR. Without a `calib.txt` the poses
 are those of the LiDAR, X_S0S. If scans are missing, the numbers in the names of
 the remaining files select the rows of the tables. If scans were renumbered,
-`frames.txt` has their old numbers, one for each scan.
+`frames.txt` contains the old number of each scan.
 
 There may also be labels, in SemanticKITTI's form,
 
@@ -64,15 +64,15 @@ _LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
-    The files contain poses X_C0C of camera C, relative to the first one. They
-    are converted to poses of the LiDAR S, X_S0S = inverse(X_CS) X_C0C X_CS;
-    `calib.txt` contains X_CS under the name `Tr`. Without `calib.txt`, the
-    poses are taken as those of the LiDAR.
+    The files contain poses X_C0C of camera C, relative to the pose at the first
+    scan. They are converted to poses of the LiDAR S, X_S0S = inverse(X_CS)
+    X_C0C X_CS; `calib.txt` contains X_CS under the name `Tr`. Without
+    `calib.txt`, the poses are taken as those of the LiDAR.
 
-    The world frame W is S0, the frame of the LiDAR at the first scan, whose z
-    is up. With a file `first_pose.txt`, which cns-drake exports, W is the world
-    frame of the recording instead. With a folder `labels`, points have the
-    fields `label` and `instance`.
+    The world frame W is S0, the LiDAR's frame at the first scan, with z up.
+    With a file `first_pose.txt`, which cns-drake exports, W is the world frame
+    of the recording instead. With a folder `labels`, points have the fields
+    `label` and `instance`.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

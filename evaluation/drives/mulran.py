@@ -1,10 +1,10 @@
-"""Drives of the MulRan data set (Kim et al., ICRA 2020), its Ouster OS1-64.
+"""Drives of the MulRan data set (Kim et al., ICRA 2020), with its OS1-64.
 
     SEQ/global_pose.csv              ns, then the upper 3 x 4 of X_UB
     SEQ/[sensor_data/]Ouster/<ns>.bin     float32 x y z intensity
 
-X_UB is the pose of the vehicle's base in the UTM grid, at 100 Hz; the base
-is on the ground. Times are whole nanoseconds.
+X_UB is the pose of the vehicle's base in the UTM grid, at 100 Hz; the origin of
+the base is on the ground. Times are whole nanoseconds.
 """
 
 from pathlib import Path

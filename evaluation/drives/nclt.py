@@ -59,8 +59,8 @@ class NcltDrive(FileDrive):
 
     The unit hangs upside down, and its field of view reaches up to 30.67 deg.
     The files contain scans from which the motion during a revolution has been
-    removed. The rings of the points are numbered by elevation, from the lowest;
-    they are not the laser numbers of the unit.
+    removed. The rings of the points are numbered from the lowest elevation
+    upwards, unlike the lasers of the unit.
     """
 
     def __init__(self, path: Path, columns: int | None = None):

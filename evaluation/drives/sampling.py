@@ -91,8 +91,8 @@ class QuerySensor:
 def corners(positions: np.ndarray, apart: float) -> list[int]:
     """Returns indices of positions that are at least a given distance apart.
 
-    The first index is 0. Each further index is that of the next position at a
-    distance of at least `apart` [m] from the previous position in the result.
+    The first index is 0. Each further index belongs to the next position that
+    lies at least `apart` [m] from the previous position in the result.
     """
     points = positions.tolist()
     kept = [0]
@@ -106,8 +106,8 @@ def travelled(positions: np.ndarray) -> np.ndarray:
     """Returns the path length (N,) up to each position (N, 3) [m].
 
     The jitter of a receiver that stands or creeps does not lengthen the path:
-    the path is divided where it is 0.5 m from the division before, and a part
-    that is much longer than its chord counts as its chord.
+    the path is divided into parts whose ends lie 0.5 m apart, and a part that
+    is much longer than the straight line between its ends counts as that line.
     """
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     ends = corners(positions, _LEAST_MOVE)
@@ -170,7 +170,7 @@ def gather(
         fields: names of further fields of the points, besides x, y and z.
         num_before: how many of the scans come before the frame.
         sensor: rotation and occluded sector that are applied to the sensor;
-            None for the sensor as recorded.
+            None to use the sensor as recorded.
 
     Returns:
         (N, 3) float64 points in the sensor's frame at that frame. If fields are

@@ -1,9 +1,9 @@
 """Estimators: functions that register a scan to a map from an initial pose.
 
-Shipped are the estimators of small_gicp (K. Koide, "small_gicp: Efficient and
-parallel algorithms for point cloud registration", JOSS 2024), two with a robust
-kernel, and, as an optional extra, KISS-Matcher (H. Lim et al., ICRA 2025). An
-estimator of your own is a Python function.
+The shipped estimators are those of small_gicp (K. Koide, "small_gicp: Efficient
+and parallel algorithms for point cloud registration", JOSS 2024), two
+estimators with a robust kernel, and, as an optional extra, KISS-Matcher (H. Lim
+et al., ICRA 2025). An estimator of your own is a Python function.
 
 small_gicp's point-to-plane error is the offset of a pair times the normal,
 component by component. On surfaces that are parallel to two axes of the world,
@@ -68,9 +68,9 @@ class Settings:
     Attributes:
         voxel: side of the voxels to which the map is downsampled [m].
         scan_voxel: side of the voxels to which a scan is downsampled [m].
-        width: greatest distance between corresponding points [m]. With VGICP,
-            a point corresponds to the Gaussian of its own voxel if the mean of
-            this Gaussian is not farther away.
+        width: greatest distance between corresponding points [m]. With VGICP, a
+            point corresponds to the Gaussian of its own voxel if the mean of
+            this Gaussian lies within that distance.
         last_width: `width` of a second alignment, which starts from the result
             of the first [m]; 0 for no second alignment. The robust estimators
             shrink their width down to this value.
@@ -136,7 +136,7 @@ class LocalisationMap:
     """A map in which scans are localised.
 
     Attributes:
-        name: name of the drive or file from which it was made.
+        name: name of the drive or file from which the map was made.
         surface: the downsampled points in W, with normals and covariances.
     """
 
@@ -150,8 +150,9 @@ class LocalisationMap:
     def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
         """Returns the map with one Gaussian per voxel, for VGICP.
 
-        Its frame is W, shifted by a fraction of a voxel, so that walls and
-        ground at round coordinates do not lie on the border of voxels.
+        The frame of this map is W, shifted by a fraction of a voxel, so that
+        walls and ground at round coordinates do not lie on the border of
+        voxels.
 
         Args:
             resolution: side of a voxel [m].
@@ -203,7 +204,7 @@ def make_map(
 
     Args:
         source: the drive, or the cloud's file.
-        settings: settings for thinning and for normals.
+        settings: settings for downsampling and for normals.
         columns: number of columns of a `.bin` file; by default guessed from the
             values.
         on_note: is called with notes on how a cloud's file was read.
@@ -240,7 +241,8 @@ def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
 def map_frames(drive: Drive) -> np.ndarray:
     """Returns the frames (K,) of a drive of which a map is made.
 
-    Of several drives, those frames are left out that are not to be kept.
+    If the drive consists of several drives, frames that these drives do not
+    keep in the map are left out.
     """
     if not isinstance(drive, JoinedDrive):
         return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)
@@ -258,7 +260,7 @@ def map_of(
     Args:
         points: (M, 3) points in W [m], at least `FEWEST_POINTS`.
         name: name of the map.
-        settings: settings for thinning and for normals.
+        settings: settings for downsampling and for normals.
     """
     surface = make_surface(points, settings.neighbours)
     return LocalisationMap(name, surface)
@@ -270,8 +272,9 @@ class Estimate:
 
     Attributes:
         X_WS: (4, 4) pose; None if the estimator found none.
-        score: the estimator's own score, higher for a better result. If it is
-            None, the share of the scan's points that lie on the map is used.
+        score: the estimator's own score, higher for a better result. If the
+            score is None, the share of the scan's points that lie on the map is
+            used instead.
         iterations: number of steps; 0 if unknown.
     """
 
@@ -297,10 +300,9 @@ class Fit:
             at the nearest points of the map, without points more than 1 m from
             the map [m]; NaN if no point is left.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
-            of W: rotation [rad], translation [m]. It is the inverse Hessian of
-            the point-to-plane error, corrected for the noise of the normals,
-            times the square of the residual, or of 0.01 m if the residual is
-            less.
+            of W: rotation [rad], translation [m]. The covariance is the inverse
+            Hessian of the point-to-plane error, corrected for the noise of the
+            normals, times the square of the residual (at least 0.01 m).
     """
 
     share: float

@@ -110,7 +110,8 @@ class Starts:
     Attributes:
         radius: distance of each initial position from the ground-truth position
             [m].
-        turn_deg: angle between each initial and true orientation [deg].
+        turn_deg: angle between each initial orientation and the ground truth
+            [deg].
         seed: seed of the random directions in which initial poses are moved and
             rotated.
 
@@ -140,8 +141,8 @@ class Starts:
 
         Returns:
             (3,) offset of the position in W, in a random direction [m]; (3,)
-            rotation about a random axis, as a rotation vector in S [rad]. Both
-            depend only on the seed and the frame.
+            rotation about a random axis, as a rotation vector in S [rad].
+            Offset and rotation depend only on the seed and the frame.
         """
         rng = np.random.default_rng([self.seed, frame])
         offset, axis = rng.normal(size=(2, 3))
@@ -175,9 +176,9 @@ class OneScan(FileDrive):
         )
 
     def scan(self, index: int) -> np.ndarray:
-        """Returns all points of the cloud, also those at the origin.
+        """Returns all points of the cloud, including points at the origin.
 
-        Other drives leave out points at the origin, since these stand for beams
+        Other drives leave out points at the origin, which stand for beams
         without a return. In this cloud, such a point can be real.
         """
         return self._read(self._files[index], 0)
@@ -248,7 +249,7 @@ class Localiser:
         surroundings: the map.
         estimator: function that registers a scan, see
             `evaluation.localisation.estimators.make_estimator`.
-        settings: settings for thinning scans.
+        settings: settings for downsampling scans.
     """
 
     surroundings: LocalisationMap
@@ -274,9 +275,10 @@ class Localiser:
             scan: structured array, in S.
             X_WS: (4, 4) ground-truth pose.
             R_WT: (3, 3) axes of the path: along, to the left, and up.
-            offset: (3,) vector from the true to the initial position, in W [m].
-            turn: (3,) rotation vector from the true to the initial orientation,
-                in S [rad].
+            offset: (3,) vector from the ground-truth to the initial position,
+                in W [m].
+            turn: (3,) rotation vector from the ground-truth to the initial
+                orientation, in S [rad].
             X_WS0: the initial pose; by default it follows from `offset` and
                 `turn`.
 
@@ -361,7 +363,8 @@ def localise(
 
     Returns:
         For each localiser and each entry of `starts`, (K,) records of `QUERY`,
-        in the order of the frames: first those of the first localiser.
+        in the order of the frames. The records of the first localiser come
+        first.
 
     Raises:
         InputError: a scan cannot be read.

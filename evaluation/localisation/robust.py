@@ -1,7 +1,7 @@
 """Point-to-plane ICP and GICP with a robust kernel and a shrinking search.
 
 Changed parts of a city lead to wrong pairs, and the Python package of
-small_gicp gives wrong pairs the same weight as right ones. Here a pair at a
+small_gicp gives wrong pairs the same weight as right pairs. Here a pair at a
 distance d from its surface has the weight (k / (k + d^2))^2 (Geman and
 McClure); k falls with the search width, the greatest distance of a pair.
 
@@ -10,8 +10,8 @@ Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): the search width is
 its initial pose. A rotation counts as the distance by which it moves a point at
 the greatest range. KISS-ICP takes s from the previous scans, but here a scan is
 localised by itself. The scan is therefore aligned repeatedly, each time from
-the last result and with at most half the width, until the least width is
-reached.
+the previous result and with at most half of the previous width, until the least
+width is reached.
 """
 
 import math
@@ -42,8 +42,8 @@ def align_robustly(
 ) -> tuple[np.ndarray, int]:
     """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
 
-    Several alignments follow one another. Each begins at the last result, and
-    pairs points over a shorter distance.
+    Several alignments follow one another. Each alignment begins at the result
+    of the previous alignment, and pairs points over a shorter distance.
 
     Args:
         surface: the map.

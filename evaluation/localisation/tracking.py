@@ -95,11 +95,11 @@ def track_drive(
         drift: see `drifting_steps`.
 
     Returns:
-        (K,) records of `TRACKED`. Before the fields of `QUERY`, each contains
-        the number of the section, the length of the path since the drive's
-        first scan, the length since the previous scan [m], and the error of the
-        tracked position [m]. This is the error of the result or, without one,
-        of the odometry.
+        (K,) records of `TRACKED`. Before the fields of `QUERY`, each record
+        contains the number of the section, the length of the path since the
+        drive's first scan and since the previous scan [m], and the error of the
+        tracked position [m]. The tracked position is the result of the
+        alignment; if there is none, the position by odometry.
 
     Raises:
         InputError: a scan cannot be read, or fewer than two are in the map.
@@ -170,8 +170,9 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
         tracked: records of `TRACKED`.
 
     Returns:
-        For each loss, the length [m], and whether the track was found again. If
-        it was not, the length ends at the end of the mapped section.
+        For each loss, the length [m], and whether the track was found again. A
+        track that is not found again counts as lost up to the end of the mapped
+        section.
     """
     found = []
     for stretch in np.unique(tracked["stretch"]):

@@ -29,9 +29,9 @@ def cell_keys(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         cells: (N, 3) numbers of cells along x, y and z.
 
     Returns:
-        (M,) int64 numbers, which sort like the cells; and which cells have one,
-        (N,) bool. Cells that are not finite, or beyond the range of 21 bits for
-        each axis, have none.
+        (M,) int64 numbers, which sort like the cells; and (N,) bool, which
+        cells have a number. Cells that are not finite, or beyond the range of
+        21 bits for each axis, have no number.
     """
     with np.errstate(invalid="ignore"):
         is_near = (cells >= 0) & (cells < 1 << _BITS)

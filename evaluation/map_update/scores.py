@@ -7,9 +7,10 @@ to see. A class that does not occur in the ground truth is left out of the mean,
 `miou`.
 
 Precision and recall of gone (in A) and new (in B) exist in three forms. By
-points, a predicted point is right if it has changed itself. Within 0.2 m and
-0.5 m, it is right if a truly changed point lies within this distance; recall
-exchanges prediction and truth. By structure, verdicts on whole structures are
+points, a predicted point is right if this point has changed in the ground
+truth. Within 0.2 m and 0.5 m, a predicted point is right if a point that has
+changed in the ground truth lies within this distance; for recall, prediction
+and ground truth are exchanged. By structure, verdicts on whole structures are
 compared, see `evaluation.map_update.structures.verdicts`.
 
 The predictions also give an updated map: A without the points that are
@@ -69,8 +70,8 @@ def score(
 
     Args:
         pair: the two maps.
-        truth: their labels in the ground truth.
-        predicted: their predicted labels.
+        truth: the ground-truth labels of these maps.
+        predicted: the predicted labels of these maps.
         names: number of a class of points -> its name, for scores by class.
 
     Raises:

@@ -1,11 +1,12 @@
 """Reads and writes the maps of two drives, with a label for each point.
 
 A folder contains a session, which is a drive with its map, in each of its
-subfolders: the older drive in `A`, the newer one in `B`. A session consists of
+subfolders: the older drive in `A`, the newer drive in `B`. A session consists
+of
 
 - `map.ply`: the merged map in the world, one point for each 0.1 m, with `x`,
-  `y`, `z` [m], and, where they are known, `label` (class, SemanticKITTI's ids)
-  and `instance` (number of a structure),
+  `y`, `z` [m], and, where known, `label` (class, SemanticKITTI's ids) and
+  `instance` (number of a structure),
 - `truth.npy`: a label for each point of the map, see `Label`,
 - `Scans/000000.pcd` onwards: the scans in the frame of the LiDAR,
 - `poses.txt`: a row for each scan, the upper 3 x 4 of the LiDAR's pose in the
@@ -150,8 +151,8 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
         path: an array `.npy` of integers, or a cloud `.ply` with a property
             `prediction` for each point.
         session: the session to which the labels belong.
-        truth: whether the labels are exact labels. Only these may have the
-            value `Label.IGNORED`.
+        truth: whether the labels are ground truth. Only ground-truth labels may
+            have the value `Label.IGNORED`.
 
     Returns:
         (N,) uint8.

@@ -26,8 +26,9 @@ class StructureChange:
         points: number of the structure's points in the map.
         observed: number of these points that the other drive observed.
         changed: number of the observed points that are gone (A) or new (B).
-        verdict: gone (A) or new (B) if most of the observed points are, else
-            kept. Without an observed point: unobserved (A) or newly_seen (B).
+        verdict: gone (A) or new (B) if most of the observed points are gone or
+            new, else kept. Without an observed point: unobserved (A) or
+            newly_seen (B).
         alone: whether the world of the other drive lacks a structure of this
             name.
     """
@@ -54,7 +55,8 @@ def verdicts(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns a verdict on each structure of a map, such as kept, gone or new.
 
-    A structure is gone or new if more than half of its observed points are.
+    A structure is gone or new if more than half of its observed points are gone
+    or new.
 
     Args:
         instances: (N,) number of the structure of each point; 0 for none.
@@ -63,9 +65,9 @@ def verdicts(
         side: `A` if the map is the older one, `B` if it is the newer one.
 
     Returns:
-        (S,) numbers of the structures; (S, 3) number of their points, of
-        observed points and of changed points; (S,) verdict of each, as a
-        `Label`.
+        (S,) numbers of the S structures; (S, 3) how many points each structure
+        has, how many of them are observed, and how many have changed; (S,)
+        verdict on each structure, as a `Label`.
     """
     unobserved, kept, changed = SIDES[side]
     rows = np.flatnonzero(instances)

@@ -1,9 +1,9 @@
 """Maps of several drives that are updated after each drive.
 
-The map of the first drive is the first map. After each further drive B, a
-change detector labels the points of the map A and of the map of B (see
-`evaluation.map_update.baselines`). Points that are gone leave the map, and the
-points of B join it.
+The map A begins as the map of the first drive. After each further drive B, a
+change detector labels the points of A and of the map of B (see
+`evaluation.map_update.baselines`). Points that are gone are removed from A, and
+the points of B are added.
 
 The scan of a place of an older drive becomes what the updated map shows from
 there: the scan without the points that are gone, and with all new points that
@@ -50,7 +50,7 @@ Detect = Callable[[Pair, int], Labels]
 
 @dataclass(frozen=True)
 class Updates:
-    """What later drives changed in the maps of several drives.
+    """Changes that later drives made to the maps of several drives.
 
     Attributes:
         corner: (3,) number of the cube of the map's corner along x, y and z.
@@ -219,9 +219,9 @@ def visible_points(
 ) -> np.ndarray:
     """Returns new points that a scan would show.
 
-    They lie in front of all surfaces that the scan shows and that are not gone,
-    and within its elevations. Of the points in one direction, the nearest one
-    is returned.
+    A new point is visible if it lies within the scan's elevations, and in front
+    of all surfaces that the scan shows and that are not gone. Of the visible
+    points in one direction, only the nearest point is returned.
 
     Args:
         scan: (N, 3) points in the frame of the sensor S [m].

@@ -28,8 +28,8 @@ def thumbnail(
         (M, 3) uint8, M <= 2000: cell along x, cell along y, and height above
         the ground in steps of 0.1 m, at most 25.5 m. Cell numbers along x and y
         begin at 0; cell 128 begins at the sensor, so that greater numbers lie
-        in front of it (x) or to its left (y). The order is random, so that the
-        first points alone show the whole scan, downsampled.
+        in front of the sensor (x) or to its left (y). The order is random, so
+        that the first points alone show the whole scan, downsampled.
     """
     x, y = np.floor(points[:, :2].T / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height

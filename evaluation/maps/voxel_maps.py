@@ -131,13 +131,14 @@ def enter(
         X: (4, 4) pose of the sensor in the moved world.
         voxel_size: length of a voxel's side [m].
         divisions: number of cells along a voxel's side; 0 to keep no samples.
-        table: (S,) slots of type `SLOT`; changed here. It needs room for all
-            voxels.
-        size: number of voxels in the table before.
+        table: (S,) slots of type `SLOT`; changed here. The table needs room for
+            all voxels.
+        size: number of voxels that the table already contains.
         sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
             has a sample; changed here.
-        samples: (K, 3) the samples [m]; changed here. It needs room for all.
-        num_samples: number of samples before.
+        samples: (K, 3) the samples [m]; changed here. The array needs room for
+            all samples.
+        num_samples: number of samples that `samples` already contains.
 
     Returns:
         Number of voxels and number of samples afterwards, and number of points
@@ -197,7 +198,8 @@ class VoxelMap:
             [m].
         counts: (V,) int64 number of points in each voxel.
         voxel_size: length of a voxel's side [m].
-        num_ignored: number of points left out as not finite.
+        num_ignored: number of points that were left out because they are not
+            finite.
         origin_W: a corner of voxel (0, 0, 0) [m].
 
     Example:
@@ -230,8 +232,8 @@ class VoxelMap:
     ) -> VoxelMap:
         """Returns the map on a grid of larger voxels.
 
-        All points of a voxel count in the larger voxel that contains their
-        centroid.
+        All points of a voxel count in the larger voxel that contains the
+        centroid of these points.
 
         Args:
             voxel_size: length of a larger voxel's side [m].
@@ -267,7 +269,8 @@ class VoxelMap:
         The points (N, 3) are in the world [m].
 
         Returns:
-            (N,) index into the map, -1 where its voxel is not occupied.
+            (N,) index of each point's voxel in the map; -1 if the map has no
+            such voxel.
         """
         if len(self) == 0 or len(points_W) == 0:
             return np.full(len(points_W), -1)
@@ -288,7 +291,7 @@ class VoxelAccumulator:
     """Makes a voxel map of clouds that are added one by one.
 
     Coordinates far from the origin (UTM) lose no precision. Memory grows with
-    the number of voxels, not of points.
+    the number of voxels, not with the number of points.
 
     For pictures, one point per cell of a finer grid can be kept.
     """
@@ -457,7 +460,7 @@ def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
     Points are in the frame of a sensor.
 
     Args:
-        points: (N, 3) points [m]; those that are not finite are left out.
+        points: (N, 3) points [m]; points that are not finite are left out.
         voxel_size: length of a voxel's side [m].
 
     Returns:

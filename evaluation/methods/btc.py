@@ -2,11 +2,11 @@
 
 Spots that stand out from the ground (walls, trunks, posts) are keypoints; the
 occupied heights above them are a binary descriptor. Triangles of nearby
-keypoints do not change when the sensor moves: a place is a candidate if its
-cloud and the query's share enough triangles with similar sides and similar
-descriptors at their vertices. A candidate counts if its triangles agree on a
-motion. The score is the share of the query's planes that match planes of the
-candidate under this motion.
+keypoints do not change when the sensor moves. A place is therefore a candidate
+if enough triangles of its cloud match triangles of the query, with similar
+sides and similar descriptors at the vertices. A candidate has a score if its
+triangles agree on a motion. The score is the share of the query's planes that
+match planes of the candidate under this motion.
 
 A cloud consists of several consecutive scans, in the frame of one of these
 scans. (The method's authors describe all clouds in one world frame. This
@@ -14,11 +14,12 @@ favours the method, because the grids on which planes and keypoints are found
 then coincide.)
 
 Scores equal the public program's scores (checked on 243 single scans of two
-LiDARs and 163 submaps, each against 308 places). Two details that the method
-leaves open follow the program. One is the order in which planes are compared
-(`btc_planes`); because of it, scores depend on the order of a cloud's points.
-The other is an error in the positions of keypoints where the ground slopes
-sideways, which lowers scores there; `image_axes: orthogonal` corrects it.
+LiDARs and 163 submaps, each against 308 places). Two details that the paper
+does not determine follow the program. First, the order in which planes are
+compared (`btc_planes`), which makes scores depend on the order of a cloud's
+points. Second, an error in the positions of keypoints where the ground slopes
+sideways, which lowers the scores there; `image_axes: orthogonal` corrects this
+error.
 
 Planes are found by `btc_planes`, keypoints and triangles by `btc_triangles`.
 """
@@ -382,8 +383,8 @@ def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
             place's frame P [m].
 
     Returns:
-        X_PQ (4, 4), the first one if several poses are equally good; None if
-        too few pairs agree.
+        X_PQ (4, 4), the first of several equally good poses; None if too few
+        pairs agree.
     """
     stride = len(query) // _TRIALS + 1
     # One proposal for each whole stride.
@@ -406,14 +407,14 @@ def plane_overlap(
 ) -> float:
     """Returns the share of a query's patches that match a patch of a place.
 
-    Each patch is compared with the patch whose centre is nearest to its own.
+    Each patch is compared with the patch whose centre is nearest.
 
     Args:
         query: patches of the query, at least one.
         place: patches of the place, at least one.
         X_PQ: (4, 4) pose of the query's frame Q in the place's frame P.
         normal_limit: upper limit of the length of the difference of the two
-            unit normals; either sign of a normal will do.
+            unit normals. The sign of a normal does not matter.
         distance_limit: upper limit of a centre's distance from the plane of the
             other patch [m].
     """

@@ -1,11 +1,11 @@
 """Planes in a cloud: one per voxel, and the ground plane.
 
-Part of BTC (see `evaluation.methods.btc`). The order in which patches are
-compared decides which of them are merged into the largest plane, the ground, on
-which all keypoints depend. The public program takes the voxels in the order of
-the hash table of its C++ library (libstdc++). This order is not part of the
-method, but it can be reproduced; with any other order, scores differ from those
-of the program.
+Part of BTC (see `evaluation.methods.btc`). All keypoints depend on the largest
+plane, which is the ground. The order in which patches are compared decides
+which patches are merged into this plane. The public program takes the voxels in
+the order of the hash table of its C++ library (libstdc++). This order is not
+part of the method, but is reproduced here, because with any other order, scores
+differ from those of the program.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def voxel_planes(
 ) -> Planes:
     """Returns a plane for each voxel whose points lie on a plane.
 
-    The planes are in the same order as in the public program of BTC, which
+    The planes are in the same order as in the public program of BTC. This order
     depends on the order of the points.
 
     Args:
@@ -85,7 +85,7 @@ def voxel_planes(
 def base_plane(
     planes: Planes, normal_limit: float, distance_limit: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Returns the largest plane that the patches form; outdoors, the ground.
+    """Returns the largest plane that patches form; outdoors, the ground.
 
     Similar patches are merged into larger planes, and patches to which no other
     patch is similar are dropped. Then similar planes are merged with each
@@ -121,11 +121,12 @@ def merge(
     """Merges similar patches; returns the merged planes.
 
     Args:
-        planes: patches to merge. Which of them are merged depends on the order
-            of the patches.
+        planes: patches to merge. The order of the patches decides which of them
+            are merged.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
-        keep_single: whether to keep patches that are similar to no other.
+        keep_single: whether to keep patches that are not similar to any other
+            patch.
     """
     labels = group_alike(
         planes.centers, planes.normals, normal_limit, distance_limit
@@ -168,8 +169,8 @@ def group_alike(
         distance_limit: see `base_plane`.
 
     Returns:
-        (P,) number of each patch's group; -1 for a patch to which no other is
-        similar.
+        (P,) number of each patch's group; -1 for a patch that is not similar to
+        any other patch.
     """
     # From the last patch to the first, each is compared with all patches before
     # it, in their order.

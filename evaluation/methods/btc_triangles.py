@@ -3,8 +3,8 @@
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of a plane,
 the cloud is an image. Each cell of the image has one bit for each layer of
 height above the plane, which is set if the layer contains points. Cells with
-many heights (walls, trunks, posts) are the keypoints, unless they are part of a
-line of such cells.
+many layers set (walls, trunks, posts) are the keypoints, unless they are part
+of a line of such cells.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ class HeightImage(NamedTuple):
     """A cloud seen along the normal of a plane.
 
     Attributes:
-        heights: (rows, columns) int64; bit k of a cell is set if it has points
-            in layer k above the plane. The last row and the last column are
-            always empty. The numbers of rows and columns are multiples of the
-            side of a segment, see `peaks`.
+        heights: (rows, columns) int64; bit k of a cell is set if the cell has
+            points in layer k above the plane. The last row and the last column
+            are always empty. The numbers of rows and columns are multiples of
+            the side of a segment, see `peaks`.
         means: (rows, columns, 2) mean position of the points of each cell,
             along rows and along columns [m]; NaN for a cell without points.
     """
@@ -242,8 +242,8 @@ def find_keypoints(
 
     Args:
         image: image of a cloud, seen along the normal of the plane.
-        center: (3,) center with which the image was drawn [m].
-        axes: (3, 3) axes with which the image was drawn.
+        center: (3,) centre with which the image was made [m].
+        axes: (3, 3) axes with which the image was made.
         min_heights: least number of layers with points in a keypoint's cell.
     """
     cells = peaks(count_bits(image.heights), min_heights)
@@ -261,8 +261,8 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
     Args:
         keypoints: all keypoints.
         radius: distance within which keypoints are neighbours [m].
-        max_number: largest number of keypoints to keep, those with the most
-            occupied layers.
+        max_number: largest number of keypoints to return. If there are more,
+            the keypoints with the most occupied layers are returned.
     """
     tree = cKDTree(keypoints.positions)
     pairs = tree.query_pairs(radius, output_type="ndarray")
@@ -301,7 +301,7 @@ class Triangles:
         sides: (T, 3) lengths, shortest first [m].
         positions: (T, 3, 3) positions of the vertices, one in each row [m].
         heights: (T, 3) int64, the binary descriptor of each vertex: bit k is
-            set if its cell has points in layer k above the plane.
+            set if the vertex's cell has points in layer k above the plane.
     """
 
     sides: np.ndarray
@@ -443,8 +443,8 @@ def match(
         table: table in which similar triangles are sought.
         side_tolerance: greatest difference of the side lengths, as the norm of
             three differences divided by the norm of the query's three lengths.
-            For large triangles, the table has a smaller limit of its own: it is
-            searched only in cells near the query's lengths.
+            For large triangles, the limit is smaller, because only cells of the
+            table near the query's lengths are searched.
         min_similarity: least Dice similarity of the descriptors, as the mean
             over three vertices.
 

@@ -6,8 +6,8 @@ of their filled cells coincide. Objects that are gone or new only lower this
 number, while unchanged objects all coincide at the same pose.
 
 Matched filters for place recognition come from Joseph, Fischer and Milford
-(arXiv 2409.03998), who use one map of occupied cells. The layers, poles and
-kerbs, and bits instead of a Fourier transform, are our additions.
+(arXiv 2409.03998), who use one map of occupied cells. We add the layers, the
+poles and kerbs, and bits instead of a Fourier transform.
 """
 
 from collections.abc import Sequence
@@ -119,8 +119,8 @@ class LayeredScan:
 class CoarseMaps:
     """Coarse occupancy maps of N places, or of a query at N headings.
 
-    There are four maps for each place or heading: one for low and middle
-    points, and one each for high points, poles and kerbs.
+    There are four maps for each place or heading: one for low and middle points
+    together, and one each for high points, poles and kerbs.
 
     Attributes:
         bits: (N, R, 4) uint64, the R rows of each map. Bit k of a row is set if
@@ -155,8 +155,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
 
     The first three searches compare coarse maps. For each place, they find the
     pose at which the greatest number of cells is filled in both scans. They
-    rank the places by how many standard deviations this number of common cells
-    lies above the number that is expected by chance. The last search improves
+    rank the places by how far this number of common cells exceeds the number
+    that is expected by chance, in standard deviations. The last search improves
     the poses of the top-ranked places by hill climbing on fine maps.
 
     The score is the weighted number of common cells on the fine maps, divided

@@ -78,10 +78,10 @@ def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
 
     Returns:
         (RINGS, SECTORS, CHANNELS) uint8, 0 where there is no point. The first
-        five channels say which bands of height have points; the bands begin at
-        0.35, 1, 2, 4 and 8 m. The other three are the greatest height (0 to 16
-        m), the difference between greatest and lowest height (0 to 0.5 m), and
-        the lowest height (-3 to 3 m).
+        five channels say which bands of height contain points; the bands begin
+        at 0.35, 1, 2, 4 and 8 m. The other three channels are the greatest
+        height (0 to 16 m), the difference between greatest and lowest height (0
+        to 0.5 m), and the lowest height (-3 to 3 m).
     """
     x, y, z = points.T
     ring = np.hypot(x, y) * (RINGS / REACH)

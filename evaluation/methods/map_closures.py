@@ -59,8 +59,8 @@ class MapClosuresDatabase:
 
     Attributes:
         num_places: number of local maps that queries may find.
-        program: object of the package that stores all local maps: those of the
-            places, and those of all queries so far.
+        program: object of the package that stores all local maps: the maps of
+            the places, and the maps of all queries so far.
         num_queries: number of queries so far.
         query: local map of the last query Q.
         found: place P -> number of inliers, and pose X_PQ (4, 4) of the last

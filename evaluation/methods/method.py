@@ -65,9 +65,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     A cloud is (N, 3) float64, finite, in the frame of the LiDAR at the place
     [m]. If the method names `point_fields`, the cloud is a structured array
-    (N,) instead. It contains `x`, `y` and `z` as float64, and these fields with
-    the types that they have in the recording. A cloud is read-only, because all
-    methods of a run share it.
+    (N,) instead. This array contains `x`, `y` and `z` as float64, and the named
+    fields with the types that they have in the recording. A cloud is read-only,
+    because all methods of a run share it.
 
     Attributes:
         name: name of the method on the command line.
@@ -75,8 +75,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         scans_per_place: number of consecutive scans that are merged into the
             described cloud. The cloud is in the frame of the scan that stands
             for the place.
-        point_fields: additional fields of points that the method needs, such as
-            intensity, ring, t or label.
+        point_fields: fields of points that the method needs besides x, y and z,
+            such as intensity, ring, t or label.
         batch_size: number of clouds for one call of `describe_batch`.
         skips_places: whether scores may be NaN (no candidate) even if every
             place is compared (`exhaustive`). If false, such a NaN is an error.
@@ -84,8 +84,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             each pixel is a column of points (see
             `evaluation.clouds.count_images`). Such a method may use the
             horizontal positions of points, and how many points lie above each
-            other, but not what only a scan has, such as planes or angles of
-            beams.
+            other, but nothing that only scans contain, such as planes or angles
+            of beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
         divides: whether a database can be searched part by part, because it is
@@ -177,8 +177,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: descriptor of the query, made by `describe`.
             database: database of D places, made by `build_database`.
-            exhaustive: whether to compare also with places that a search would
-                skip only to save time.
+            exhaustive: whether to also compare places that a search would skip
+                only to save time.
 
         Returns:
             (D,) float64, higher is more similar; NaN for a place that is no
@@ -217,11 +217,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return None
 
     def shortlist(self, query: Descriptor, database: Database) -> np.ndarray:
-        """Returns how well the best entries of a part of a database fit.
+        """Returns how well a query fits the best entries of a database part.
 
-        The entries may be places, or several for each place. Of all parts, the
-        search compares the `num_shortlisted` best ones, see `score_best`. A
-        method that `divides` and has a search must define both `shortlist` and
+        A place may have one entry or several. The search compares the
+        `num_shortlisted` best entries of all parts, see `score_best`. A method
+        that `divides` and has a search must define both `shortlist` and
         `score_best`.
 
         Returns:
@@ -237,7 +237,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: see `score`.
             database: part of a database, made by `build_database`.
-            number: how many entries of `shortlist` to compare, from its first.
+            number: how many entries of `shortlist` to compare, beginning with
+                the first.
         """
         raise NotImplementedError
 
@@ -267,9 +268,10 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def relative_pose(
         self, query: Descriptor, database: Database, place: int
     ) -> np.ndarray | None:
-        """Returns the pose (4, 4) of a query's LiDAR in the frame of a place's.
+        """Returns the pose X_PQ (4, 4) of a query's LiDAR Q at a place.
 
-        The pose is X_PQ; None if the method does not estimate poses.
+        P is the LiDAR at the place. The result is None if the method does not
+        estimate poses.
         """
         if type(self).relative_poses is Method.relative_poses:
             return None
@@ -386,7 +388,7 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 def known_methods() -> tuple[str, ...]:
     """Returns the names of all registered methods.
 
-    Optional methods, which run only on request, are registered when they are
+    An optional method, which runs only on request, is registered when it is
     first made.
 
     Example:

@@ -138,7 +138,7 @@ def extremes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest of values in each cell, both (size,).
 
-    For a cell without values they are inf and -inf.
+    For a cell without values, the results are inf and -inf.
 
     Args:
         values: (N,) values.
@@ -247,7 +247,7 @@ def best_overlaps(
         queries: (H, R, S) uint64 maps of the query, at H headings that divide
             360 deg evenly.
         places: (D, R + 2 * margin, S) uint64 maps of the places, with `margin`
-            empty rows before and after their own.
+            empty rows before and after the R rows of each map.
         weights: (S,) int64 weight of a bit of each map.
         starts: (N, 4) int64 initial poses: number of the place, number of the
             heading, and shifts of the query by rows and by columns.
@@ -258,7 +258,7 @@ def best_overlaps(
         For each initial pose: the greatest overlap, (N,) int64; and the number
         of the heading and the shifts by rows and by columns at which it occurs,
         (N, 3) int64. If several of the `moves` give this overlap, the first one
-        counts. If all of them shift the query by more than `margin` rows, the
+        counts. If all `moves` shift the query by more than `margin` rows, the
         overlap is -1.
     """
     num_headings, num_rows, num_maps = queries.shape
@@ -312,8 +312,8 @@ def climb(
 
     A filled cell of the query overlaps the place if the place has a filled cell
     there, or next to it, in the same layer. The search is hill climbing: it
-    moves to the best of the 26 neighbours of a pose until none is better, then
-    continues with smaller steps.
+    moves to the best of the 26 neighbours of a pose until no neighbour is
+    better than the pose, then continues with smaller steps.
 
     Args:
         cells: (M,) uint16 of the query, see `layer_cells`.

@@ -3,19 +3,19 @@
 A scan becomes two polar images: one of the greatest heights and one of
 occupancy. The sensor's displacement between query and place is modelled by a
 normal distribution. In polar coordinates, this distribution blurs the occupancy
-across the rings, and along the rings, there less so at larger range. The
-blurred occupancy is the probability that a cell has a point.
+across the rings and along the rings; along the rings, the blur decreases with
+range. The blurred occupancy is the probability that a cell has a point.
 
-The heights give the rotation between two scans, and a first similarity: their
-cosine at this rotation. The probabilities are moved towards 1/2 where they are
-uncertain; their symmetric Kullback-Leibler divergence gives a second
-similarity. The score is the product of the two.
+The heights give the rotation between two scans, and a first similarity: the
+cosine of the heights at this rotation. The probabilities are moved towards 1/2
+where they are uncertain; the symmetric Kullback-Leibler divergence of the
+probabilities gives a second similarity. The score is the product of the two.
 
 The code follows the authors' program (github.com/shawrby/PROBE-descriptor,
 BSD-3); on the same scans, scores agree to 1e-6. Deliberate differences:
 
-- All places are compared. The program first takes the 50 nearest ones by the
-  means of the rings, which saves time.
+- All places are compared. To save time, the program compares only the 50 places
+  with the most similar means of the rings.
 - A place without points within range is never a candidate, and a query without
   such points has no candidates.
 - Scans with a narrow field of view get no special treatment.
@@ -72,7 +72,8 @@ class Probe:
         heights: (rings, sectors) greatest height in each cell, scaled to unit
             length over all cells; all NaN without a point within range.
         mu: (rings, sectors) float32 probability that a cell has a point. Scores
-            depend on its precision, which is that of the authors' program.
+            depend on the precision of `mu`, which is that of the authors'
+            program.
     """
 
     heights: np.ndarray

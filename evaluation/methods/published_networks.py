@@ -7,14 +7,14 @@ estimates a pose. The architectures are reimplemented from the papers and the
 authors' programs; no weights are shipped.
 
 Clouds are prepared as in PointNetVLAD's program (Uy and Lee, CVPR 2018), which
-made the networks' training data. Points near the greatest plane are removed.
-The rest is downsampled to 4096 points, centred, and scaled so that the mean
-distance from the centre is 1/2. Points outside of [-1, 1] are replaced by other
-points. As in that program, x points backwards. Deliberate differences:
+made the networks' training data. Points near the largest plane are removed. The
+other points are downsampled to 4096 points, centred, and scaled so that the
+mean distance from the centre is 1/2. Points outside of [-1, 1] are replaced by
+other points. As in that program, x points backwards. Deliberate differences:
 
 - A place is one scan of a spinning LiDAR, not 20 m of a planar scanner.
 - Random draws have a fixed seed.
-- A cloud with fewer points than 4096 repeats some.
+- A cloud with fewer than 4096 points repeats some points.
 """
 
 import abc
@@ -369,7 +369,7 @@ def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
     """Returns indices of points that are far apart from each other.
 
     This is farthest point sampling. The first index is 0. Each further index is
-    the point whose distance to the nearest point chosen so far is greatest.
+    that of the point that is farthest from all points chosen so far.
 
     Args:
         points: (N, 3) points [m].

@@ -2,10 +2,10 @@
 
 A scan becomes a bird's-eye map with six channels that describe the shape of the
 cloud. In the Radon transform of this map, a rotation of the scan is a shift of
-rows; the magnitude of each row's spectrum does not change if the scan is moved.
-Two scans are similar if these spectra correlate well at some shift of the rows.
-This shift is also the difference in heading. Once the heading is known, the
-correlation of the bird's-eye maps gives the translation.
+rows; the magnitude of each row's spectrum does not change if the LiDAR is
+moved. Two scans are similar if these spectra correlate well at some shift of
+the rows. This shift is also the difference in heading. Once the heading is
+known, the correlation of the bird's-eye maps gives the translation.
 """
 
 from __future__ import annotations
@@ -394,15 +394,15 @@ def _signed(shift: int, n: int) -> int:
 
 
 def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
-    """Returns the k nearest neighbours of every point, itself included.
+    """Returns the k nearest neighbours of each point, including the point.
 
     Args:
         points: (N, 3) finite float64.
         k: number of neighbours, from 1 to N.
 
     Returns:
-        (N, k) indices in no particular order. The choice among equally far
-        points is not defined, but constant for a cloud.
+        (N, k) indices in no particular order. Which of several equally far
+        points are chosen is not defined, but is always the same for a cloud.
     """
     found, _ = small_gicp.KdTree(points).batch_knn_search(points, k)
     return found.astype(np.int64)
@@ -413,11 +413,11 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
     The numbers are a selection of the hand-made features of LPD-Net (Liu et
     al., ICCV 2019). Let l1 >= l2 >= l3 be the eigenvalues of the covariance of
-    a point's neighbours, s their sum, and m1 >= m2 the eigenvalues of its
-    horizontal part. The features are change of curvature l3 / s; omnivariance
-    (l1 l2 l3)^(1/3) / s; entropy of the eigenvalues, -sum (li / s) ln (li / s);
-    horizontal roundness m2 / m1 (which LPD-Net calls linearity); range and
-    variance of z.
+    a point's neighbours, s their sum, and m1 >= m2 the eigenvalues of the
+    covariance's horizontal part. The features are change of curvature l3 / s;
+    omnivariance (l1 l2 l3)^(1/3) / s; entropy of the eigenvalues, -sum (li / s)
+    ln (li / s); horizontal roundness m2 / m1 (which LPD-Net calls linearity);
+    range and variance of z.
 
     If the neighbours lie in a plane or on a line, the limits of the formulas
     are used (0 ln 0 = 0, and 0 / 0 = 0 for a vertical line).
@@ -505,13 +505,13 @@ def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Returns the integrals of an image along parallel rays.
 
-    With u the column and v the row of a pixel, counted from the centre of the
-    image, the ray s of angle t is u cos t - v sin t = s, where s counts pixels
-    from the centre, too. The axes and the values are those of torch-radon
+    Let u be the column and v the row of a pixel, counted from the centre of the
+    image. The ray s of angle t is u cos t - v sin t = s, where s also counts
+    pixels from the centre. The axes and the values are those of torch-radon
     (Ronchetti 2020). A ray within 45 degrees of the vertical samples the image
     once in each row, any other ray once in each column. Each sample
-    interpolates between the two nearest pixels; outside the image it is zero.
-    The sum of the samples is multiplied by the distance between samples.
+    interpolates between the two nearest pixels; a sample outside the image is
+    zero. The sum of the samples is multiplied by the distance between samples.
 
     A pixel at distance d from a ray contributes hat(d / w) / w with w =
     max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).

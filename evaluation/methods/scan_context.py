@@ -248,10 +248,10 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     ) -> np.ndarray | None:
         """Returns a rough pose X_PQ (4, 4) of a query in the frame of a place.
 
-        Polar contexts give the heading; the lateral offset is zero, or that of
-        the augmented copy that fits best. Cartesian contexts give the lateral
-        offset; the heading is zero, or 180 deg if the augmented copy fits best.
-        The result is None if no column is filled in both contexts.
+        Polar contexts give the heading; the lateral offset is zero, or the
+        offset of the augmented copy that fits best. Cartesian contexts give the
+        lateral offset; the heading is zero, or 180 deg if the augmented copy
+        fits best. The result is None if no column is filled in both contexts.
         """
         chosen = np.flatnonzero(database.places == place)
         similarities, shifts = self._compare(query, database, chosen)

@@ -2,9 +2,9 @@
 
 A file of `torch.save` is an archive with a pickle and the numbers of each
 tensor. An unpickler can run any code, and can fill the memory when it reads a
-small pickle. This reader runs the instructions of a pickle itself: each makes
-at most one small object, nothing is called, and numbers are read only for the
-tensors that are wanted.
+small pickle. This reader runs the instructions of a pickle itself: each
+instruction makes at most one small object, nothing is called, and numbers are
+read only for the tensors that are wanted.
 """
 
 from collections.abc import Iterator, Mapping
@@ -218,10 +218,11 @@ def read_weights(
 ) -> dict[str, np.ndarray]:
     """Returns name -> tensor (float32) of a network's weights.
 
-    Numbers of other types are converted. The dictionary of tensors may lie in
-    others, and all of its names may begin with the same words, such as
-    `module.`, which `DataParallel` adds. If several dictionaries have the
-    wanted names, the first is read, and a note on stderr names it.
+    Numbers of other types are converted. The dictionary of tensors may lie
+    inside other dictionaries, and all names in it may begin with the same
+    words, such as `module.`, which `DataParallel` adds. If several dictionaries
+    have the wanted names, the first dictionary is read, and a note on stderr
+    names it.
 
     Args:
         path: file that `torch.save` wrote (PyTorch 1.6 or later), with a state

@@ -137,7 +137,8 @@ class Trend:
 
     Attributes:
         rho: Spearman's rank correlation; NaN if AUC or TCR_sym is constant.
-        p_value: its two-sided p-value under the hypothesis of no correlation.
+        p_value: two-sided p-value of `rho` under the hypothesis of no
+            correlation.
         slope: change of AUC per 0.1 of TCR_sym, by the least-squares line.
         spread: greatest minus least AUC.
         num_pairs: number of pairs of drives.
@@ -159,8 +160,8 @@ def findings(
 ) -> list[Finding]:
     """Returns a verdict on each of the paper's findings that can be tested.
 
-    A finding can be tested if `results` and `changes` contain the data that it
-    is about. Only results on the paper's maps, with its methods and its
+    A finding can be tested if `results` and `changes` contain the data on this
+    finding. Only results on the paper's maps, with its methods and its
     protocol, count. If a method has several results on a pair, the first one
     counts, as in the report's tables.
     """

@@ -1,4 +1,4 @@
-"""Public real scans, measured as a study measures simulated ones.
+"""Public real scans, measured as a study measures simulated scans.
 
 `data_sets` opens the scans, `measuring` measures methods on them, and `judge`
 trains a classifier to distinguish real from simulated scans.

@@ -54,7 +54,7 @@ class DataSet(NamedTuple):
             `evaluation.clouds.cloud_files.read_cloud` knows.
         whole: whether the scans contain all points that the LiDAR measured.
         columns: number of columns of its `.bin` files; in files with another
-            digest, it is found from the values.
+            digest, the number is found from the values.
     """
 
     folder: str
@@ -210,8 +210,8 @@ class RealScans(NamedTuple):
 def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """Returns the drives of the data sets in a folder.
 
-    Notes name the data sets that are missing, those whose digest is wrong, and
-    unknown folders.
+    Notes name missing data sets, data sets with a wrong digest, and unknown
+    folders.
 
     Raises:
         InputError: there is no data set, or one cannot be read.
@@ -298,7 +298,7 @@ def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
 def simulated_drives(
     folder: Path, unit: str, on_note: OnNote
 ) -> list[NamedDrive]:
-    """Returns the drives in a folder whose LiDAR is like a real one.
+    """Returns the drives in a folder whose LiDAR is like a given real LiDAR.
 
     Args:
         folder: folder of simulated drives.

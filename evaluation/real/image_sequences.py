@@ -4,8 +4,8 @@ A sequence is a folder with images `imgs/*.png` and a table `pose.txt`, or with
 two such folders, `places` and `queries`. Each image becomes a cloud (see
 `evaluation.clouds.count_images`), so that methods read the sequence like any
 other drive. The table has the upper 3 x 4 part of the LiDAR's pose in each row.
-Only the position on the ground and the heading count, because nothing else
-shows in an image from above. `write_images` makes such a folder of any drive.
+Only the position on the ground and the heading count, because an image from
+above shows nothing else. `write_images` makes such a folder of any drive.
 """
 
 from collections.abc import Iterator, Sequence
@@ -117,21 +117,21 @@ def open_sequences(
 
     For the sequences on which BEVPlace was evaluated, the frames of places and
     queries are those of that evaluation. In any other sequence, the first half
-    are places and the second half queries, unless the sequence has a folder for
-    each. Queries without a match are left out, as in the evaluation of
-    BEVPlace.
+    of the images are places and the second half queries, unless the sequence
+    has one folder for places and one for queries. Queries without a match are
+    left out, as in the evaluation of BEVPlace.
 
     Args:
         folder: folder with a folder for each sequence; it need not exist.
         on_note: is called with notes on what is left out.
-        queries: number of queries of a sequence, chosen evenly among those with
-            a match. The places are then one random match of each query. By
-            default, all queries and all places.
+        queries: number of queries of a sequence, chosen evenly among the
+            queries with a match. The places are then one random match of each
+            query. By default, all queries and all places.
 
     Raises:
         InputError: there is a folder but no sequence in it, or a sequence has
-            no images, other images than square ones of 8 bits, no poses, or
-            another number of them.
+            no images, an image that is not square or not of 8 bits, or not
+            exactly one pose for each image.
     """
     return [
         found
@@ -161,8 +161,8 @@ def open_images(folder: Path) -> list[NamedDrive]:
 def write_images(drive: Drive, folder: Path, on_note: OnNote) -> None:
     """Writes an image of each scan of a drive, and a table of the poses.
 
-    The motion of the LiDAR during a scan is taken out. A file appears under its
-    final name only when all are complete.
+    The motion of the LiDAR during a scan is taken out. The files appear under
+    their final names only when all files are complete.
 
     Args:
         drive: the drive.

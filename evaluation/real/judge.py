@@ -3,12 +3,12 @@
 Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
 features. Boosted trees are then trained to distinguish the patches of the two
 sets; a place is never in both training and test data. A place consists of the
-scans less than 30 m from its first scan, even of several passes or drives, or
-of all scans in a folder without poses. The AUC of the classifier is 1 if it
-classifies all patches correctly, and 0.5 for guessing. As a control, the
-classifier distinguishes the first half of the simulated places from the second
-half. All AUCs are means over random samples of patches; single samples differ
-by up to 0.04.
+scans less than 30 m from its first scan, even if they come from several passes
+or drives. In a folder without poses, all scans are one place. The AUC of the
+classifier is 1 if it classifies all patches correctly, and 0.5 for guessing. As
+a control, the classifier distinguishes the first half of the simulated places
+from the second half. All AUCs are means over random samples of patches; single
+samples differ by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
 recordings, or from files that store one ring after the other, like KITTI's. If
@@ -157,8 +157,8 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
 
     Args:
         patch: (M, 5) the piece, see `scan_table`.
-        rng: random generator, by which the points are chosen whose
-            neighbourhoods are described.
+        rng: random generator, which chooses the points whose neighbourhoods are
+            described.
     """
     p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
     tree = cKDTree(p)
@@ -374,7 +374,7 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
 
     The AUC is the mean of a cross-validation in up to three folds. All patches
     of a place are in the same fold. The result is NaN if all real patches, or
-    all simulated ones, are from one place.
+    all simulated patches, are from one place.
 
     Args:
         real: features and places of real patches.
@@ -413,8 +413,8 @@ def aucs_by_group(real: Features, simulated: Features) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
     The result contains the AUC of the classifier for each group of features,
-    and that of a control: the same classifier on two halves of the simulated
-    scans.
+    and the AUC of a control, which is the same classifier on two halves of the
+    simulated scans.
     """
     names = common_names([real, simulated])
     groups = {"all": names}

@@ -92,8 +92,8 @@ def measure_real(
         output: folder of the results.
         cluster: runs the jobs.
         names: names of methods and estimators, or Python files with your own;
-            if empty, all shipped ones. A file of an estimator defines a
-            function `localise`.
+            if empty, all shipped methods and estimators. A file of an estimator
+            defines a function `localise`.
         settings: `METHOD.NAME=VALUE` each, for methods of place recognition.
         simulated: folder of simulated recordings. Their scans are added as
             places, and a classifier tries to distinguish them from the real

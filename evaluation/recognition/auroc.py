@@ -8,8 +8,9 @@ import numpy as np
 def auroc(scores: np.ndarray, is_positive: np.ndarray) -> float:
     """Returns the area under the receiver operating characteristic.
 
-    It is the probability that a positive has a higher score than a negative;
-    equal scores count half. It is NaN if all or none are positive.
+    The area is the probability that a positive has a higher score than a
+    negative; equal scores count half. The result is NaN if all items or no
+    items are positive.
 
     Args:
         scores: (N,) scores; NaN is the lowest.

@@ -94,8 +94,8 @@ def measure_cost(
 
     Args:
         method: method to measure.
-        clouds: clouds to describe, two or more; the time for the first one does
-            not count.
+        clouds: two or more clouds to describe; the time for the first cloud
+            does not count.
         scans_per_place: number of scans that are merged into each cloud.
         search: cost of searching a database.
     """
@@ -119,8 +119,8 @@ def query_ms(
 
     A query is compared with all places, including the method's second stage if
     it has one. The time does not include geometric verification and the pose of
-    the top-ranked place, because not every method has them, and their time does
-    not depend on the number of places. The first query does not count.
+    the top-ranked place, because not every method has a pose, and the time for
+    it does not depend on the number of places. The first query does not count.
 
     Args:
         method: method to measure.

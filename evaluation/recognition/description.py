@@ -44,8 +44,8 @@ class DescribedScans:
         blocks: (K,) block of the route in which each place or query lies, see
             `evaluation.recognition.metrics.route_blocks`; None if the route is
             unknown.
-        drive_of: (K,) number of the drive of each place, if they are of several
-            drives; None for one drive.
+        drive_of: (K,) number of the drive of each place, if the places are of
+            several drives; None for one drive.
     """
 
     frames: np.ndarray

@@ -58,9 +58,9 @@ class PairEvidence:
             the query and its right place are aligned: the share of the query's
             points or the share of the place's points, whichever is less. NaN if
             `fits` is NaN for every method.
-        fits: method -> (Q,) the same share for the query and its wrong
-            top-ranked place; NaN if the top-ranked place is right, or at most
-            twice the protocol's radius away.
+        fits: method -> (Q,) the same share as `right_fits`, but for the query
+            and its wrong top-ranked place; NaN if the top-ranked place is
+            right, or at most twice the protocol's radius away.
         unchanged: (Q,) `overlaps` of the control, which is the same comparison
             without a change of the city; None without a control.
     """
@@ -109,8 +109,8 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
         applies:
 
         - `occluded`: the right place's scan shows less than half of the query's
-          scan, and at least half of the rest is occluded for the right place's
-          sensor.
+          scan, and at least half of the other points are occluded for the right
+          place's sensor.
         - `no_overlap`: the right place's scan shows less than half of the
           query's scan, for another reason.
         - `changed`: at least a quarter of the surroundings is new or gone.

@@ -73,7 +73,8 @@ class PlaceOutcome:
         place_frames: (D,) frame of each place in its drive.
         best_places: (Q, K) int32, the top-ranked places of each query, best
             first; -1 where there are fewer candidates.
-        best_scores: (Q, K) their scores; NaN where there are fewer.
+        best_scores: (Q, K) scores of these places; NaN where there are fewer
+            candidates.
         matches: (M, 2) int32, each pair of a query and a place that is a true
             match.
         nearest: (Q,) distance of each query to the nearest place that is

@@ -35,8 +35,8 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 class RetrievalProtocol:
     """The protocol of place recognition: how two drives are compared.
 
-    The defaults are those of the paper, with queries as recorded. The only
-    difference is which of the merged scans determines the pose of a place.
+    The defaults are those of the paper, with queries as recorded, except for
+    `place`: which of the merged scans determines the pose of a place.
 
     Attributes:
         radius: greatest distance between a query and its match, in three
@@ -159,7 +159,7 @@ class RetrievalProtocol:
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.
 
-        These poses differ from the recorded ones if the protocol gives queries
+        These poses differ from the recorded poses if the protocol gives queries
         a random yaw or a tilt.
 
         Args:
@@ -177,9 +177,9 @@ class RetrievalProtocol:
     def name(self) -> str:
         """Name of the protocol: `fair`, `paper`, `recorded` or `own`.
 
-        If any field that changes a number differs from the shipped protocol,
-        such as the radius or a spacing, the name is `own`. Geometric
-        verification does not count, because tables have a column for it.
+        The name is `own` if any field that changes a number, such as the radius
+        or a spacing, differs from the shipped protocol. Geometric verification
+        does not count, because tables have a column for it.
         """
         return self._named(lambda one: one)
 

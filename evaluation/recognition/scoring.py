@@ -60,12 +60,12 @@ def gated(
     """Returns scores after geometric verification: (D,) for each radius.
 
     Geometric verification tests the `NUM_GATED` places with the best scores.
-    The method estimates the distance of each from the query, and `gate_weight`
-    returns a weight w from 1 (near) to 0 (far). If w is 0, the place is
-    rejected: its score becomes NaN. Otherwise the score s becomes s - (1 - w)
-    |s|; a positive score is thus multiplied by w. A place for which the method
-    estimates no pose keeps its score. Scores of places that are not tested
-    become NaN.
+    The method estimates the distance of each of these places from the query,
+    and `gate_weight` returns a weight w from 1 (near) to 0 (far). If w is 0,
+    the place is rejected: its score becomes NaN. Otherwise the score s becomes
+    s - (1 - w) |s|; a positive score is thus multiplied by w. A place for which
+    the method estimates no pose keeps its score. Scores of places that are not
+    tested become NaN.
 
     If the method estimates no pose at all, all scores stay the same.
 
@@ -167,13 +167,13 @@ def score_places(
         query_cloud: cloud of the current query, for a second stage.
         database: the result of `build_database` for the places.
         place_clouds: clouds of the D places, for a second stage.
-        is_known: (D,) bool, which places may be candidates. If this excludes a
-            place, the query is compared with every place, because a search for
-            a few top-ranked places might return only excluded ones.
+        is_known: (D,) bool, which places may be candidates. If a place is
+            excluded, the query is compared with every place, because a search
+            for a few top-ranked places might return only excluded places.
         gate_radius: radius of geometric verification [m] (see `gated`); None
             for none.
-        exhaustive: whether to compare also with places that a search would skip
-            only to save time.
+        exhaustive: whether to also compare places that a search would skip only
+            to save time.
         where: the name of the current query, for errors.
 
     Raises:

@@ -18,7 +18,7 @@ from evaluation.recognition.stored_places import StoredDescriptors
 
 
 class Search:
-    """A method's search in a database, one group of its places after another.
+    """A method's search in a database, one group of places after another.
 
     If the descriptors are a list, or the method does not divide databases,
     there is one group. Results equal the results of one search in the whole

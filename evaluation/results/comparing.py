@@ -209,10 +209,10 @@ def compare(
             or, in a table without this protocol, the table's only protocol.
             Rows whose protocols differ in anything that changes a number (see
             `RetrievalProtocol.digest`) are never compared.
-        gate: whether to compare the rows with geometric verification (true) or
-            those without (false).
+        gate: whether to compare the rows that were measured with geometric
+            verification (true) or without (false).
         rankings: whether to compare only the order of the methods in these
-            tables, without the shipped ones. The tables need no condition in
+            tables, without the shipped tables. The tables need no condition in
             common; one can contain simulated drives and another real drives.
 
     Raises:
@@ -306,7 +306,7 @@ def compare(
 
 
 def suggest_comparison(folder: Path) -> None:
-    """Prints the command that compares a folder's results with shipped ones.
+    """Prints the command that compares a folder's results with those shipped.
 
     Nothing is printed if that command would refuse the results, such as those
     of an experiment for which no results are shipped.

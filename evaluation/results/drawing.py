@@ -63,7 +63,7 @@ def escape_dollars(text: str) -> str:
 
 
 def name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
-    """Writes the names of a panel's lines right of it, at the lines' ends.
+    """Writes the names of lines at their ends, to the right of the panel.
 
     Names that would overlap are moved apart, as little as possible. Lines
     without a label get no name.

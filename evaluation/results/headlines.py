@@ -74,7 +74,7 @@ def survival(rows: Sequence[Row]) -> str:
 
     A method survives if it retains at least 90 % of its AUC strict, by the
     lower limit of the 95 % t interval of `ranking`, whose units are cities.
-    Fewer than four cities do not show it.
+    Fewer than four cities do not show whether a method survives.
 
     Args:
         rows: rows of the metric `kept_strict`, of changed conditions.
@@ -132,7 +132,7 @@ def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
 
     Args:
         rows: rows of the metric `auc`.
-        queries: the answers behind them.
+        queries: the answers from which the rows were computed.
 
     Returns:
         A clause; empty if there is one method, or the answers are unknown.

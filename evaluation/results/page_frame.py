@@ -19,11 +19,11 @@ class PageSection(NamedTuple):
     """A section of a page.
 
     Attributes:
-        name: its identifier, to which links lead.
-        word: its name among the links at the top.
-        body: its contents as HTML.
-        is_open: whether it is shown from the start. Otherwise, it unfolds when
-            its name is clicked.
+        name: identifier of the section, to which links lead.
+        word: name of the section among the links at the top.
+        body: contents of the section as HTML.
+        is_open: whether the section is shown from the start. Otherwise, the
+            section unfolds when a reader clicks its name.
     """
 
     name: str
@@ -50,11 +50,11 @@ def framed_page(
         title: title of the window.
         heading: heading of the page.
         intro: paragraphs below the heading, as HTML.
-        sections: its sections, in order.
-        made_by: what made the page, for its end.
-        notes: sentences on how it was made, for its end.
+        sections: sections of the page, in order.
+        made_by: what made the page, for the end of the page.
+        notes: sentences on how the page was made, for the end of the page.
         style: further style sheet.
-        scripts: further scripts. Each uses only those before it.
+        scripts: further scripts. A script uses only the scripts before it.
         data: values for these scripts, as JSON in an element with the id
             `data`.
     """

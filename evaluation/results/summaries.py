@@ -114,13 +114,14 @@ class Summary(NamedTuple):
     Attributes:
         what: name of the number.
         map: name of the map.
-        task: the task from whose results it is computed.
+        task: the task from whose results the number is computed.
         method: name of the method, with its settings.
         gate: whether geometric verification was used, which rejects places by
             the method's own pose estimate.
-        value: the number.
-        low, high: limits of its interval or range; NaN if unknown.
-        n: number of conditions from which it is computed; None if unknown.
+        value: the number. low, high: limits of the number's interval or range;
+        NaN if unknown.
+        n: number of conditions from which the number is computed; None if
+            unknown.
     """
 
     what: str
@@ -359,8 +360,8 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
     Rows of the same experiment, map and method, all with or all without
     geometric verification, form a curve of the metric. For each two
     neighbouring points of a curve, there is a summary whose value is an
-    exponent: 1 if the metric grows in proportion between them, 2 if it grows
-    with the square.
+    exponent: 1 if the metric grows in proportion to `over` between these
+    points, 2 if the metric grows with the square of `over`.
 
     Args:
         results: the table of results.
@@ -388,10 +389,11 @@ def correlations(
 ) -> list[Summary]:
     """Returns how well a factor or metric predicts where each method fails.
 
-    For each method, the value is Spearman's rank correlation of `x` with
-    1 - `metric`, over the conditions in which `x` and `metric` are known. Its
-    interval is by bootstrap over these conditions. Methods with fewer than
-    five such conditions are left out, since so few points show no trend.
+    For each method, the value is Spearman's rank correlation of `x` with 1 -
+    `metric`, over the conditions in which `x` and `metric` are known. The
+    interval of this correlation is by bootstrap over these conditions. Methods
+    with fewer than five such conditions are left out, since so few points show
+    no trend.
 
     Args:
         results: the table of results. Its rows must be either all measured with
@@ -474,15 +476,16 @@ def ranking(
     Only conditions count that were measured with all methods. The intervals of
     the means are t intervals. Their independent units are maps if there are
     several maps, and conditions otherwise. Intervals are limited to the
-    metric's range, and unknown for two or three units, which say next to
-    nothing. The bootstrap samples contain the same units for all methods and
-    for all tables of the same maps; tables of other maps are sampled
-    independently. For a single condition, the intervals are those in the rows.
+    metric's range. With two or three units, intervals are unknown, because they
+    would say next to nothing. The bootstrap samples contain the same units for
+    all methods and for all tables of the same maps; tables of other maps are
+    sampled independently. For a single condition, the intervals are those in
+    the rows.
 
     Args:
         rows: rows of one metric.
-        least_first: whether a smaller value is better, so that the least comes
-            first.
+        least_first: whether a smaller value is better, so that the least value
+            comes first.
 
     Returns:
         The M methods, the best first; and (B, M) the mean of each method in
@@ -533,7 +536,7 @@ def ranking(
 
 
 def worths(results: Results, metric: str) -> list[Summary]:
-    """Returns what each change detector is worth that updates a map.
+    """Returns the worth of each change detector that updates a map.
 
     The worth is 0 if the metric is the same as in a map that is never updated,
     1 if the metric is the same as in a map that is updated by exact labels, and
@@ -596,8 +599,8 @@ def summarised(
 
     Args:
         results: all results of the experiment.
-        queries: answers to single queries, for `excesses`; None to leave these
-            numbers out.
+        queries: answers to single queries, for `excesses`; None to leave out
+            `excesses`.
         charts: the charts as in the file of the experiment.
     """
     found = []

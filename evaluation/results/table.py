@@ -169,9 +169,9 @@ class Key:
         conditions that differ only in the columns left out.
 
         Args:
-            names: names of the columns to leave out. With `method`, its
-                settings, such as `methods.ring++.crop`, are left out as well.
-                With `protocol` or one of its fields, such as
+            names: names of the columns to leave out. With `method`, settings of
+                methods, such as `methods.ring++.crop`, are left out as well.
+                With `protocol` or a field of the protocol, such as
                 `protocol.radius`, name and digest of the protocol are left out.
                 The version is never part of the key.
 
@@ -224,9 +224,9 @@ class Row(Key):
     """A number that was measured.
 
     Attributes:
-        metric: its name.
-        value: the number; NaN if it is undefined.
-        low, high: its 95 % interval; NaN if unknown.
+        metric: name of the metric.
+        value: the number; NaN if it is undefined. low, high: limits of the
+        number's 95 % interval; NaN if unknown.
         n: number of queries, structures or points that count; None if unknown.
     """
 

@@ -263,7 +263,8 @@ def keyed(
 ) -> Columns[_Item]:
     """Returns similar columns for `Table.of`, such as one for each method.
 
-    All cells come from one function. Each column passes its own key to it.
+    All cells come from one function. Each column passes its own key to this
+    function.
 
     Args:
         keys: name of a column -> its key, such as the name of a method.

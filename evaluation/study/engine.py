@@ -83,7 +83,7 @@ class Engine:
                 databases in this order.
             make_jobs: class of the jobs, which says how drives are read.
             tasks: names of the tasks that measure these comparisons; by default
-                all.
+                all tasks.
         """
         planned = make_jobs(
             StudyFiles(self.output),

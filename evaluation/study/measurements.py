@@ -231,7 +231,7 @@ def measure_places(
         num_distractors: number of places of these drives that are added to the
             database.
         methods: the methods.
-        protocol: the protocol of the comparison; its own radius does not
+        protocol: the protocol of the comparison; its field `radius` does not
             matter.
         radii: radii of a match [m].
         truth: (Q, D) overlap of each query with each place, if the protocol
@@ -403,8 +403,8 @@ def with_distractors(
     """Returns a database to which places of other drives are added.
 
     The drives through other cities are moved so far away that none of their
-    places is a match. Their first `num_others` places are appended, or all if
-    there are fewer.
+    places is a match. The first `num_others` places of these drives are
+    appended, or all places if there are fewer.
 
     Args:
         database: a drive, with a method's descriptors of its places, or the

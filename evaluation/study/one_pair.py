@@ -151,8 +151,8 @@ def pair_of(
 
     Args:
         database, query: the drives.
-        names: their names in tables.
-        protocol: the protocol that was asked for.
+        names: names of the drives in tables.
+        protocol: the protocol that the user requested.
         settings: name -> value of settings outside of the protocol that change
             a number.
         more: further fields of the pair.

@@ -2,8 +2,8 @@
 
 A part is the file of one intermediate result. It begins with a line that names
 its format and a line of JSON with its inputs. The result follows (see
-`encode`), compressed by zstd at its fastest level. Compression halves maps. For
-50 MB of spectra, which hardly shrink, it takes a tenth of a second.
+`encode`), compressed by zstd at its fastest level. Compression halves maps.
+Spectra hardly shrink; compressing 50 MB of them takes a tenth of a second.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -556,7 +556,7 @@ class FeatureFiles:
     def remove_descriptors(self) -> None:
         """Removes all descriptors, once results were made from them.
 
-        They take three quarters of the space; see `Part.remove_value`.
+        Descriptors take three quarters of the space; see `Part.remove_value`.
 
         Raises:
             InputError: a file cannot be written.

@@ -117,7 +117,7 @@ def recorded_comparisons(
 def chosen_sessions(
     city: MapDrives, names: Sequence[str], where: str
 ) -> tuple[RecordingInfo, ...]:
-    """Returns the recordings of a database of several, from older to newer.
+    """Returns the recordings of a database, from older to newer.
 
     Args:
         city: all recordings of the map; the query is the recording of the last

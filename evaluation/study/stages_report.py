@@ -67,13 +67,15 @@ _SEED = 1
 class StagesReport:
     """A report on recordings, which need not exist yet.
 
-    It is the experiment `stages` on these recordings: its engine measures all
-    pairs of drives, and writes `results.csv` and `queries.csv`. The page, the
-    figures and the wide tables are made from the same files.
+    The report is the experiment `stages` on these recordings: the experiment's
+    engine measures all pairs of drives, and writes `results.csv` and
+    `queries.csv`. The page, the figures and the wide tables are made from the
+    same files.
 
     A recording can serve as a control: its drive goes through one stage of a
-    map, on the route of the drive through another stage. Its comparison with
-    the usual drive through the same stage shows the effect of the route alone.
+    map, on the route of the drive through another stage. Comparing the control
+    with the usual drive through the same stage shows the effect of the route
+    only.
 
     Attributes:
         recordings: the recordings. A recording that does not exist yet is made

@@ -50,7 +50,8 @@ class LocaliseTask(Task):
     """Measures how well scans are aligned to a map from wrong initial poses.
 
     With the setting `odometry_drift`, drives are tracked instead of single
-    scans. The setting `estimator` contains settings of all its methods.
+    scans. The setting `estimator` contains settings of all registration
+    methods.
     """
 
     name = "localise"
@@ -217,11 +218,11 @@ def measure_localisation(
         processes: number of processes, where the system can fork.
 
     Returns:
-        An array for each pair of a method and an entry of `starts`: first those
-        of the first method, in the order of `starts`. Each array contains one
-        record of `evaluation.localisation.localise.QUERY` per query, or one of
-        `TRACKED` per tracked scan. If no query is near the map, the list is
-        empty.
+        An array for each pair of a method and an entry of `starts`. The arrays
+        of the first method come first, in the order of `starts`. Each array
+        contains one record of `evaluation.localisation.localise.QUERY` per
+        query, or one record of `TRACKED` per tracked scan. If no query is near
+        the map, the list is empty.
     """
     mapped = database()
     asked = query()

@@ -38,7 +38,8 @@ class MapScores(NamedTuple):
     Attributes:
         scores: name of a score -> its value, see
             `evaluation.map_update.scores.score`.
-        gone, new: number of points with this exact label.
+        gone, new: numbers of points whose exact label is gone, and whose exact
+        label is new.
         labels: the detector's labels of both maps.
     """
 
@@ -112,8 +113,8 @@ def score_methods(
         maps: folder with the maps of two drives and their exact labels.
         methods: names of change detectors. The name `TRUTH` scores the exact
             labels themselves.
-        given: files with labels of the older and of the newer map. If they are
-            given, they are scored under the name `GIVEN`.
+        given: files with labels of the older and of the newer map. These labels
+            are scored under the name `GIVEN`.
 
     Returns:
         Method -> its scores.

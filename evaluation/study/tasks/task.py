@@ -56,7 +56,8 @@ class NamedDrive:
         needs: names of the jobs that record the drive; empty if it is recorded
             already, or is simulated while it is read.
         length: about how long the drive is [m], to estimate costs.
-        num_scans: number of its scans, if known: no more are described.
+        num_scans: number of the drive's scans, if known; at most this number of
+            scans is described.
     """
 
     name: str
@@ -103,7 +104,7 @@ class Pair:
     Attributes:
         map_name: name of the map.
         names: names of the database drive and of the query drive in tables. All
-            conditions of the same two drives share them.
+            conditions of the same two drives have the same names.
         factors: name -> value of each factor of the condition.
         seed: seed of everything that is random.
         is_baseline: whether other conditions are compared with this one.
@@ -185,7 +186,7 @@ class Pair:
     def is_composed(self) -> bool:
         """Whether the database differs from the places of a single drive.
 
-        This is so if it has places of several drives, or only some places of
+        A composed database has places of several drives, or only some places of
         one drive.
         """
         return bool(self.beside) or self.keep != KEEP_ALL
@@ -216,7 +217,7 @@ class Jobs:
             match that are used for this pair [m].
         processes: number of processes that a task may use by itself.
         shows_overlaps: whether results contain the share of each query's scan
-            that its best match shows. To compute it takes time.
+            that its best match shows. Computing this share takes time.
         leaves_out_slow: whether methods that would take more than an hour for a
             pair are left out.
     """
