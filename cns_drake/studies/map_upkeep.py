@@ -1,6 +1,7 @@
 """Maps of simulated drives that are updated after each drive."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import shutil
 import tempfile
@@ -65,32 +66,46 @@ def update_maps(
         sources: sources of the drives, from older to newer.
         maintain: name of a change detector; or `TRUTH`, for exact labels.
     """
-    labelled: list[LabelledDrive] = []
-    frames: list[np.ndarray] = []
-
-    def detect(pair: Pair, number: int) -> Labels:
-        if maintain != TRUTH:
-            return run_baseline(maintain, pair)
-        before, taken = labelled[-1], frames[-1]
-        gone = label_points(pair.A, before, taken)
-        far = nearest(pair.B.points, pair.A.points, _KNOWN_WITHIN)
-        new = np.where(np.isinf(far), Label.NEW, Label.KEPT)
-        return Labels(gone, new.astype(np.uint8))
-
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        kept = UpkeptMap(folder / "A", detect)
+        kept = UpkeptMap(folder / "A")
         for source in sources:
             if maintain == TRUTH:
-                labelled[:] = [labelled_drive(source)]
-                drive = labelled[0].drive
+                labelled = labelled_drive(source)
+                session, frames = write_session(
+                    labelled.drive, folder / "B", _SPACING
+                )
+                stands = _on_still_surfaces(session.points, labelled)
+                detect = partial(_exact_labels, drive=labelled, frames=frames)
             else:
-                drive = source()
-            session, taken = write_session(drive, folder / "B", _SPACING)
-            frames[:] = [taken]
-            stands = np.ones(len(session.points), bool)
-            if maintain == TRUTH and not labelled[0].scenario.traffic.is_off:
-                stands = is_there(session.points, labelled[0].still())
-            kept.add(session, stands)
+                session, _ = write_session(source(), folder / "B", _SPACING)
+                stands = np.ones(len(session.points), bool)
+                detect = partial(run_baseline, maintain)
+            kept.add(session, stands, detect)
             shutil.rmtree(folder / "B")
     return kept.finish()
+
+
+def _on_still_surfaces(
+    points: np.ndarray, labelled: LabelledDrive
+) -> np.ndarray:
+    """Returns which points (N, 3) of a drive are not on traffic, (N,) bool."""
+    if labelled.scenario.traffic.is_off:
+        return np.ones(len(points), bool)
+    return is_there(points, labelled.still())
+
+
+def _exact_labels(
+    pair: Pair, *, drive: LabelledDrive, frames: np.ndarray
+) -> Labels:
+    """Returns the exact labels of the map so far and of the next drive's map.
+
+    Args:
+        pair: the two maps.
+        drive: the next drive.
+        frames: (K,) frames of the drive that are scans of its map.
+    """
+    gone = label_points(pair.A, drive, frames)
+    far = nearest(pair.B.points, pair.A.points, _KNOWN_WITHIN)
+    new = np.where(np.isinf(far), Label.NEW, Label.KEPT)
+    return Labels(gone, new.astype(np.uint8))

@@ -43,9 +43,9 @@ _CUBE = 0.4
 # far apart [rad].
 _BEAMS_APART = np.deg2rad(0.35)
 
-# A function that takes the pair of the map so far and the next drive's map, and
-# the number of this drive. It returns labels of both maps.
-Detect = Callable[[Pair, int], Labels]
+# A change detector: labels the points of the map so far and of the next drive's
+# map.
+Detect = Callable[[Pair], Labels]
 
 
 @dataclass(frozen=True)
@@ -75,22 +75,20 @@ class Updates:
 class UpkeptMap:
     """A map that is updated drive by drive."""
 
-    def __init__(self, folder: Path, detect: Detect):
+    def __init__(self, folder: Path):
         """Starts without a map.
 
         Args:
             folder: folder for the scans of all drives so far; it must be empty.
-            detect: change detector.
         """
         self._folder = folder
-        self._detect = detect
         self._map: Session | None = None
         self._drive_of = np.zeros(0, np.int16)
         self._is_added = np.zeros(0, bool)
         self._gone: list[np.ndarray] = []
         self._number = 0
 
-    def add(self, session: Session, stands: np.ndarray) -> None:
+    def add(self, session: Session, stands: np.ndarray, detect: Detect) -> None:
         """Updates the map by the next drive.
 
         Args:
@@ -98,6 +96,8 @@ class UpkeptMap:
                 are moved to the folder of the map.
             stands: (N,) bool, points that may join the map. The others are on
                 moving objects.
+            detect: compares the map with the drive; not called for the first
+                drive, which has no map to compare with.
         """
         self._gone.append(session.points[~stands])
         session = replace(
@@ -111,7 +111,7 @@ class UpkeptMap:
             self._is_added = np.zeros(len(session.points), bool)
             points, X_WS = session.points, session.X_WS
         else:
-            labels = self._detect(Pair(self._map, session), self._number)
+            labels = detect(Pair(self._map, session))
             stays = labels.A != Label.GONE
             old = self._map.points
             self._gone.append(old[~stays])

@@ -47,10 +47,10 @@ def keeper(tmp_path):
     """Updates a map by drives with given points; returns the updates."""
 
     def update(drives, labels):
-        kept = UpkeptMap(tmp_path / "A", lambda pair, number: labels(pair))
+        kept = UpkeptMap(tmp_path / "A")
         for number, points in enumerate(drives):
             session, _ = write_session(OneScan(points), tmp_path / f"B{number}")
-            kept.add(session, np.ones(len(session.points), bool))
+            kept.add(session, np.ones(len(session.points), bool), labels)
         return kept.finish()
 
     return update
