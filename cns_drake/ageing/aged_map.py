@@ -88,14 +88,14 @@ def age_map(
     Args:
         source: the folder of the map; its last stage is today.
         years: ascending years relative to today, from -200 to 200. Negative
-            years are before today; they need the buildings' years of
-            construction (column `built` of `structures.csv`).
+            years lie before today, and are possible only if the column `built`
+            of `structures.csv` contains the buildings' years of construction.
         seed: the seed of all random numbers, not negative.
         rates: event -> rate per year, see `cns_drake.ageing.rates.read_rates`.
         output: the folder to write, which must not exist yet.
-        finish: called with the folder and the result when all other work is
-            done, to add files of your own. The folder gets its final name
-            afterwards.
+        finish: function that can add files of your own. It is called with the
+            folder and the result when all other work is done, before the folder
+            gets its final name.
 
     Returns:
         The stages and the events.

@@ -1,4 +1,4 @@
-"""The history of a city: what happens to it, year after year.
+"""The history of a city: which events happen, year after year.
 
 The city in a year follows from the city in the year before. Each object has its
 own random numbers for each year and event, so that a simulation of more years

@@ -44,8 +44,8 @@ class OldWorld:
         rows: name of a structure -> its row in this table.
         things: name of a structure -> the structure in W.
         visuals: name of a structure -> SDF texts of its visuals.
-        built: name of a structure -> year of construction, if it is in the
-            table.
+        built: name of a structure -> year of construction, for structures whose
+            year is in the table.
         today: calendar year of the stage; None if the table has no years.
     """
 

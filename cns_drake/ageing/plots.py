@@ -490,7 +490,7 @@ def _widened(part: Part, middle: np.ndarray, share: float) -> Part:
 def horizontal_section(triangles: np.ndarray, z: float) -> np.ndarray:
     """Returns where triangles cut a horizontal plane: segments (N, 2, 2) [m].
 
-    Each row of a segment is x and y of one of its ends.
+    Each row of a segment contains x and y of an end of the segment.
 
     Args:
         triangles: (M, 3, 3) triangles [m].

@@ -84,8 +84,8 @@ def check_years(years: Iterable[int]) -> tuple[int, ...]:
     """Checks the years of an aged map, relative to today, and returns them.
 
     Raises:
-        InputError: the years do not ascend, or one is more than 200 years from
-            today.
+        InputError: the years do not ascend, or a year is more than 200 years
+            from today.
     """
     found = tuple(years)
     text = " ".join(map(str, found))
@@ -124,8 +124,8 @@ class Tally:
             share: probability of the event in this trial.
             hit: whether the event happened.
             things: number of objects that this trial adds to `exposure`, the
-                number of objects to which the event can happen. Use 0 if an
-                earlier trial has added these objects.
+                number of objects at risk. Use 0 if an earlier trial has already
+                added these objects.
         """
         self.expected[event] += share
         self.exposure[event] += things

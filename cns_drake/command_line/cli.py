@@ -1,7 +1,7 @@
 """The command `cns-drake`: its commands, each with an example.
 
-Each command imports its slow modules itself, so that `--help` and `list` answer
-at once. Interrupts wait during imports.
+Each command imports the slow modules that it needs only when it runs, so that
+`--help` and `list` answer at once. Interrupts wait during imports.
 """
 
 from collections.abc import Callable

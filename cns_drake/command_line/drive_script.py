@@ -48,14 +48,14 @@ def run_drive(
         lidar: preset that replaces the LiDARs of the scenario.
         returns: `ideal` or `calibrated`, the model of the LiDARs' returns; by
             default as the scenario says.
-        weather: weather; by default that of the scenario.
+        weather: weather; by default the weather of the scenario.
         traffic: number of vehicles, and also of pedestrians; by default as the
             scenario says.
         transient: switch -> value in the section `transient`; by default as the
             scenario says.
         driver: `real` for a driver who wanders and changes lanes, or `none` for
-            one who stays in the middle of the lane; by default as the scenario
-            says.
+            a driver who stays in the middle of the lane; by default as the
+            scenario says.
         ride: class of the road surface after ISO 8608, `A` to `E`, or `none`
             for a car that stays steady; by default as the scenario says.
         imu_rate: samples of the IMU per second; by default as the scenario

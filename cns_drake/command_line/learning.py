@@ -60,7 +60,7 @@ def train(
             drives. returns: weather, and the losses and errors of a real LiDAR.
             driver: the car wanders in its lane and changes lanes. May be
             repeated.
-        drawn_streets: Generate random streets as well, instead of using the
+        drawn_streets: Generate cities along random streets instead of the
             streets of the shipped maps. The shipped maps can then serve as a
             test, because the training has never seen their streets.
         graded: Train with exact overlaps, so that a place ranks higher if it

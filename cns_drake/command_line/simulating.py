@@ -72,7 +72,7 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     experiment makes to `<output>/cities`.
 
     Args:
-        vary: name of a shipped experiment, or the file of one.
+        vary: name of a shipped experiment, or an experiment file.
         output: folder of the recordings.
         cluster: runs the jobs that make cities.
 
@@ -109,7 +109,8 @@ def choose_returns(
     """Returns the model of LiDAR returns and the weather, from options.
 
     Args:
-        returns: the option --returns; None if it is not given.
+        returns: the option --returns; None if the user has not given the
+            option.
         fog: visibility in fog [m]; None for no fog.
         rain: rain rate [mm/h].
         snowfall: snowfall rate, as melted water [mm/h].

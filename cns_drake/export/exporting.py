@@ -1,9 +1,9 @@
 """Exports one recording into a folder of drives.
 
-The folder can contain several drives of one format. In it, the file
-`export.yaml` lists the exported files and shows that the folder was written by
-an export. The subfolder of a drive is written under a name ending in `.part`,
-and gets its final name when it is complete.
+The folder can contain several drives of one format. The file `export.yaml` in
+this folder lists the exported files, and shows that an export wrote the folder.
+The subfolder of a drive is written under a name ending in `.part`, and gets its
+final name when it is complete.
 """
 
 from collections.abc import Callable, Iterator
@@ -46,15 +46,15 @@ def export_drive(
     Args:
         recording: path of the recording.
         format_name: name of the format: `cns`, `kitti`, `mulran` or `tum`.
-        output: the folder of drives: a new or empty folder, or one to which
-            this function has already written drives of the same format.
+        output: the folder of drives: a new or empty folder, or a folder to
+            which this function has already written drives of the same format.
         lidar: name of the LiDAR to export, if the recording has several.
         absent_in: another stage of the recording's map. Points on structures
             that are absent in this other stage get SemanticKITTI's labels of
             moving objects (see `cns_drake.export.marked_drive.MarkedDrive`).
             None keeps the recorded labels.
         sequence: number of the drive in KITTI's layout; by default the digits
-            at the end of its name.
+            at the end of the drive's name.
         on_note: called with notes about how the recording was read and written.
 
     Raises:

@@ -37,7 +37,7 @@ _PROJECTION = np.eye(4)
 
 @dataclass(frozen=True)
 class Layout:
-    """The files that one export format has for a drive.
+    """The files that an export in one format contains for a drive.
 
     All attributes except the last two are functions that take the drive. Paths
     are relative to the folder that holds all exported drives, unless stated
@@ -53,7 +53,7 @@ class Layout:
             scan. It returns the files of the scan: path in the drive's folder
             -> content. None for formats without scans.
         shared_outer_files: whether the outer files belong to all drives
-            together, for which they must be the same.
+            together, and must therefore be the same for all drives.
         has_labels: whether points have labels.
     """
 
@@ -102,8 +102,8 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
 def imu_files(drive: McapDrive) -> dict[str, str]:
     """Returns the file `imu.yaml`, the IMU's noise in Kalibr's format.
 
-    The result maps the file name to its text. It is empty if the recording does
-    not contain the noise.
+    The result maps the file name to its text. The result is empty if the
+    recording does not contain the noise.
     """
     return {} if drive.kalibr is None else {"imu.yaml": drive.kalibr}
 
@@ -111,8 +111,8 @@ def imu_files(drive: McapDrive) -> dict[str, str]:
 def structure_files(drive: McapDrive) -> dict[str, str]:
     """Returns the file `structures.json`, the table of structures.
 
-    The result maps the file name to its text. It is empty if the recording
-    contains no such table.
+    The result maps the file name to its text. The result is empty if the
+    recording contains no such table.
     """
     if drive.instances is None:
         return {}
@@ -123,8 +123,8 @@ def structure_files(drive: McapDrive) -> dict[str, str]:
 def unit_quaternions(drive: McapDrive) -> np.ndarray:
     """Returns the orientations of a drive's M odometry messages, (M, 4).
 
-    They are unit quaternions x, y, z, w of R_WB. Quaternions in the recording
-    may have any length.
+    The result contains unit quaternions x, y, z, w of R_WB. Quaternions in the
+    recording may have any length.
 
     Raises:
         InputError: if a quaternion has no direction, or a position is not
@@ -161,7 +161,7 @@ def stamped_rows(
     Numbers are written with all digits.
 
     Args:
-        stamps: the N times, as they are to be written.
+        stamps: the N times, as texts to write.
         columns: arrays (N, k) of numbers, whose columns are put side by side.
         separator: text between two values of a row.
     """

@@ -18,7 +18,7 @@ from cns_drake.scene.world import load_world, structures_in
 
 
 class MarkedDrive(McapDrive):
-    """A recording whose points are marked if absent in another stage.
+    """A recording that marks points on structures absent in another stage.
 
     A structure is absent if the world of the other stage contains no part of
     it. A building that is only lower in the other stage is not absent. Points

@@ -107,7 +107,7 @@ class Fleet(Section):
     Each drive has a route that is sampled at random, one of the viewpoints
     `near`, `lane` and `reversed`, and trees with or without leaves. The random
     choices for a car in a year do not depend on the numbers of cars and of
-    years, so a larger fleet contains the drives of a smaller one.
+    years, so a larger fleet contains the drives of a smaller fleet.
 
     Attributes:
         cars: number of drives per year.
@@ -152,8 +152,8 @@ class Compared:
     """The drives of the database and the query drive of one condition.
 
     Attributes:
-        database: the drive of the database; if there are several, the oldest
-            one.
+        database: the drive of the database; the oldest drive if there are
+            several.
         query: the drive of the queries.
         protocol: protocol of the queries.
         distractors: number of places of other cities that are added to the
@@ -164,10 +164,10 @@ class Compared:
         beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
             `evaluation.recognition.keeping.kept_places`.
-        maintain: what updates the maps of older drives by newer ones, see
+        maintain: what updates the maps of older drives by newer drives, see
             `evaluation.map_update.upkeep`.
         ages: the years by which the city has aged at the time of each of
-            `drives`; empty if it does not age.
+            `drives`; empty if the city does not age.
         lengths: approximate length of each of `drives` [m].
     """
 
@@ -808,8 +808,8 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
     """Returns a copy of a drive that goes through another stage of the map.
 
     Route and driver stay the same. The copy and the usual drive of the other
-    stage go through the same city, so a comparison of these two shows only the
-    effect of the route.
+    stage go through the same city, so a comparison of these two drives shows
+    only the effect of the route.
 
     Args:
         drive: the drive.
@@ -892,8 +892,8 @@ def with_lidars_moved(
     Args:
         drive: the drive.
         ahead: how far the LiDARs are moved forwards [m].
-        left: how far they are moved to the left [m].
-        heading_deg: angle by which they are rotated to the left [deg].
+        left: how far the LiDARs are moved to the left [m].
+        heading_deg: angle by which the LiDARs are rotated to the left [deg].
     """
     lidars = {}
     for name, config in drive.lidars.items():
@@ -929,12 +929,12 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
 
 
 def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
-    """Returns a hash of all drives and of the cities that they lead through.
+    """Returns a hash of all drives and of the cities along these drives.
 
     Args:
         compared: the drives.
-        worlds: cache, world file -> digest of the files of its world. The
-            digests of the worlds of these drives are added in place.
+        worlds: cache, world file -> digest of the files of its world. This
+            function adds the digests of the worlds of these drives.
 
     Raises:
         InputError: a file of a world cannot be read.

@@ -4,10 +4,10 @@ For simulated drives, rays cast in the world decide which points of a query's
 scan the place's sensor sees (see `evaluation.recognition.overlap_truth`). A
 point is seen if
 
-- it is within the ranges of the LiDAR and of the protocol,
+- the point is within the ranges of the LiDAR and of the protocol,
 - the place's beams cover its direction,
-- nothing occludes it, and a surface lies within `TOLERANCE` of it on the line
-  of sight.
+- nothing occludes the point, and a surface lies within `TOLERANCE` of the point
+  on the line of sight.
 
 The place's sensor sees the world of its own drive, with the stage and the
 traffic of this drive.
@@ -76,8 +76,8 @@ class Sight:
 def sights_of(drive: SimulatedDrive) -> Callable[[int], Sight]:
     """Returns a function that returns the `Sight` at a frame of a drive.
 
-    Its argument is the number of the frame. A `Sight` is valid until the next
-    call of the function.
+    The argument of the returned function is the number of the frame. A `Sight`
+    is valid until the next call of the function.
 
     Args:
         drive: the drive.
@@ -140,7 +140,7 @@ def exact_overlaps(
     """Returns the exact overlap of Q queries with D places, (Q, D).
 
     The overlap is the share of a query's points that the LiDAR at the place
-    sees. It is NaN for a query without points.
+    sees. The overlap is NaN for a query without points.
 
     Args:
         database: the drive of the places, in whose world rays are cast.

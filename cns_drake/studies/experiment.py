@@ -1,9 +1,8 @@
 """Experiments: what differs between two drives, and what is measured.
 
-An experiment is a YAML file. It names maps, fields of the drive that makes the
-database and of the drive that queries it, and the tasks to measure. A field
-with a list of values is a factor; the conditions of the experiment are the
-product of all factors.
+An experiment is a YAML file. The file names maps, fields of the database drive
+and of the query drive, and the tasks to measure. A field with a list of values
+is a factor; the conditions of the experiment are the product of all factors.
 """
 
 from __future__ import annotations
@@ -124,7 +123,7 @@ _LONG_FORMS = {"tasks": _by_name, "methods": _by_name, "protocol": _base}
 
 
 class MadeMap(Section):
-    """A map that an experiment makes: an aged city or an imported one.
+    """A map that an experiment makes: an aged city or an imported city.
 
     Attributes:
         name: name of the new map.
@@ -282,8 +281,8 @@ class Experiment(Section):
         """Numbers of the frozen redraws on which the experiment runs.
 
         A redraw of a map has other buildings along the same streets. The
-        numbers of the frozen ones come from the field `both.redraw.frozen`;
-        without it, the list is empty.
+        numbers of the frozen redraws come from the field `both.redraw.frozen`;
+        without this field, the list is empty.
         """
         redraw = self.both.get("redraw")
         found: Any = []
@@ -307,7 +306,7 @@ class Experiment(Section):
 def named_programs(fields: Any) -> list[str]:
     """Returns the Python files that fields of an experiment name.
 
-    A study that measures them runs these files.
+    A study with these fields runs the files.
 
     Args:
         fields: a value of any fields, such as `tasks` or `methods`, nested to
@@ -731,7 +730,7 @@ def num_levels(experiment: Experiment) -> dict[str, int]:
 
     Raises:
         ValueError: a case has the name of the condition without a change, or
-            combines what is no case.
+            combines something that is not a case.
     """
     found = {}
     for name in experiment.cases:

@@ -118,8 +118,8 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    First call `want_age` and `want_redrawn` for all maps; `make` then makes
-    them together. In this way, a city that is aged by several numbers of years
+    First call `want_age` and `want_redrawn` for all maps; `make` then makes all
+    maps together. In this way, a city that is aged by several numbers of years
     becomes one map with a stage for each number.
     """
 
@@ -244,7 +244,7 @@ class MadeMaps:
 def made_map_step(
     made: MadeMap, experiment: Experiment, folder: Path, shipped: Mapping
 ) -> MakeMap:
-    """Returns the job step that makes a map which an experiment describes.
+    """Returns the job step that makes a map described by an experiment.
 
     Args:
         made: description of the map.
@@ -291,18 +291,18 @@ def distracting_drives(
     cluster: Cluster,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> list[Scenario]:
-    """Returns drives through other cities than the query's.
+    """Returns drives through cities other than the query's city.
 
-    Their places make recognition harder if they are added to a database. The
-    drives come in this order, until they have about the wanted number of
+    Adding the places of these drives to a database makes recognition harder.
+    The drives come in this order, until they have about the wanted number of
     places: the shipped drives of other maps, each through its own stage; if the
     query's map is shipped, drives along its streets between other buildings;
     the drives of other maps through their other stages; and drives along the
     streets of other maps, between other buildings.
 
     Args:
-        query: the query drive. The returned drives have its LiDARs, and do not
-            go through its city.
+        query: the query drive. The returned drives have the LiDARs of the query
+            drive, and do not go through its city.
         number: approximate number of places.
         spacing: distance between two places [m].
         output: folder for the newly generated cities, with other buildings.

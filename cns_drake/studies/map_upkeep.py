@@ -36,7 +36,7 @@ class UpkeptSource:
 
     Attributes:
         sources: sources of all drives of the map, from older to newer.
-        number: number of the drive among them.
+        number: number of the drive among `sources`.
         maintain: what updates the map, see `update_maps`.
         updates: file with the result of `update_maps`.
     """

@@ -73,8 +73,8 @@ class ExportOptions:
             OverlapNet and its like.
         spacing: distance between two clouds, along the path [m].
         scans: number of consecutive scans that are merged into a cloud.
-        max_range: greatest distance of a point along x, y or z [m]; farther
-            points are left out.
+        max_range: largest absolute x, y and z of a point [m]; points beyond
+            this limit are left out.
     """
 
     format: Format = "pointnetvlad"

@@ -43,7 +43,7 @@ def record_all(
     """Records scenarios as `<output>/<name>/`.
 
     A finished recording of the same scenario and world is kept; an interrupted
-    one is continued.
+    recording is continued.
 
     Args:
         scenarios: the scenarios to record.
@@ -201,10 +201,10 @@ class Record(Step):
 
 
 def is_recorded(scenario: Scenario, folder: Path) -> bool:
-    """Returns whether a finished recording of exactly this scenario exists.
+    """Returns whether a finished recording of this exact scenario exists.
 
     The result is false if the world, the roads or the program have changed
-    since it was recorded.
+    since the recording was made.
 
     Args:
         scenario: the scenario.

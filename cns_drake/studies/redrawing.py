@@ -5,10 +5,10 @@ plants, cars and furniture are therefore sampled anew. Each such city is a map
 folder.
 
 Frozen redraws are redraws of the shipped maps that were not used to develop any
-method. They also have the map's stages, and its drives with realistic drivers.
-Some are rotated as a whole, so that their streets are not parallel to the axes
-of the world. `worlds/redraws.csv` contains the seeds and rotations, which were
-chosen at random before any method ran.
+method. Frozen redraws also have the map's stages, and the map's drives with
+realistic drivers. Some frozen redraws are rotated as a whole, so that their
+streets are not parallel to the axes of the world. `worlds/redraws.csv` contains
+the seeds and rotations, which were chosen at random before any method ran.
 """
 
 import abc
@@ -204,12 +204,13 @@ class RedrawCity(MakeMap):
         """Writes further input files, such as `stages.yaml`; by default none.
 
         Override this function for files that contain names of structures,
-        because these names are not known earlier. To find them, call
+        because these names are not known earlier. To find the names, call
         `cns_drake.city.generation.city_structures.make_city` with `draft`.
 
         Args:
-            draft: folder of the map, before it gets its final name. It already
-                contains the files of `inputs`, but not the generated city.
+            draft: folder of the map, before it gets its final name. The folder
+                already contains the files of `inputs`, but not the generated
+                city.
         """
 
     def sources(self) -> dict[str, object]:
@@ -276,8 +277,8 @@ class FrozenRedraw:
     Attributes:
         map_name: name of the shipped map.
         number: number of the redraw, from 1.
-        seed: seed of its city.
-        turn_deg: angle by which its city is rotated about the world's origin
+        seed: seed of the redraw's city.
+        turn_deg: angle by which the city is rotated about the world's origin
             [deg].
     """
 
@@ -314,8 +315,8 @@ def redraw_frozen(
     buildings, plants and objects.
 
     Args:
-        maps: names of shipped maps; all of them if empty.
-        numbers: numbers of the redraws; all of them if empty.
+        maps: names of shipped maps; all shipped maps if empty.
+        numbers: numbers of the redraws; all redraws if empty.
         output: folder for the maps, which are named `<map>_f<number>`.
         cluster: runs the jobs.
         source: file of the experiment, for errors.
@@ -364,8 +365,8 @@ class RedrawFrozen(RedrawCity):
         """Returns the new city's input files, without `stages.yaml`.
 
         The result maps file names to contents. The scenarios of the map's
-        drives are included; in them, a realistic driver replaces the original
-        one.
+        drives are included; in these scenarios, a realistic driver replaces the
+        original driver.
         """
         source = MapFolder(self.map_folder)
         texts = redrawn_inputs(self.map_folder, self.stage, self.seed)

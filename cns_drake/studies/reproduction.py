@@ -155,10 +155,10 @@ def _drives(folder: Path) -> list[Scenario]:
 def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's drives.
 
-    The last drive is the one in the last stage. Each other drive has a control
-    drive, which follows the same route, but through the last stage. The control
-    drive and the last drive see the same city, so a comparison of these two
-    shows the effect of the route alone.
+    The last drive is the drive in the last stage. Each other drive has a
+    control drive, which follows the same route, but through the last stage. The
+    control drive and the last drive see the same city, so a comparison of these
+    two drives shows only the effect of the route.
     """
     last = max(drives, key=lambda drive: natural_key(drive.stage or ""))
     return [

@@ -87,9 +87,10 @@ def noticed_changes(
 ) -> Noticed:
     """Returns which changes between the first drive and the query are noticed.
 
-    If a structure appeared, the first drive that gets returns from it notices
-    it. If a structure disappeared, the first later drive notices it that would
-    have got returns from it in the city of the first drive.
+    If a structure appeared, the change is noticed by the first drive that gets
+    returns from the structure. If a structure disappeared, the change is
+    noticed by the first later drive that would have got returns from the
+    structure in the city of the first drive.
 
     Args:
         drives: year and sighting of each drive, from older to newer.
@@ -250,8 +251,9 @@ def changes_until(
         query: the query, in the aged city.
 
     Returns:
-        Structure -> the first year in which it appears; structure -> the first
-        year in which it disappears. Both are empty without a history.
+        Structure -> the first year in which the structure appears; structure ->
+        the first year in which the structure disappears. Both mappings are
+        empty without a history.
 
     Raises:
         InputError: the history cannot be read.

@@ -98,7 +98,8 @@ class TrainingScans:
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
         overlaps: (N, N) share of each scan that is visible from the place of
-            each other scan. None if distances determine which places are right.
+            each other scan. None if the distance determines which places are
+            right.
     """
 
     images: np.ndarray
@@ -334,7 +335,7 @@ def features(parameters: Parameters, images: Any) -> Any:
 def scores(queries: Any, places: Any) -> Any:
     """Returns the similarity of Q queries and P places, (Q, P), as a JAX array.
 
-    It is the correlation of their feature maps at the best heading.
+    The similarity is the correlation of two feature maps at the best heading.
 
     Args:
         queries: (Q, TURNS, FEATURES) feature maps, see `features`.
@@ -365,8 +366,8 @@ def train(
         scans: images of the scans, and which scans show the same place.
         steps: number of batches.
         seed: seed of all random numbers.
-        state: file with the state of the training. If it exists, the training
-            continues from there.
+        state: file with the state of the training. If the file exists, the
+            training continues from this state.
         digest: digest of the scans.
         on_step: is called with the number of each step and the weights.
 

@@ -1,9 +1,8 @@
 """Drives for training: cities, stages and effects, all sampled at random.
 
 A city has the streets of a map, or streets sampled at random. All other
-structures are sampled anew, and so are two earlier stages. Several drives
-follow the same route and differ as real visits do: in stage, effects, LiDAR and
-driver.
+structures, and two earlier stages, are sampled anew. Several drives follow the
+same route and differ as real visits do: in stage, effects, LiDAR and driver.
 """
 
 from collections.abc import Sequence
@@ -195,8 +194,8 @@ def scan_city(
     Args:
         reporter: reports progress.
         drawn: the random city.
-        folder: folder to which the map of the city is written; it is removed at
-            the end.
+        folder: folder to which the map of the city is written; the folder is
+            removed at the end.
 
     Returns:
         `images` (N, RINGS, SECTORS, CHANNELS) uint8 polar images of the scans,
@@ -338,7 +337,7 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     The last stage is the whole city. In earlier stages, whole buildings are
     missing, and with each building the objects that stand, grow or park nearest
     to it. Some trees are missing as well, and a few buildings and trees are
-    lower.
+    lower than in the last stage.
 
     Args:
         city: the city.

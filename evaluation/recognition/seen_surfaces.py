@@ -5,9 +5,9 @@ direction, one in each quadrant, determine where the surface lies in that
 direction: in the plane of the three nearest returns or, at edges and at grazing
 incidence, between the ranges of the nearest and the farthest return.
 
-Compared with rays cast in the simulated world, shares of shown points are wrong
-by some hundredths for scans taken up to 30 m apart, and by more beyond
-(docs/notes/fitting.md).
+A comparison with rays cast in the simulated world shows that shares of shown
+points are wrong by some hundredths for scans up to 30 m apart, and by more for
+scans farther apart (docs/notes/fitting.md).
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ _UNKNOWN, _SHOWN, _BEHIND = range(3)
 
 
 class Shares(NamedTuple):
-    """Shares of points that a scan shows and occludes; NaN without points.
+    """The shares of points that a scan shows, and that a scan occludes.
 
-    A point can be neither shown nor occluded, for example in front of all
-    surfaces.
+    The shares are NaN without points. A point can be neither shown nor
+    occluded, for example in front of all surfaces.
 
     Attributes:
         shown: share of points on surfaces that the scan shows.
@@ -138,9 +138,10 @@ class SeenSurfaces:
         - Three or more returns with similar ranges: the distance is
           perpendicular to a plane through three of these returns.
         - Fewer returns, or returns from two surfaces at an edge: the distance
-          is along the line of sight. For a point nearer than all these returns,
-          it is measured to the nearest return; for a point farther than all
-          returns, to the farthest. For a point between returns, it is NaN.
+          is along the line of sight. If the point is nearer than all these
+          returns, the distance is measured to the nearest return; if the point
+          is farther, to the farthest return. For a point between the returns,
+          the distance is NaN.
         - No return: the result is infinite.
 
         Args:

@@ -21,17 +21,17 @@ def along_the_way(
 ) -> np.ndarray:
     """Returns scores (Q, D) that are averaged along the path.
 
-    The new score of query q and place p is the mean of their own score and of
-    one score of each earlier query. Let d be the distance from an earlier query
-    to q. If both drives go in the same direction, the earlier query contributes
-    its score for the place at the distance d before p; if the drives go in
-    opposite directions, its score for the place at the distance d after p. The
-    new score is the better of these two means. Distances are along the paths.
+    The new score of query q and place p is the mean of the score of q for p and
+    of one score of each earlier query. Let d be the distance from an earlier
+    query to q. If both drives go in the same direction, the earlier query
+    contributes its score for the place at the distance d before p; if the
+    drives go in opposite directions, the earlier query contributes its score
+    for the place at the distance d after p. The new score is the better of the
+    means for the two directions. Distances are along the paths.
 
     An earlier query is left out of the mean if it has no candidates, or if the
-    database's path ends within the distance d from p. If an earlier query has
-    candidates, but no score for the place in question, it contributes its least
-    score.
+    database's path ends within the distance d from p. An earlier query that has
+    candidates, but no score for that place, contributes its least score.
 
     Args:
         scores: (Q, D) scores of single queries; NaN for places that are no

@@ -16,8 +16,8 @@ MOST_BYTES = 400_000_000
 class StoredDrives:
     """Described drives that are read again whenever they are needed.
 
-    Successive drives form a group. Only the drives of one group are in memory,
-    so reading drive by drive, in order, reads each only once.
+    Successive drives form a group. Only the drives of one group are in memory.
+    Each drive is read only once if you use the drives in order.
 
     Attributes:
         group_of: (N,) non-decreasing, the group of each drive.
@@ -70,7 +70,7 @@ class StoredDrives:
         Args:
             places: D places of these drives without descriptors.
             drive_of: (D,) number of the drive of each place, non-decreasing.
-            rows: (D,) number of each place among those of its drive.
+            rows: (D,) number of each place among the places of its drive.
         """
         stored = StoredDescriptors(self, drive_of, rows)
         if len(stored.groups) > 1:
@@ -101,7 +101,7 @@ class StoredDescriptors(Sequence[Any]):
         Args:
             drives: the drives.
             drive_of: (D,) number of the drive of each place, non-decreasing.
-            rows: (D,) number of each place among those of its drive.
+            rows: (D,) number of each place among the places of its drive.
         """
         self._drives = drives
         self._drive_of = drive_of

@@ -99,8 +99,9 @@ def _draw_curve(
 def draw_track(rows: np.ndarray, stem: Path) -> None:
     """Draws the results of a tracked drive over its length, and saves them.
 
-    The figure shows the position error, with the limits of right and of lost
-    poses, and the share of each scan's points that the map lacks.
+    The figure shows the position error, with the limits beyond which a pose is
+    wrong or the track is lost, and the share of each scan's points that the map
+    lacks.
 
     Args:
         rows: records of `evaluation.localisation.tracking.TRACKED`.

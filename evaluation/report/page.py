@@ -102,7 +102,8 @@ class Report:
         recognitions: place recognition of all pairs without their controls, and
             of drives compared with themselves.
         sessions: place recognition in databases of several drives through one
-            stage, each database beside that of the first of its drives.
+            stage, each next to the database that contains only the first of
+            these drives.
         differences: AUC differences between methods.
         evidence: (database, query) -> evidence on why the best-scoring place
             of a query is wrong.

@@ -49,7 +49,7 @@ class Illustration:
             that the page does not show.
         num_panels: number of panels side by side; a phone shows one at a time.
         legend: the colours (red, green, blue), each with its meaning. The page
-            shows them below the figure.
+            shows these colours below the figure.
     """
 
     stem: Path
@@ -66,8 +66,8 @@ class CameraImages:
 
     Attributes:
         stamps_ns: (K,) time stamps of the LiDAR frames [ns].
-        times_ns: (M,) times of the images, increasing [ns]. An image can be
-            the nearest one for several frames.
+        times_ns: (M,) times of the images, increasing [ns]. An image can be the
+            nearest image for several frames.
         files: the M images as JPEG.
     """
 
@@ -76,7 +76,7 @@ class CameraImages:
     files: list[bytes]
 
     def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and which one each frame shows.
+        """Returns every `step`-th image, and which image each frame shows.
 
         Returns:
             A mapping for JSON. `files` contains the images as base64 text. Two
@@ -108,7 +108,8 @@ class PageDrive:
         thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
         view: the map from above, as a WebP file.
         extent: left, right, bottom and top of the view [m].
-        images: images of the drive's camera at the frames, if it has one.
+        images: images of the drive's camera at the frames, if the drive has a
+            camera.
     """
 
     name: str
@@ -133,11 +134,12 @@ def make_drive(
 
     Args:
         name: name of the drive.
-        view: picture of its stage from above.
+        view: picture of the drive's stage from above.
         X_WS: (N, 4, 4) poses of the LiDAR at all frames.
         frames: numbers of the K frames that are places or queries.
         thumbnails: K reduced scans, one for each of these frames.
-        images: images of the drive's camera at these frames, if it has one.
+        images: images of the drive's camera at these frames, if the drive has a
+            camera.
     """
     positions = X_WS[:, :3, 3]
     stream = io.BytesIO()
@@ -205,16 +207,17 @@ def browser_data(
 ) -> dict:
     """Returns the data of the query browser, ready for JSON.
 
-    Top views of the maps are not included: the browser uses those in the
-    pictures that `evaluation.report.page.route_picture` makes.
+    Top views of the maps are not included: the browser uses the top views in
+    the pictures that `evaluation.report.page.route_picture` makes.
 
     Args:
         recognitions: results of methods on pairs of drives.
         drives: name of a drive -> its data for the page.
         changes: map, database and query -> change between the drives.
-        pages: name of a drive -> its web page; some may be absent.
-        evidence: names of database and query -> why queries went wrong; some
-            may be absent.
+        pages: name of a drive -> the web page of the drive. Drives can be
+            absent.
+        evidence: names of database and query -> why queries failed. Pairs can
+            be absent.
     """
     used = {
         name

@@ -32,7 +32,7 @@ class Finding:
 
     Attributes:
         claim: the claim in words.
-        verdict: whether it is confirmed, in a word or two.
+        verdict: whether the claim is confirmed, in a word or two.
         evidence: the numbers behind the verdict, in words.
         table: table or figure of the publication that makes the claim; may be
             empty.
@@ -65,23 +65,22 @@ class Reference:
 
     Attributes:
         title: the source's name in the report.
-        counting: in words, for which methods the source counted all queries,
-            and for which only those with a match; used only if there are
-            published results.
+        counting: sentence that says for which methods the source counted all
+            queries, and for which methods only queries with a match; used only
+            if there are published results.
         changes: (map, earlier stage, later stage) -> TCR_sym.
         further: (label, stages, TCR_sym) of pairs for which the source states
-            the change alone, and no results of place recognition.
+            only the change, and no results of place recognition.
         recognitions: (map, database, query, method, mode) -> numbers. The mode
             says which queries the source counted, see
-            `PlaceRecognitionMetrics`; it is the same for all results of a
-            method.
-        protocols: method -> protocol by which the source ran it, including the
-            number of scans per place.
+            `PlaceRecognitionMetrics`; all results of a method have the same
+            mode.
+        protocols: method -> protocol by which the source ran the method,
+            including the number of scans per place.
         judge: function that returns verdicts on all claims that a report's
-            numbers can test. It takes two lists. The first contains the results
-            on pairs of drives: those by the report's own protocol, followed by
-            those by the source's protocol. The second contains the changes
-            between stages.
+            numbers can test. The function takes two lists: the results on pairs
+            of drives, first by the report's own protocol and then by the
+            source's protocol; and the changes between stages.
     """
 
     title: str = ""
@@ -137,8 +136,8 @@ class Reference:
     def mode(self, method: str) -> Mode:
         """Returns which queries count in the published numbers of a method.
 
-        The mode is `all`, or `filtered` for only the queries with a match. It
-        is `all` for a method without published numbers.
+        The mode is `all`, or `filtered` for only the queries with a match. For
+        a method without published numbers, the mode is `all`.
         """
         modes = (key[4] for key in self.recognitions if key[3] == method)
         return next(modes, "all")

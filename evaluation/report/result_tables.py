@@ -1,7 +1,7 @@
 """The tables of a report: change, recognition, faults, poses, costs, queries.
 
-Functions named `..._table` return tables for print; those named `..._numbers`
-return tables with all digits, for files.
+Functions named `..._table` return tables for print; functions named
+`..._numbers` return tables with all digits, for files.
 """
 
 from __future__ import annotations
@@ -188,8 +188,9 @@ def recognition_table(
 ) -> Table:
     """Returns the table of place recognition, like Table II of the paper.
 
-    It has a row for each pair of drives, and the columns AUC, strict AUC and
-    R@1 for each method. If `mode` is None, each method also has a column F1.
+    The table has a row for each pair of drives, and the columns AUC, strict AUC
+    and R@1 for each method. If `mode` is None, each method also has a column
+    F1.
 
     Args:
         results: results of one protocol.
@@ -286,7 +287,8 @@ def audit_table(
 ) -> Table:
     """Returns a table of all metrics with the counts from which they follow.
 
-    It has a row for each result and mode (all queries, or those with a match).
+    The table has a row for each result and mode (all queries, or only queries
+    with a match).
 
     Args:
         results: results of methods on pairs of drives.
@@ -353,7 +355,7 @@ def metric_numbers(results: Sequence[PlaceOutcome]) -> Table:
 
 
 class MethodDifference(NamedTuple):
-    """The AUC of one method minus that of another, on one pair of drives.
+    """The AUC of a method minus the AUC of another, on a pair of drives.
 
     Attributes:
         result: result of the first method.
@@ -525,8 +527,8 @@ def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
 def fault_numbers(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
     """Returns the table `why.csv`: why top-ranked places were wrong.
 
-    For each method on each pair of drives, it counts the queries with a wrong
-    top-ranked place, by reason.
+    For each method on each pair of drives, the table counts the queries with a
+    wrong top-ranked place, by reason.
     """
     return Table.of(
         _count_faults(results, evidence),
@@ -610,7 +612,8 @@ class DriveTrack:
 
         Returns:
             Nine arrays (Q,) of objects: frame, stamp [ns], x, y, z [m], and qx,
-            qy, qz, qw of the orientation. All are None where there is no frame.
+            qy, qz, qw of the orientation. All values are None where there is no
+            frame.
         """
         X_WS = self.X_WS[frames]
         quats_xyzw = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat()
