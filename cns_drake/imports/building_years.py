@@ -47,7 +47,7 @@ _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
-    """Returns the year that a text states; None if it states none.
+    """Returns the year that a text states; None if the text has no year.
 
     For a range (`1914..1918`), the result is the last year; for `before 1910`
     and `~1855`, the year in the text. For a period such as a century, the

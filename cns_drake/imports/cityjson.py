@@ -97,7 +97,7 @@ class ReferenceSystem:
 
         `first` and `second` are the first two coordinates of the place, in the
         order of the system's definition. The result is True for a system
-        without an area of use, since nothing speaks against the place.
+        without an area of use, because nothing rules out the place.
         """
         system = _horizontal_system(self.name)
         if system.area_of_use is None:
@@ -238,7 +238,7 @@ class CityGeometry(NamedTuple):
 
     Attributes:
         lod: level of detail; 0 if unknown.
-        faces: the faces; those of a solid enclose it.
+        faces: the faces; the faces of a solid enclose the solid.
         kinds: type of each face, such as RoofSurface; "" if unknown.
         is_solid: whether the geometry is a solid.
     """
@@ -256,7 +256,7 @@ class CityObject(NamedTuple):
         name: id of the object.
         kind: type of the object, such as BuildingPart.
         attributes: attributes, as in the file.
-        parents: ids of the objects of which this one is a part.
+        parents: ids of the objects of which this object is a part.
         geometries: geometries, except those that cannot be read.
     """
 
@@ -275,9 +275,9 @@ class CityFile:
         objects: id -> object.
         system: reference system of the coordinates.
         faults: counts of faulty parts.
-        order_is_open: whether it is unknown in which order the file gives east
-            and north, because both orders lead to places in the system's area
-            of use.
+        order_is_open: whether the order of east and north in the file is
+            unknown, because both orders lead to places in the system's area of
+            use.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
@@ -737,9 +737,9 @@ def import_cityjson(
 ) -> ForeignCity:
     """Imports a city from a CityJSON file; the origin is its centre.
 
-    `lod` is the level of detail to read; None for the highest of each object.
-    `year_attribute` is the attribute with the year of construction; None for
-    the usual names.
+    `lod` is the level of detail to read; None for the highest level of each
+    object. `year_attribute` is the attribute with the year of construction;
+    None for the usual names.
 
     Raises:
         InputError: if the file cannot be used.
@@ -769,7 +769,7 @@ def import_structures(
     Args:
         city: the content of the file.
         origin: (3,) origin of the map in the file's coordinates [m].
-        lod: level of detail to read; None for the highest of each object.
+        lod: level of detail to read; None for the highest level of each object.
         year_attribute: attribute with the year of construction; None for the
             usual names.
     """

@@ -156,7 +156,7 @@ def extruded(
     """Returns the walls and the roof of a solid, as triangles (M, 3, 3) [m].
 
     A roof that is impossible on the footprint is replaced by a flat roof, and
-    counted as a fault.
+    counts as a fault.
 
     Args:
         polygon: the footprint.
@@ -287,7 +287,7 @@ def surface_samples(
 
     Every place on a triangle, up to its edges, is at most `spacing` [m] from
     one of the points. `window` contains the least and the greatest x and y,
-    (2,) each; points outside of it are left out.
+    (2,) each; points outside of these limits are left out.
     """
     while len(triangles):
         if window is not None:

@@ -36,7 +36,7 @@ LAWN: Rgb = (0.42, 0.55, 0.30)
 def random_share(seed: int, purpose: str, name: str) -> float:
     """Returns a random number from 0 to 1 that depends only on the arguments.
 
-    `purpose` and `name` say for what the number is used, and for which object.
+    `purpose` says what the number is used for, and `name` for which object.
     """
     return _number(seed, purpose, name) / 2.0**64
 
@@ -70,8 +70,8 @@ class Imported:
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail; 0 if unknown.
-        original: name of the structure of which this one is a variant; "" if
-            this one is not a variant.
+        original: name of the structure of which this structure is a variant; ""
+            if this structure is not a variant.
         is_gone: whether the structure was demolished at an unknown date.
     """
 
@@ -254,8 +254,8 @@ def make_imported(
         until: year in which the structure was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object; 0 if unknown.
-        narrower: kind of the structure, if the file says more than its type,
-            such as `church` for a Building.
+        narrower: kind of the structure, if the file is more specific than the
+            type, such as `church` for a Building.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))

@@ -88,8 +88,8 @@ class Ground:
     def to_mesh(self) -> Mesh:
         """Returns the ground as a mesh, lowered by 0.1 m.
 
-        The mesh is lower, so that pavements at the height of the ground can be
-        seen.
+        The mesh is lower than the ground, so that pavements at the height of
+        the ground can be seen.
         """
         x, y = np.meshgrid(self.xs, self.ys)
         vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)
@@ -176,8 +176,8 @@ def ground_structures(
 ) -> list[Structure]:
     """Returns the guessed ground of a city, as a list of one structure.
 
-    The list is empty if the imported file contains a terrain, which then is one
-    of `structures`.
+    The list is empty if the imported file contains a terrain, because
+    `structures` then contains this terrain.
 
     Args:
         structures: structures of the city.

@@ -48,10 +48,10 @@ def import_city(
             OpenDRIVE (.xodr).
         output: the folder to write, which must not exist yet.
         options: the options of the import.
-        finish: called with the folder and the sizes of its stages (see
-            `write_world`), to add files. By then the folder contains all other
-            files and has its final name, but still lies in a temporary folder.
-            If `finish` fails, nothing is left.
+        finish: function that can add files. It is called with the folder and
+            the sizes of its stages (see `write_world`), when the folder
+            contains all other files and has its final name, but still lies in a
+            temporary folder. If `finish` fails, nothing is left.
 
     Returns:
         Counts of what was imported.

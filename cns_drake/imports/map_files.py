@@ -61,11 +61,11 @@ def write_world(
         source: imported file, named in comments.
         city: the structures of each stage.
         bottom: structures of the guessed ground, which are in all stages.
-        dressing: details that were added to buildings and streets; None if none
-            were.
+        dressing: details that were added to buildings and streets; None if no
+            details were added.
 
     Returns:
-        Name of a stage -> how many structures and how many triangles it has.
+        Name of a stage -> numbers of structures and of triangles in the stage.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     versions = (
@@ -113,7 +113,7 @@ def city_facts(
     """Returns facts about an imported map, as a mapping.
 
     The facts are the reference system, the origin, the level of detail and the
-    years of the stages. If given, `changes` and `dressing` add their own facts.
+    years of the stages, and the facts from `changes` and `dressing`, if given.
 
     Args:
         city: the city as in its file.

@@ -17,7 +17,7 @@ _LONGEST = 100
 class ImportFaults:
     """Counts the repaired and omitted parts of a file, by kind of fault.
 
-    For each kind, it keeps the name of one object as an example.
+    For each kind, the name of one object is kept as an example.
     """
 
     def __init__(self) -> None:
@@ -37,8 +37,8 @@ class ImportFaults:
     def take_back(self, kind: str) -> None:
         """Removes one fault of a kind from the counts.
 
-        Use it for a fault that was counted but turns out not to matter, such as
-        an object that was left out at first and is placed later.
+        Use this function for a counted fault that turns out not to matter, such
+        as an object that was left out at first and is placed later.
         """
         kind = _printable(kind)
         self._counts[kind] -= 1
@@ -77,13 +77,14 @@ class ImportOptions:
             `grow`, the details of `dressed`, and the buildings of a town that
             is built along a file's roads.
         along: CSV file with the waypoints of a drive, which replaces the two
-            proposed drives; None for the proposed ones.
+            proposed drives; None for the proposed drives.
         within: greatest distance of structures from the drives [m]; None for no
             limit.
         drive_on: side of the street on which traffic keeps; None for the side
             in the file, or right if the file names none.
-        grow: share of the buildings that are missing or lower in an additional
-            first stage, sampled at random; None for no such stage.
+        grow: share of the buildings, sampled at random, that are missing in an
+            additional first stage or lower there than today; None for no such
+            stage.
         dressed: whether to add details, such as windows and parked cars, that
             are not in the file.
     """

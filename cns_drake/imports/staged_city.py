@@ -89,7 +89,7 @@ def with_gone(
     """Returns the structures of a past city: `others`, and former buildings.
 
     Where a building of today stands in the place of a former building, the
-    result contains only one of them: the building of today if its year of
+    result contains only one of the two: the building of today if its year of
     construction is known, and otherwise the former building.
 
     Args:
@@ -125,7 +125,7 @@ class StagedCity:
     """The structures of an imported city, by stage.
 
     Attributes:
-        standing: name of a stage -> structures that exist in it.
+        standing: name of a stage -> structures that exist in this stage.
         kept: structures that exist in at least one stage.
         undated: number of buildings without a year.
         dated: number of buildings with a year.
@@ -152,7 +152,7 @@ class StagedCity:
         the part near the drives.
 
         Raises:
-            InputError: if no structure is near, or there is no drive.
+            InputError: if no structure is near a drive, or there is no drive.
         """
         if not drives:
             raise InputError(
@@ -348,7 +348,7 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with an additional first stage, and its differences.
+    """Returns a city with an additional first stage, and what differs there.
 
     In the first stage, buildings that no longer exist today stand in place of
     the structures that replaced them. Some of the other buildings, sampled at
@@ -358,15 +358,16 @@ def grow(
 
     Args:
         city: the city, with one stage.
-        part: share of the buildings that are missing or lower in the first
-            stage.
+        part: share of the buildings that differ in the first stage: they are
+            missing, or lower than in the last stage.
         seed: seed of the random draws.
 
     Returns:
         The city with the stages 01 and 02, and a mapping: `missing` contains
-        the names of missing buildings, `part_of_height` the relative heights of
-        lower buildings, and `gone_since`, if there are any, the names of
-        buildings that no longer exist today.
+        the names of missing buildings, `part_of_height` the heights of lower
+        buildings as shares of their heights in the last stage, and
+        `gone_since`, if there are any, the names of buildings that no longer
+        exist today.
     """
     (last,) = city.standing.values()
     buildings = [one for one in last if one.kind.startswith("Building")]

@@ -65,7 +65,7 @@ class Reference:
 
     Attributes:
         title: the source's name in the report.
-        counting: sentence that says for which methods the source counted all
+        counting: clause that says for which methods the source counted all
             queries, and for which methods only queries with a match; used only
             if there are published results.
         changes: (map, earlier stage, later stage) -> TCR_sym.

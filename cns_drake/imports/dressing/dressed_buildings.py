@@ -71,8 +71,8 @@ def split_buildings(
 ) -> list[BareBuilding]:
     """Returns buildings, split into walls, roof and other surfaces.
 
-    A variant of a building, such as a lower one in an earlier stage, has the
-    style of the original.
+    A variant of a building, such as a lower building in an earlier stage, has
+    the style of the original.
 
     Args:
         buildings: the buildings.
@@ -165,19 +165,19 @@ def dress_buildings(
     """Returns the buildings of a city with windows, doors and shops.
 
     A building looks the same in each stage and each import, because its random
-    numbers depend only on the seed and its name. Only walls near a drive get
-    windows. Doors and shops face streets.
+    numbers depend only on the seed and on the building's name. Only walls near
+    a drive get windows. Doors and shops face streets.
 
     Args:
         structures: the structures of the city, of which the buildings get
             details.
-        drives: the drives, near which there is more detail.
+        drives: the drives; there is more detail near drives.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages; None if all do. A wall gets
-            no details if buildings that exist in all stages occlude it from the
-            drives.
+        always: structures that exist in all stages; None if all structures do.
+            A wall gets no details if buildings that exist in all stages occlude
+            it from the drives.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """

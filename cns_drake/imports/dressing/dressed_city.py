@@ -45,7 +45,7 @@ class Dressing:
         origins: name of a changed or added structure -> `dressed` for a
             structure of the file with added details, or `lot` for a random
             structure. All other structures are as in the file.
-        facts: counts of details from the file and of random ones.
+        facts: counts of details from the file and of random details.
         bottom: structures of the guessed ground; empty if the file has a
             terrain.
     """

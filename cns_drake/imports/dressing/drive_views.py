@@ -68,7 +68,7 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns how far from a drive each wall is seen, (N,) [m].
+        """Returns the distance from which drives see each wall, (N,) [m].
 
         This is the distance from the wall to the nearest viewpoint on a drive
         from which the wall is visible; infinite without such a viewpoint.

@@ -1,7 +1,7 @@
 """Walls and roofs with details for imported buildings.
 
-A wall is divided into storeys and bays, which get the same details as in
-generated buildings. A roof gets equipment or chimneys.
+A wall is divided into storeys and bays, which get the same details as the
+storeys and bays of generated buildings. A roof gets equipment or chimneys.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Opening(NamedTuple):
 
     Attributes:
         row: number of the storey, from 0.
-        nth: number of bays between this bay and the nearer of the wall's ends.
+        nth: number of bays between the opening and the nearer end of the wall.
         x0: left end, seen from outside.
         x1: right end.
         z0: height of the lower edge.
@@ -129,7 +129,7 @@ class FacadePlan:
         """Returns whether a part on the wall would block a car on a drive.
 
         `z` is the height of the part above the panel's origin, and `reach` is
-        how far it protrudes from the wall [m].
+        how far the part protrudes from the wall [m].
         """
         is_low = z - self.ground < _TALLEST_CAR
         return is_low and self.to_drive < reach + _HALF_PATH
@@ -137,9 +137,9 @@ class FacadePlan:
     def probes(self) -> np.ndarray:
         """Returns a point in front of each opening and of the wall's top.
 
-        These are (N + 1, 3) points in W, for N openings [m]; the last one
-        belongs to the top. An opening, or the top, is occluded if the point in
-        front of it cannot be seen.
+        The result contains (N + 1, 3) points in W, for N openings [m]; the last
+        point belongs to the top. An opening, or the top, is occluded if the
+        point in front of it cannot be seen.
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
@@ -596,7 +596,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 def add_roof_pieces(
     out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
 ) -> None:
-    """Adds equipment to a flat roof, or chimneys to a pitched one.
+    """Adds equipment to a flat roof, or chimneys to a pitched roof.
 
     Args:
         out: the building under assembly, which gets the parts.

@@ -186,8 +186,8 @@ def guessed_streets(
 ) -> Iterator[Imported]:
     """Yields structures for a carriageway and sidewalks along drives.
 
-    Use it for a city whose file has no roads: its drives are assumed to be in
-    the middle of the streets.
+    Use this function for a city whose file has no roads: the drives are assumed
+    to be in the middle of the streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
@@ -262,7 +262,7 @@ _SQUARE = 50.0
 def paved_gaps(
     structures: Sequence[Imported], drives: Sequence[WaypointRoute]
 ) -> Iterator[Imported]:
-    """Yields additional sidewalks, which fill gaps beside existing ones.
+    """Yields sidewalks that fill gaps beside existing sidewalks.
 
     A gap is unpaved ground at most 3 m wide, such as the strip between a
     sidewalk and a building. Only gaps near the drives are filled. The ground

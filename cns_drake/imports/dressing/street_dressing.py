@@ -185,8 +185,8 @@ class StreetThings:
 class StreetRoom:
     """Places small objects in a city where there is room for them.
 
-    `found` (a `StreetThings`) gets the objects, and `lamps` lists the positions
-    (x, y) of the street lamps among them [m].
+    The objects are added to `found` (a `StreetThings`). `lamps` lists the
+    positions (x, y) of the street lamps among these objects [m].
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class StreetRoom:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object if there is room for it; returns whether there was.
+        """Places an object if there is room; returns whether there was room.
 
         The object stands at the height of the lowest ground below it. Only cars
         are placed on carriageways.
@@ -480,7 +480,7 @@ def dress_streets(
 ) -> StreetThings:
     """Places small objects along the streets of a city, and returns them.
 
-    Objects from the imported file are placed first, and then random ones.
+    Objects from the imported file are placed first, and then random objects.
     Objects are placed near the paths of the drives, but not on them. Without
     drives nothing is placed.
 

@@ -87,12 +87,13 @@ class Style:
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[str, bool]:
-    """Returns the use of a building, and whether its tags state the use.
+    """Returns the use of a building, and whether the tags state the use.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.
-        area: area of the footprint [m^2]; it decides if the tags state no use.
-        height: height of the walls [m]; it decides if the tags state no use.
+        area: area of the footprint [m^2]. Area and height determine the use if
+            the tags do not state it.
+        height: height of the walls [m].
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
@@ -136,7 +137,7 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Returns a style for a building: from its tags, otherwise random.
+    """Returns a style for a building: from its tags, or else at random.
 
     The number of random numbers that are used does not depend on the tags.
 

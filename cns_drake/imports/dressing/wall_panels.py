@@ -36,7 +36,7 @@ _MOST_PIECE_BENT = 0.01
 
 @dataclass(frozen=True)
 class Panel:
-    """A vertical wall, or a piece of one, as seen from outside.
+    """A vertical wall, or a piece of a wall, as seen from outside.
 
     In panel coordinates, x runs to the right and z upwards [m].
 
@@ -101,7 +101,7 @@ def find_panels(
     walls: Sequence[np.ndarray],
     is_wanted: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> list[Panel]:
-    """Returns the walls of buildings as panels; bent walls become several.
+    """Returns the walls of buildings as panels, several for a bent wall.
 
     Args:
         walls: for each building, its vertical triangles (M, 3, 3), which face

@@ -1,10 +1,11 @@
 """Searches two drives through a city that share a part of their paths.
 
-The first drive is approximately the longest of all shortest paths. The second
-drive shares the middle part of the first drive, but has a beginning and an end
-of its own, which are called arms. A path is a sequence of pieces, such as lanes
-of streets or cells of free space. A `WayGraph` says which piece can follow
-which; a sequence of its pieces is called a way.
+The first drive is approximately the longest of the shortest paths between any
+two places. The second drive shares the middle part of the first drive, but has
+a beginning and an end of its own, which are called arms. A path is a sequence
+of pieces, such as lanes of streets or cells of free space. A `WayGraph` says
+which piece can follow which piece; a sequence of pieces in this graph is called
+a way.
 """
 
 from abc import ABC, abstractmethod
@@ -103,12 +104,12 @@ def steerable_drive(
     """Returns the drive along waypoints, or the place (2,) of its failure.
 
     A drive fails at an obstacle, or at a bend that is too tight for the car. If
-    a drive is too short, the result is the place in its middle.
+    a drive is too short, the result is the place in the middle of the drive.
 
     Args:
         waypoints: (N, 2) or (N, 3) places [m].
         room: function that takes places (M, 2) along the path, and returns the
-            first one with an obstacle, or None; by default there are no
+            first place with an obstacle, or None; by default there are no
             obstacles.
         margin: least radius of a bend, as a multiple of the car's smallest
             turning radius.
@@ -270,7 +271,7 @@ def find_drives(graph: WayGraph) -> list[WaypointRoute]:
     """Returns two drives that share a part of their paths, if there are any.
 
     If no second drive is found, the list has one drive; if no drive is found,
-    it is empty.
+    the list is empty.
     """
     for _ in range(_MOST_TRIES):
         way = _longest_way(graph)
@@ -444,8 +445,8 @@ class Lane:
         line: (N, 2) middle of the street, in driving direction [m].
         begin: node at which the lane begins.
         end: node at which the lane ends.
-        aside: lateral offset of the lane from `line` [m], towards the side on
-            which traffic keeps.
+        aside: lateral offset of the lane from `line` [m], positive towards the
+            side on which traffic keeps.
         way: number of the piece of street; the lane in the opposite direction
             has the same number.
     """
@@ -476,10 +477,10 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
 
 
 def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns pairs of lanes of which the first leads into the second.
+    """Returns pairs of lanes, where the first lane leads into the second.
 
-    The result is two arrays (L,): the numbers of the first lanes, and those of
-    the second lanes. Sharp turns are left out.
+    The result is two arrays (L,): the numbers of the first lanes, and the
+    numbers of the second lanes. Sharp turns are left out.
     """
     starts: defaultdict[int, list[int]] = defaultdict(list)
     for number, lane in enumerate(lanes):
@@ -510,7 +511,7 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
     lane.
 
     Args:
-        lanes: lanes, of which each leads into the next.
+        lanes: lanes; each lane leads into the next.
         spacing: approximate distance between points [m].
     """
     parts = []

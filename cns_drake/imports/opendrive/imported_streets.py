@@ -147,7 +147,7 @@ def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
 
 
 class ImportedStreets:
-    """The areas that the lanes on the ground cover, by kind, in W [m].
+    """The areas of the lanes on the ground in W [m], by kind of lane.
 
     Where lanes overlap, road takes precedence over parking, parking over other
     ground, and all of these over sidewalks.

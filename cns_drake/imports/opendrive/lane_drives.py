@@ -123,7 +123,7 @@ class BandGraph(search.WayGraph):
 
 
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointRoute]:
-    """Returns two drives along lanes; a part of their paths is the same.
+    """Returns two drives along lanes that share a part of their paths.
 
     The list contains only one drive, or none, if no more drives are found.
     `bands` contains the lanes of the whole network, including bridges.

@@ -94,12 +94,13 @@ class LaneBand:
         road: the road.
         section: number of the section in this road.
         lane: the lane.
-        kind: type of the lane. It is "enclosed" for a lane of type none with
-            other lanes farther outside, as on a road that is closed to traffic.
+        kind: type of the lane. The kind is "enclosed" for a lane of type none
+            if there are other lanes farther outside, as on a road that is
+            closed to traffic.
         inner: (N, 3) places on the edge nearer to the middle of the road [m].
             Where the width of the lane has a step, a place on one edge is
-            repeated. For a lane above a kerb, z is the height of the road, not
-            that of the lane.
+            repeated. For a lane above a kerb, z is the height of the road and
+            not of the lane.
         outer: (N, 3) places on the other edge, like `inner` [m].
         middle: (N, 3) places midway between the two edges [m].
         heading: (N,) heading of the road [rad].
@@ -255,15 +256,15 @@ def stations(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns distances along a road at which its shape must be sampled.
 
-    Between two places the road is nearly straight. A joint of two pieces of the
-    road is contained twice, once for each piece.
+    Between two of these distances, the road is nearly straight. A joint of two
+    pieces of the road is contained twice, once for each piece.
 
     Args:
         road: the road.
         start: where the first place is [m].
         end: where the last place is [m].
-        more: functions along the road whose shape matters, besides the road's
-            own.
+        more: functions along the road whose shape matters in addition to the
+            shape of the road.
 
     Returns:
         (N,) distances along the road, and (N,) distances that select the piece
@@ -433,9 +434,9 @@ class KerbHeights:
     """The height of imported sidewalks above the road, by place.
 
     The constructor takes the lanes on the ground, and the usual height of a
-    kerb [m], which applies where the file states none. An object is called with
-    places (N, 2) in W [m], and returns heights (N,) [m]. `differ` says whether
-    any kerb has another height than the usual one.
+    kerb [m], which applies where the file states no height. An object is called
+    with places (N, 2) in W [m], and returns heights (N,) [m]. `differ` says
+    whether any kerb has another height than the usual height.
     """
 
     def __init__(self, bands: Sequence[LaneBand], usual: float):

@@ -19,11 +19,11 @@ class Piece:
 
     Attributes:
         s: distance along the road at which the element begins [m].
-        x: x of its first point in W [m].
-        y: y of its first point in W [m].
-        heading: heading at its first point in W [rad].
+        x: x of the element's first point in W [m].
+        y: y of the element's first point in W [m].
+        heading: heading at the element's first point in W [rad].
         length: length of the element [m].
-        shape: the curve, in the frame of its first point.
+        shape: the curve, in the frame of the element's first point.
     """
 
     s: float
@@ -78,8 +78,8 @@ class Cubics:
             s: (N,) distances along the road [m] at which the function is
                 evaluated.
             inside: (N,) for each distance, any point of the cubic piece that is
-                used [m]. It is usually `s` itself, and differs from `s` only at
-                a joint, where it selects the piece before or after the joint.
+                used [m]. This is usually `s`. At a joint, a point before or
+                after `s` selects the piece before or after the joint.
             is_slope: whether to return the derivatives.
         """
         if not self:
@@ -197,8 +197,8 @@ class LaneSection:
     Attributes:
         start: distance along the road at which the stretch begins [m].
         end: distance along the road at which the stretch ends [m].
-        lanes: lane number -> lane. It excludes the middle lane 0, which has
-            only marks.
+        lanes: lane number -> lane. The middle lane 0, which has only marks, is
+            not included.
         middle_marks: marks of the middle lane 0.
     """
 
@@ -212,8 +212,8 @@ class Thing(NamedTuple):
     """A signal, or an object beside the road.
 
     Attributes:
-        name: unique in the network.
-        is_signal: whether it is a signal; otherwise it is an object.
+        name: name of the thing, unique in the network.
+        is_signal: whether the thing is a signal; otherwise it is an object.
         kind: type of the thing, in lower case.
         s, t: coordinates along and across the road [m].
         z: height above the road [m].
@@ -228,7 +228,8 @@ class Thing(NamedTuple):
             [m] at both ends of an object without gaps along the road, such as a
             wall; None for other objects.
         is_dynamic: whether the state can change, as for a traffic light.
-        faces_back: whether it is for traffic against the direction of the road.
+        faces_back: whether the thing is for traffic against the direction of
+            the road.
     """
 
     name: str
@@ -290,7 +291,7 @@ class ImportedRoad:
             s: (N,) distances along the road [m].
             inside: (N,) distances that select the piece of the road, usually
                 equal to `s`. At a joint between two pieces, a distance slightly
-                before or after `s` selects one of them.
+                before or after `s` selects the piece before or after the joint.
         """
         starts = np.array([piece.s for piece in self.pieces])
         index = np.searchsorted(starts, inside, side="right") - 1

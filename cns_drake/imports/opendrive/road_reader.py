@@ -1,8 +1,8 @@
 """Reads roads from an OpenDRIVE file.
 
 The import joins lanes whose ends meet, and does not use the links between
-roads, lanes and junctions. It only reports links to things that are not in the
-file, as faults.
+roads, lanes and junctions. The import only reports, as faults, links to things
+that are not in the file.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

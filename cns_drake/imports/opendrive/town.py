@@ -4,9 +4,8 @@ Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
 lane's outer border, and the mark of lane 0 in the middle of the road. Double
 lines are listed from the inside outwards; double lines in the middle of the
 road are listed from left to right. A line on the border between two lanes lies
-half on each lane. If one of these lanes is not carriageway, half of the line
-would be hidden below the kerb stones, so the import moves the line onto the
-carriageway.
+half on each lane. If one of these lanes is not carriageway, the kerb stones
+would hide half of the line, so the import moves the line onto the carriageway.
 """
 
 from collections import Counter, defaultdict
@@ -401,9 +400,9 @@ def build_town(
     Args:
         source: the file.
         options: `seed` of all random draws; `dressed`: whether to paint the
-            road marks of the file; `grow`: the share of the buildings, those in
-            the east, that the first stage lacks; `within`: the greatest
-            distance of structures from the drives [m].
+            road marks of the file; `grow`: the share of the buildings that the
+            first stage lacks, which are the buildings in the east; `within`:
+            the greatest distance of structures from the drives [m].
         own: drives that replace the proposed drives; None to use the proposed
             drives.
 

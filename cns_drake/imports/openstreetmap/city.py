@@ -399,7 +399,7 @@ def standing_buildings(
     Args:
         areas: buildings and building parts.
         faults: counts to which the omitted buildings are added.
-        with_gone: whether to yield also buildings that were demolished at an
+        with_gone: whether to also yield buildings that were demolished at an
             unknown date.
     """
     for one in areas:
@@ -423,7 +423,7 @@ def make_buildings(
 ) -> Iterator[Imported]:
     """Yields buildings, made from outlines and building parts.
 
-    Where a building has parts, these replace the outline.
+    Where a building has parts, the parts replace the outline.
 
     Args:
         areas: outlines of buildings, and building parts.

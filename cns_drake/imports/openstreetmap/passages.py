@@ -91,8 +91,8 @@ def passages_of(
 ) -> list[Passage]:
     """Returns the ways that lead through buildings or under roofs.
 
-    They have the tag `tunnel=building_passage` or `covered`, and are lines or
-    areas on the ground. `local` converts longitudes and latitudes to
+    These ways have the tag `tunnel=building_passage` or `covered`, and are
+    lines or areas on the ground. `local` converts longitudes and latitudes to
     coordinates in metres, and `faults` counts tags that cannot be read.
     """
     found = []
@@ -147,7 +147,7 @@ class Passages:
 
         Args:
             polygon: footprint of the solid in W [m].
-            low: height of its lowest point [m].
+            low: height of the solid's lowest point [m].
 
         Returns:
             The area in W [m] and the height above the ground [m]; None if no

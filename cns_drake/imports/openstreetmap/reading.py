@@ -224,10 +224,11 @@ class Local:
 
     The constructor takes the longitude and latitude of the origin [deg]. An
     object is called with longitudes and latitudes (N, 2) [deg], and returns x
-    and y (N, 2) [m]. It uses the Earth's radii of curvature at the origin.
-    Places d metres north and east of it are off by about 1.1 d^2 tan(latitude)
-    / R, where R is the Earth's radius: at 52 deg by 0.5 m if d is 1.5 km, and
-    by 22 m if d is 10 km. Lengths 10 km north are wrong by 20 in 10,000 there.
+    and y (N, 2) [m]. The conversion uses the Earth's radii of curvature at the
+    origin. A place d metres north and d metres east of the origin is off by
+    about 1.1 d^2 tan(latitude) / R, where R is the Earth's radius: at a
+    latitude of 52 deg by 0.5 m if d is 1.5 km, and by 22 m if d is 10 km. At
+    that latitude, lengths 10 km north of the origin are wrong by 20 in 10,000.
     """
 
     def __init__(self, longitude: float, latitude: float):
@@ -267,8 +268,8 @@ class OsmWay(NamedTuple):
     Attributes:
         name: id of the way, such as `w123`.
         tags: tags of the way.
-        line: (N, 2) longitude and latitude of its nodes [deg].
-        nodes: ids of its nodes.
+        line: (N, 2) longitude and latitude of the way's nodes [deg].
+        nodes: ids of the way's nodes.
     """
 
     name: str
@@ -283,7 +284,7 @@ class OsmArea(NamedTuple):
     Attributes:
         name: id of the area, such as `w123` or `r123`.
         tags: tags of the area.
-        polygons: its polygons, in longitude and latitude [deg].
+        polygons: polygons of the area, in longitude and latitude [deg].
     """
 
     name: str
@@ -462,7 +463,8 @@ def has_tag(tags: Tags, name: str) -> bool:
 def is_building(tags: Tags) -> bool:
     """Returns whether tags describe a building or a part of a building.
 
-    A former building counts, too, if its tags state when it was demolished.
+    A former building counts as well, if its tags state the date of its
+    demolition.
     """
     return (
         has_tag(tags, "building")

@@ -84,7 +84,7 @@ class Bridges:
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     """Returns the bridges and the tunnels among the ways of a file.
 
-    Of two bridges that cross, the upper one counts as a bridge over another
+    Of two bridges that cross, the upper bridge counts as a bridge over another
     way. `local` converts longitudes and latitudes to coordinates in metres.
     """
     used = [
@@ -131,7 +131,7 @@ class Look(NamedTuple):
     Attributes:
         kind: kind of the area, such as Sidewalk.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        rgb: colour; None for that of the class.
+        rgb: colour; None for the colour of the class.
         z: height of the upper side [m].
         narrower: what the area is, if its tags say more than `kind`, such as
             `park`.

@@ -59,7 +59,7 @@ _IN_MILES = ("gb", "uk", "us")
 
 
 def length(text: str | None) -> float | None:
-    """Returns the length that a text states [m]; None if it states none.
+    """Returns the length [m] that a text states, or None.
 
     If the text contains a list or a range, the greatest length is returned.
     """
@@ -113,18 +113,18 @@ def tag_value(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the value of a tag; None if the tag has no valid one.
+    """Returns the value of a tag; None if the tag has no valid value.
 
     Args:
         tags: tags of an element.
         key: key of the tag.
         read: function that converts the text of the tag to its value; it
             returns None for a text that it cannot convert.
-        most: greatest plausible value. A greater one is counted as a fault, as
-            is a text that `read` cannot convert.
+        most: greatest plausible value. A greater value counts as a fault, as
+            does a text that `read` cannot convert.
         where: id of the element, and the faults to add to; None if faults are
             not counted.
-        least: least plausible value. A smaller one is counted as a fault.
+        least: least plausible value. A smaller value counts as a fault.
     """
     text = tags.get(key)
     if text is None:
@@ -144,9 +144,9 @@ def heights(
 ) -> tuple[float, float, float]:
     """Returns three heights of a building, from its tags [m].
 
-    They are the heights of the lowest and the highest point above the ground,
-    and the height of the roof alone. Heights without a tag are estimated, for
-    example from the number of levels.
+    The results are the heights of the building's lowest and highest points
+    above the ground, and the height of the roof only. Heights without a tag are
+    estimated, for example from the number of levels.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -226,8 +226,8 @@ def street_width(
 ) -> float | None:
     """Returns the width of a street's carriageway [m]; None for other ways.
 
-    Without a tag for the width, it follows from the number of lanes or the kind
-    of street.
+    Without a tag for the width, the width follows from the number of lanes or
+    the kind of street.
 
     Args:
         tags: tags of the street.
@@ -273,9 +273,9 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     """Returns the distance of the outermost lane from the street's middle [m].
 
-    The distance is to the middle of the lane. It is 0 on a two-way street on
-    which two cars cannot pass each other, because cars keep to the middle
-    there. `width` is the width of the carriageway [m].
+    The distance is to the middle of the lane. On a two-way street on which two
+    cars cannot pass each other, the distance is 0, because cars keep to the
+    middle. `width` is the width of the carriageway [m].
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
@@ -300,7 +300,7 @@ def is_marked(tags: Mapping[str, str]) -> bool:
 def path_width(tags: Mapping[str, str]) -> float | None:
     """Returns the width of a path for people [m]; None for other ways.
 
-    Without a tag for the width, it follows from the kind of path.
+    Without a tag for the width, the width follows from the kind of path.
     """
     usual: float | None = TABLES["paths"].get(tags.get("highway", ""))
     if usual is None:
@@ -388,7 +388,7 @@ class LaneLayout(NamedTuple):
             is_forward: whether the lane is in the direction of the street's
                 line.
             number: number of the lane in this direction; 0 is the innermost
-                one.
+                lane.
         """
         same = self.forward if is_forward else self.backward
         return self.width * (number + (1 + self.total) / 2.0 - same)
@@ -439,13 +439,13 @@ def speed_limit(
 ) -> float:
     """Returns the speed limit on a street [m/s].
 
-    Without a tag, it is the usual limit for the kind of street.
+    Without a tag, the result is the usual limit for the kind of street.
 
     Args:
         tags: tags of the street.
         is_forward: direction of travel: along the street's line, or against it.
         where: id of the street, and the counts to which tags that cannot be
-            read are added. By default they are not counted.
+            read are added. By default such tags are not counted.
     """
     side = "forward" if is_forward else "backward"
     for key in (f"maxspeed:{side}", "maxspeed", *_SPEED_RULES):

@@ -76,7 +76,7 @@ class Stretch:
         street: the street, which may extend beyond the junctions.
         line: (N, 2) middle of the street, with rounded corners and evenly
             spaced points [m].
-        nodes: node at the first point of `line`, and at the last one.
+        nodes: nodes at the first and at the last point of `line`.
         layout: numbers and width of the lanes.
     """
 
@@ -90,10 +90,10 @@ class Stretch:
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
     def heading(self, end: int) -> float:
-        """Returns the direction of the stretch at one of its ends [rad].
+        """Returns the direction of the stretch at an end of the stretch [rad].
 
-        It points away from this end, along the stretch. `end` is 0 for the
-        first point and -1 for the last.
+        The direction points away from this end, along the stretch. `end` is 0
+        for the first point and -1 for the last.
         """
         line = self.line if end == 0 else self.line[::-1]
         reach = min(len(line) - 1, max(1, round(_ARM / SPACING)))
@@ -125,9 +125,9 @@ class StreetTraffic(NamedTuple):
     """The lanes of streets, and which lane leads into which.
 
     Attributes:
-        lanes: lanes of streets, then those through junctions.
+        lanes: lanes of streets, followed by lanes through junctions.
         links: pairs of lanes, of which the second follows the first.
-        beside: lane -> its neighbour on the outer side, with the same
+        beside: lane -> the neighbouring lane on the outer side, with the same
             direction.
         junctions: nodes at which three or more ends of streets meet.
     """
@@ -150,7 +150,7 @@ def make_traffic_lanes(
         streets: the streets.
         crossed: nodes at which people cross.
         surface: surface of all streets in W [m]. Ways through junctions that
-            leave it are left out.
+            leave this surface are left out.
         side: 1 if traffic keeps right, and -1 if it keeps left.
     """
     stretches = list(_stretches(streets, crossed))

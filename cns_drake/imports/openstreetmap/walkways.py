@@ -42,8 +42,8 @@ class StreetWalkways(NamedTuple):
     """The walkways of a city: sidewalks, paths, and crossings between them.
 
     Attributes:
-        walkways: all walkways, those over crossings last.
-        crossings: node of a street -> the crossing there.
+        walkways: all walkways; the walkways over crossings come last.
+        crossings: node of a street -> the crossing at this node.
     """
 
     walkways: Sequence[lane_graph.Walkway]
