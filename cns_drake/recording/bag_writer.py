@@ -28,7 +28,6 @@ from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
-from cns_drake.recording.schedule import START_NS, Schedule
 from cns_drake.recording.topic_chunks import TopicChunks, messages_by_time
 
 
@@ -407,60 +406,3 @@ def _encode(name: str, value: Any) -> tuple[str, bytes]:
         return "application/yaml", to_yaml(value).encode()
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     return "application/json", text.encode()
-
-
-def take_over_frames(
-    bag: BagWriter,
-    topics: Sequence[Topic],
-    schedule: Schedule,
-    frame_topic: str,
-) -> int:
-    """Copies the complete frames of an interrupted run to the new run.
-
-    A frame consists of a message on `frame_topic` and all messages until the
-    next message on this topic. A latched topic has a single message, at the
-    start of the recording.
-
-    Args:
-        bag: open bag of the new run, to which nothing has been written yet.
-        topics: topics of the recording.
-        schedule: schedule of the topics that are not latched; its streams have
-            the names of the topics.
-        frame_topic: name of the topic on which each frame begins.
-
-    Returns:
-        The number of copied frames, from frame 0 on.
-    """
-    frames = tick = 0
-    frame: list[RecordedMessage] = []
-    missing = {topic.name for topic in topics if topic.latched}
-    missing.update(schedule.due(0))
-    # If all streams have an end, no message is due after the last one.
-    last = None
-    if schedule.ends.keys() >= schedule.steps.keys():
-        last = max(schedule.ends.values())
-
-    def write_frame() -> None:
-        nonlocal frames
-        frames += 1
-        for message in frame:
-            bag.write(*message)
-        frame.clear()
-
-    for message in bag.interrupted():
-        if (
-            message.topic not in missing
-            or message.stamp_ns != START_NS + schedule.time_ns(tick)
-            or message.sequence != tick // schedule.steps.get(message.topic, 1)
-        ):
-            break
-        frame.append(message)
-        missing.remove(message.topic)
-        while not missing and tick != last:
-            tick += 1
-            missing.update(schedule.due(tick))
-            if frame_topic in missing:
-                write_frame()
-    if not missing:
-        write_frame()
-    return frames

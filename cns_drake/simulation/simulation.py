@@ -17,12 +17,10 @@ from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.bag_writer import (
-    BagWriter,
-    take_over_frames,
-)
+from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.recording.resuming import take_over_frames
 from cns_drake.recording.schedule import START_NS, frames_within
 from cns_drake.scenarios import provenance
 from cns_drake.scenarios.planning import DrivePlan, shown_beside

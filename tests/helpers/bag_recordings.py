@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from cns_drake.recording.bag_writer import BagWriter, take_over_frames
+from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import recording_topics
+from cns_drake.recording.resuming import take_over_frames
 from cns_drake.recording.schedule import START_NS, frame_stamp_ns, make_schedule
 
 TOPICS = recording_topics(["lidar"])
