@@ -92,7 +92,7 @@ _METRICS = {
     "kept": "retained share",
     "tcr_sym": "TCR_sym",
     "miou": "mean IoU",
-    "visible_change_added": "visible change minus the baseline's",
+    "visible_change_added": "visible change without parallax",
     "query_time": "time of a query [s]",
     "build_time": "time to build the database [s]",
     "memory": "memory of the descriptors [bytes]",

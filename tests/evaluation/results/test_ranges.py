@@ -28,7 +28,7 @@ from evaluation.results.table_forms import Cell, Table
         ("kept", 0.0, math.inf, False),
         ("r1_kept_low", 0.0, math.inf, False),
         ("time of a query [ms]", 0.0, math.inf, False),
-        ("visible change minus the baseline's", -1.0, 1.0, False),
+        ("visible change without parallax", -1.0, 1.0, False),
         ("rank correlation of 1 - auc with tcr_sym", -1.0, 1.0, False),
         ("TP of F1max", 0.0, math.inf, True),
         ("N (with a match)", 0.0, math.inf, True),
