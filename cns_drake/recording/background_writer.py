@@ -1,7 +1,7 @@
 """Writes messages in a thread, while the next frame is computed.
 
-Compression takes half of a frame's time, during which other Python code can
-run.
+Compression takes half of a frame's time. Other Python code can run during the
+compression.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _MOST_HELD = 64
 class BackgroundWriter:
     """A context manager that writes messages to a BagWriter in a thread.
 
-    Messages are written in order. Leaving the context waits until all are
-    written; leaving it by an exception drops the messages that are still
-    waiting. If writing fails, nothing more is written, and the error is raised
-    by a later `write` or on leaving.
+    Messages are written in order. Leaving the context waits until all messages
+    are written; leaving the context by an exception drops the messages that are
+    still waiting. If writing fails, nothing more is written, and the error is
+    raised by a later `write` or on leaving.
     """
 
     def __init__(self, write: Callable[..., None]):

@@ -35,8 +35,8 @@ class RecordedMessage(NamedTuple):
     """A message of a recording.
 
     Attributes:
-        topic: name of its topic.
-        stamp_ns: its time [ns].
+        topic: name of the message's topic.
+        stamp_ns: time of the message [ns].
         data: the serialised message.
         sequence: number of the message on its topic.
     """
@@ -53,7 +53,7 @@ class BagWriter:
     Leaving the context normally completes the recording. Leaving it by an
     exception closes the file as a shorter but valid MCAP file under its `.part`
     name. The same calls always produce the same bytes, even if a run was
-    interrupted and another one continued it.
+    interrupted and another run continued the recording.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -178,8 +178,9 @@ class BagWriter:
     def interrupted(self) -> Iterator[RecordedMessage]:
         """Yields the messages that an interrupted run recorded.
 
-        To take them over, write each one as soon as it is yielded, before any
-        other message. The iterator ends where the file is damaged.
+        To take over these messages, write each message as soon as it is
+        yielded, before any other message. The iterator ends where the file is
+        damaged.
 
         Raises:
             InputError: if the file cannot be read.
@@ -206,7 +207,7 @@ class BagWriter:
 
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk, or
-                the message is not later than the last one on its topic.
+                the message is not later than the last message on its topic.
             RuntimeError: the recording is not open.
         """
         if not self._is_open:

@@ -56,9 +56,10 @@ class RecordedCamera(NamedTuple):
     Attributes:
         info: intrinsics as Drake describes them.
         X_BC: pose of C in B.
-        depth: camera of the depth images, if its intrinsics or its pose differ.
-            These images then have the frame `<camera>_depth`, and intrinsics on
-            the topic `/<camera>/depth/camera_info`.
+        depth: camera of the depth images, if this camera's intrinsics or pose
+            differ from those of the colour images. Depth images then have the
+            frame `<camera>_depth`, and intrinsics on the topic
+            `/<camera>/depth/camera_info`.
     """
 
     info: CameraInfo
@@ -67,10 +68,10 @@ class RecordedCamera(NamedTuple):
 
 
 class RecordedSensor(NamedTuple):
-    """A sensor of a user-defined kind; the recorder's port has its name.
+    """A sensor of a user-defined kind, whose name is also its port's name.
 
     Attributes:
-        topic: topic of its messages.
+        topic: topic of the sensor's messages.
         X_BC: pose of the sensor's frame C in the vehicle's frame B.
         make_message: function that returns a message, given the value of the
             port, the name of the frame C and the time [ns].
@@ -136,8 +137,8 @@ class McapRecorder(LeafSystem):
     publish writes nothing.
 
     Connect the inputs directly to continuous outputs. A publish event sees the
-    state before any update at the same time, so with a zero-order hold in
-    between, every message would be one period old.
+    state before any update at the same time. With a zero-order hold between
+    output and input, every message would therefore be one period old.
 
     Example:
         from cns_drake import McapRecorder

@@ -122,9 +122,9 @@ def make_imu(
             [m^2/s^4], and of the angular velocity [rad^2/s^2].
 
     Returns:
-        The message. For a value without noise, its covariance states a standard
-        deviation of 1e-6. For a value that is None, its covariance begins with
-        -1 (REP 145).
+        The message. The covariance of a value without noise states a standard
+        deviation of 1e-6. The covariance of a value that is None begins with -1
+        (REP 145).
     """
     force_variance, turn_variance = variances
     return ros_types.make_message(
@@ -264,10 +264,10 @@ def rendered_intrinsics(camera: CameraInfo) -> np.ndarray:
     """Returns the intrinsic matrix K (3, 3) of the images that Drake renders.
 
     Pixel (u, v) of an image shows what lies along K^-1 (u, v, 1), in the
-    optical frame. The principal point in K is half a pixel less than that of
-    `camera`, in both directions: Drake's renderers count from the outer corner
-    of the first pixel, while ROS and Drake's documentation count from the
-    centre of the first pixel.
+    optical frame. Both coordinates of the principal point in K are half a pixel
+    less than in `camera`: Drake's renderers count from the outer corner of the
+    first pixel, while ROS and Drake's documentation count from the centre of
+    the first pixel.
     """
     K = camera.intrinsic_matrix()
     K[:2, 2] -= 0.5

@@ -14,17 +14,17 @@ class PartFile(io.BufferedRandom):
     """A binary file that a process can resume by writing it again.
 
     A process that resumes an interrupted file writes all bytes again from the
-    start of the file. As long as these bytes equal those in the file, nothing
-    changes on the disk. At the first different byte the file is cut off, and
-    the rest is written. The result is the same as if the file had been empty.
-    The part that both runs have in common is never lost, and there is no second
-    copy on the disk.
+    start of the file. As long as these bytes equal the bytes in the file,
+    nothing changes on the disk. At the first different byte, the file is cut
+    off, and all further bytes are written. The result is the same as if the
+    file had been empty. The part that both runs have in common is never lost,
+    and there is no second copy on the disk.
 
     Only one process can write the file at a time. The file is locked until it
     is closed or its process ends in any way.
 
     Attributes:
-        replaying: whether all bytes written so far were there already.
+        replaying: whether the file already contained all bytes written so far.
     """
 
     def __init__(self, path: Path):

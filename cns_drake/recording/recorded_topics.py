@@ -39,10 +39,10 @@ def recording_topics(
         camera_names: names of the cameras.
         with_imu: whether an IMU is recorded.
         with_odometry: whether odometry is recorded.
-        layouts: LiDAR name -> layout of its points, if not `cns`.
+        layouts: LiDAR name -> layout of the points, if the layout is not `cns`.
         with_objects: whether boxes of moving objects are recorded.
         further: topics of sensors of other kinds.
-        depth_camera_names: names of those cameras whose depth images have
+        depth_camera_names: names of the cameras whose depth images have
             intrinsics or a pose of their own.
 
     Raises:

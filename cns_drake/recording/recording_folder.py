@@ -35,9 +35,9 @@ class RecordingFolder:
 
         Raises:
             InputError: the folder cannot be used, contains a finished
-                recording, or contains files none of which belongs to a
-                recording of this name. With `overwrite`, only if the folder
-                cannot be used.
+                recording, or contains files, none of which belongs to a
+                recording of this name. With `overwrite`, only the first of
+                these faults is an error.
         """
         with user_errors(self.path):
             if not self.path.is_dir():

@@ -41,8 +41,8 @@ class Repair:
         num_messages: number of recovered messages.
         seconds: time between the earliest and the latest recovered message [s].
         num_faults: number of parts of the file that could not be read; 0 if the
-            file was whole.
-        first_fault: description of the first such part.
+            file was undamaged.
+        first_fault: description of the first part that could not be read.
     """
 
     output: Path

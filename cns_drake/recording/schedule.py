@@ -43,10 +43,10 @@ class Schedule:
 
     Attributes:
         tick: time between ticks [s].
-        steps: name of a stream -> number of ticks from one of its messages to
-            the next. The first message of every stream is due at tick 0.
-        ends: name of a stream -> the last tick at which it can have a message;
-            streams without an entry have no end.
+        steps: name of a stream -> number of ticks between two messages of the
+            stream. The first message of every stream is due at tick 0.
+        ends: name of a stream -> the last tick at which the stream can have a
+            message. Streams without an entry have no end.
     """
 
     tick: Fraction
@@ -94,8 +94,9 @@ def make_schedule(
     """Returns the schedule of streams, given the period of each stream.
 
     Args:
-        periods: name of a stream -> time between its messages [s].
-        until: name of a stream -> the time of its last message [s].
+        periods: name of a stream -> time between two messages of the stream
+            [s].
+        until: name of a stream -> the time of the stream's last message [s].
     """
     exact = {
         name: Fraction(period).limit_denominator(_FINEST)

@@ -2,8 +2,8 @@
 
 To read one message, a reader has to uncompress the whole chunk that contains
 the message. If chunks contained all messages in the order of time, a reader of
-the poses would uncompress all clouds as well. The messages of a short span of
-time are therefore collected, and written topic by topic. The topics keep the
+the poses would uncompress all clouds as well. Therefore the messages of a short
+span of time are collected, and then written topic by topic. The topics keep the
 order of their first messages: readers sort messages by their log times, and
 messages of equal time by their places in the file.
 """
@@ -103,8 +103,8 @@ def messages_by_time(stream: BinaryIO) -> Iterator[tuple[str, Message]]:
     """Yields the topics and messages of a recording in the order of log times.
 
     The iterator ends where the file is damaged or ends. Messages of equal time
-    keep the file's order. At no time are more messages in memory than those of
-    chunks that overlap in time.
+    keep the file's order. Memory holds only the messages of chunks that overlap
+    in time.
     """
     times = list(chunk_times(stream))
     starts = [chunk[1] for chunk in times]

@@ -58,28 +58,31 @@ class LidarConfig:
 
     Most fields are the same as those of a LiDAR in a scenario. Unlike in a
     scenario, coordinates are not rounded by default, and the default rate is
-    that of the data sheet.
+    the rate of the data sheet.
 
     Attributes:
         name: name of the system; the channel is `DRAKE_POINT_CLOUD_<name>`.
         X_PB: pose of the sensor B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
         preset: name of the unit, from the table of presets.
-        rate: revolutions per second, at most 1000; by default that of the data
-            sheet.
-        columns: columns in a revolution; by default those of the preset.
-        min_range: nearest range [m]; by default that of the preset.
-        max_range: farthest range [m]; by default that of the preset.
+        rate: revolutions per second, at most 1000; by default the rate of the
+            data sheet.
+        columns: columns in a revolution; by default the number in the preset.
+        min_range: nearest range [m]; by default the nearest range of the
+            preset.
+        max_range: farthest range [m]; by default the farthest range of the
+            preset.
         resolution: step of the coordinates; 0 for exact values [m].
         range_noise: standard deviation of a Gaussian error of ranges [m].
         dropout: probability that a return is lost.
         faint_dropout: additional loss of faint returns: a return of intensity I
-            is also lost with this probability times (1 - I).
+            is also lost with the probability `faint_dropout` * (1 - I).
         motion_distortion: whether beams are cast at their own firing times.
         causal: whether a scan covers the revolution that ends at its time, so
             that a controller can use it at once.
-        capture_offset: time of the first published scan [s]; the others follow
-            one revolution after another. So several LiDARs can take turns.
+        capture_offset: time of the first published scan [s]; the other scans
+            follow, one per revolution. With different offsets, several LiDARs
+            can take turns.
         output_delay: time from a scan's capture to its publication [s], less
             than a revolution. The message keeps the time of the capture. The
             ports of the `Lidar` are not delayed.

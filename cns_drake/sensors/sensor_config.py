@@ -34,8 +34,8 @@ Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 class Section(InputModel):
     """A section of a scenario file.
 
-    Unknown fields and numbers that are not finite are errors. A section cannot
-    be changed after it was made.
+    Unknown fields and numbers that are not finite are errors. You cannot change
+    a section after it was made.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -76,9 +76,10 @@ class Mount(Section):
 class SensorConfig(Mount, abc.ABC):
     """A sensor that publishes one message at a time on one topic.
 
-    For your own kind of sensor, derive a class from this one. If a subclass of
-    `Scenario` has a field of this class, the sensor is added to the Diagram and
-    recorded. The name of the field is the name of the sensor and of its frame.
+    For your own kind of sensor, derive a class from this class. If a subclass
+    of `Scenario` has a field of this class, the sensor is added to the Diagram
+    and recorded. The name of the field is the name of the sensor and of its
+    frame.
 
     Attributes:
         xyz: position in base_link [m].

@@ -36,7 +36,7 @@ def check_new_sensor(
 
 
 def check_unused_names(builder: DiagramBuilder, *names: str) -> None:
-    """Checks that a diagram has no systems of these names yet.
+    """Checks that a diagram has no systems of certain names yet.
 
     A diagram with two systems of one name ends the process when it is built.
 

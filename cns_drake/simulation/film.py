@@ -61,7 +61,7 @@ def with_some_traffic(scenario: Scenario) -> Scenario:
     """Adds 60 vehicles and 60 pedestrians to a scenario without traffic.
 
     A scenario that already has traffic, or whose streets have no room for so
-    many, is returned unchanged.
+    much traffic, is returned unchanged.
     """
     folder = scenario.folder
     is_possible = folder.roads.is_file() or folder.lanes.is_file()
@@ -112,7 +112,7 @@ def make_film(
         scenario: the drive.
         path: file to write, .webp or .mp4.
         seconds: length of the film [s].
-        size: width and height of its images [pixels].
+        size: width and height of the film's images [pixels].
         start: time of the drive at which the stretch begins [s]; by default the
             time at which the road ahead is straightest.
         on_note: called with notes for the user.
@@ -177,8 +177,8 @@ class FilmStage(Step):
         scenario: the drive in that stage, with the cameras of the film.
         times: times at which images are taken [s].
         folder: folder to which the images are written.
-        first: for each camera, the number of its first image in the film;
-            further images of the camera follow.
+        first: for each camera, the number of the camera's first image in the
+            film; further images of the camera follow.
     """
 
     scenario: Scenario

@@ -59,7 +59,8 @@ class LoadedDrive:
         scenario: the scenario; its field `frames` is never None.
         trajectory: motion of the vehicle.
         world: world of the stage, with the vehicle and the objects of the
-            traffic. Its SceneGraph passes to the first Diagram.
+            traffic. The first Diagram that is built takes over the world's
+            SceneGraph.
         traffic: motion of all other vehicles and of pedestrians; None without
             traffic.
     """
@@ -170,11 +171,11 @@ def plan_scenario_traffic(
     Args:
         scenario: scenario with traffic.
         trajectory: motion of the scenario's vehicle.
-        world: world of the scenario's stage, if already loaded; it must not be
-            part of a diagram yet.
+        world: world of the scenario's stage, if already loaded. The world must
+            not be part of a diagram yet.
 
     Raises:
-        InputError: the map has no roads or sidewalks, or no room for so many
+        InputError: the map has no roads or sidewalks, or no room for that many
             vehicles or pedestrians, or a SUMO trace cannot be replayed on this
             map.
 

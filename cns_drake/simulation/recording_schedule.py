@@ -27,8 +27,8 @@ class RecordingPlan:
     """The topics of a drive's recording, and the times of their messages.
 
     Attributes:
-        topics: the topics. The first has the scans of the first LiDAR; each of
-            its messages begins a frame.
+        topics: the topics. The first topic has the scans of the first LiDAR;
+            each message on this topic begins a frame.
         schedule: times of the messages, with a stream for each topic that is
             not latched.
         layouts: LiDAR name -> name of the layout of its recorded points.
@@ -48,10 +48,10 @@ def plan_recording(scenario: Scenario) -> RecordingPlan:
     """Returns the topics and the schedule of a scenario's recording.
 
     The scenario's number of frames must be set. No scan begins after the last
-    frame. Samples of the IMU, if it is not ideal, and odometry with a rate of
-    its own continue until the last scan is complete. So do the poses on `/tf`
-    if scans have motion distortion: such scans can thus be corrected up to
-    their last point.
+    frame. Samples of an IMU that is not ideal, and odometry with a rate of its
+    own, continue until the last scan is complete. If scans have motion
+    distortion, the poses on `/tf` also continue until then, so that scans can
+    be corrected up to their last point.
 
     Raises:
         InputError: Kalibr's file cannot be used.

@@ -32,7 +32,7 @@ def scan_world(
         world: the world.
         X_WS: pose of the LiDAR in the world.
         pattern: directions and ranges of the LiDAR's beams.
-        returns: model of calibrated returns; None for ideal ones.
+        returns: model of calibrated returns; None for ideal returns.
 
     Returns:
         Structured array (N,) of `POINT_DTYPE`, in the LiDAR's frame S.
@@ -49,7 +49,7 @@ def still_scene(
     Args:
         world: the world.
         X_WS: pose in the world near which rays will start. Rays must start
-            within a few kilometres of it.
+            within a few kilometres of this pose.
         pattern: directions and ranges of a LiDAR's beams.
     """
     lidar, context = _stationary_lidar(world, X_WS, pattern)

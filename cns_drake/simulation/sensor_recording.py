@@ -49,22 +49,22 @@ def add_mcap_recorder(
 
     The topics are `/<name of the system>/points` for every LiDAR;
     `/<name>/color`, `depth`, `label` and `camera_info` for every camera, and
-    `/<name>/depth/camera_info` if its depth images have intrinsics or a pose of
-    their own (their frame is then `<name>_depth`);
+    `/<name>/depth/camera_info` if depth images have other intrinsics or another
+    pose than colour images (the frame of depth images is then `<name>_depth`);
     `/imu/data` for an IMU; and `/odometry` for odometry. The poses of sensors
     on the same body as the odometry are in `/tf_static`; those of all other
     sensors are in `/tf`.
 
-    A sensor with an entry in `rates` is recorded at this rate, and an IMU that
-    was added with a rate at its own rate. All other sensors are recorded once
-    per `period`. Without `period`, each LiDAR is recorded once per revolution,
-    and all other sensors once per revolution of the first LiDAR.
+    A sensor with an entry in `rates` is recorded at this rate. An IMU that was
+    added with a rate is recorded at that rate. All other sensors are recorded
+    once per `period`. Without `period`, each LiDAR is recorded once per
+    revolution, and all other sensors once per revolution of the first LiDAR.
 
     Args:
         builder: builder of a diagram with the sensors.
         folder: the rosbag2 folder to write.
-        period: time between two messages of a sensor without a rate [s]. It can
-            be left out if there is a LiDAR.
+        period: time between two messages of a sensor without a rate [s]. You
+            can leave out this argument if there is a LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
             per second, at most 1000.
         lidars: LiDARs to record; each needs a different name.
@@ -165,12 +165,13 @@ def add_mcap_recorder(
 def connect_by_name(
     builder: DiagramBuilder, ports: Mapping[str, OutputPort], recorder: System
 ) -> None:
-    """Connects output ports to those inputs of a recorder that have their name.
+    """Connects output ports to the inputs of a recorder by their names.
 
     Args:
         builder: builder of a diagram with the recorder.
         ports: name -> port of what is measured.
-        recorder: the recorder; an input of another name stays unconnected.
+        recorder: the recorder. An input stays unconnected if no port has its
+            name.
     """
     for key, port in ports.items():
         if recorder.HasInputPort(key):

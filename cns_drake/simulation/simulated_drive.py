@@ -1,7 +1,8 @@
 """Drives that are simulated while the evaluation reads them.
 
 No recording is written: scans are used directly to make maps and place
-descriptors, in about half the time.
+descriptors. This takes about half the time of recording a drive and then
+reading the recording.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ class SimulationSource:
     def identity(self) -> dict:
         """Returns everything on which the simulated scans depend, for JSON.
 
-        That is the scenario, and the digests of its files and of the code.
-        Equal results mean equal scans.
+        The result contains the scenario, and the digests of its files and of
+        the code. Equal results mean equal scans.
         """
         return {
             "simulated": self.scenario.model_dump(mode="json"),
@@ -64,7 +65,7 @@ class SimulationSource:
 
 
 class SimulatedDrive(Drive):
-    """A drive whose scans are simulated; they equal those of a recording.
+    """A drive whose scans are simulated, and equal those of a recording.
 
     Each access to a scan simulates it.
 
@@ -162,8 +163,9 @@ class SimulatedDrive(Drive):
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
         """Returns the world as a scene for ray casting, and the pose X_WS.
 
-        Both are those at the time stamp of scan `index`; X_WS is the pose of
-        the LiDAR. The scene is valid until the next call of `look` or `scan`.
+        Scene and pose are those at the time stamp of scan `index`; X_WS is the
+        pose of the LiDAR. The scene is valid until the next call of `look` or
+        `scan`.
         """
         scene = self._lidar.EvalScene(self._context_at(index))
         return scene, self.X_WBs[index] @ self.X_BS

@@ -104,9 +104,9 @@ def simulate(
         output: folder for recordings.
         page_file: file for a web page of the drive, if any.
         graphviz_file: file for the Diagram as Graphviz text, if any.
-        overwrite: whether to replace an existing recording of that name.
-        num_threads: number of threads that cast the rays of a LiDAR; the
-            recording does not depend on it.
+        overwrite: whether to replace an existing recording of the same name.
+        num_threads: number of threads that cast the rays of a LiDAR. The
+            recording does not depend on this number.
         on_frame: called with the number of finished frames and the number of
             all frames.
         on_note: called with notes for the user, for example about an

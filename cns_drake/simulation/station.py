@@ -68,7 +68,7 @@ def make_station(
 
     Args:
         drive: the scenario to build; or the scenario as `load_drive` returns
-            it, whose SceneGraph passes to the Diagram.
+            it; the Diagram then takes over the SceneGraph of the loaded world.
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.

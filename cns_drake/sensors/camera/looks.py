@@ -34,8 +34,8 @@ class Look:
             There are 1, 3 or 4 channels; the fourth is 0 where the surface has
             holes.
         roughness: roughness of the surface, from 0 (a mirror) to 1 (chalk).
-        is_face: whether one copy of the texture, with its own colours, covers
-            the whole of each geometry instead of being repeated.
+        is_face: whether one copy of the texture, which has colours of its own,
+            covers the whole of each geometry instead of being repeated.
     """
 
     size: float

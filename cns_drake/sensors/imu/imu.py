@@ -93,7 +93,8 @@ def add_imu(
         body: the carrier P of the IMU: a body of a finalized plant, or a frame
             that is fixed on such a body.
         X_PB: pose of the IMU in P, as in Drake's RgbdSensor.
-        rate: samples per second; None for one per frame (scan) of a recorder.
+        rate: samples per second; None for one sample per frame (scan) of a
+            recorder.
         noise: errors of the IMU, which need a rate; by default none. The random
             numbers depend on the name of the IMU, unless the noise has a
             `sensor_name`.
@@ -171,8 +172,8 @@ def add_described_imu(
         body: body that carries the IMU.
         trajectory: motion of that body as a function of time.
         motion: system with the kinematic output ports of the body's plant.
-        scan_rate: scans per second; the rate of the IMU if the description has
-            none.
+        scan_rate: scans per second; also the rate of the IMU if the description
+            has no rate.
         seed: seed of the IMU's errors.
 
     Returns:

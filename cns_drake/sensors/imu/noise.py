@@ -36,10 +36,10 @@ class ImuNoise:
             zero [m/s^2].
         gyroscope_turn_on_bias: standard deviation of the bias at time zero
             [rad/s].
-        accelerometer_range: greatest specific force that an axis measures,
-            either way [m/s^2].
-        gyroscope_range: greatest angular velocity that an axis measures, either
-            way [rad/s].
+        accelerometer_range: greatest specific force that an axis measures, in
+            either direction [m/s^2].
+        gyroscope_range: greatest angular velocity that an axis measures, in
+            either direction [rad/s].
         seed: seed of all random numbers.
         sensor_name: distinguishes the errors of several IMUs. `add_imu`
             replaces the default by its own `name`.

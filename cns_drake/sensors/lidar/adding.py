@@ -68,9 +68,9 @@ def add_lidar(
         scene_graph: the SceneGraph to scan.
         body: the carrier P: a body of a finalized plant that is registered with
             `scene_graph`, a frame that is fixed on such a body, or a FrameId
-            that any other source has registered there. A frame on a body keeps
-            the pose from its model, even if a Context changes it, as for
-            Drake's cameras.
+            that any other source has registered with `scene_graph`. A frame on
+            a body keeps the pose from its model, even if a Context changes it,
+            as for Drake's cameras.
         X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
             the frame of the sensor is S.
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
@@ -79,9 +79,10 @@ def add_lidar(
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by
-            default its body and all bodies that are welded to it, except the
-            world. A frame on a body stands for the whole body. A FrameId stands
-            for its own geometry only: a SceneGraph does not know of welds.
+            default the LiDAR's body and all bodies that are welded to this
+            body, except the world. A frame on a body stands for the whole body.
+            A FrameId stands for its own geometry only, because a SceneGraph
+            does not contain welds.
         motion_distortion: whether the LiDAR and all other bodies of its plant
             keep moving during a revolution (see `Lidar`). Bodies of other
             plants and frames of other sources stay where they are at the time

@@ -118,18 +118,18 @@ class Lidar(LeafSystem):
     If the port `sweep` is connected, the poses of P come from a `Sweep` and not
     from the SceneGraph: one pose for the whole revolution or, with motion
     distortion, one for each column at its firing time. With motion distortion,
-    a point is expressed in S at its firing time t, as a real unit reports it:
-    X_WS(start of the revolution + t) transforms it to the world. During the
-    revolution, all other moving geometry stays where it is at the time of the
-    output.
+    a point is expressed in S at the firing time t of its beam, as a real unit
+    reports the point: X_WS(start of the revolution + t) transforms it to the
+    world. During the revolution, all other moving geometry stays where it is at
+    the time of the output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
     bodies of a plant move during the revolution, with the velocities that they
     have at the time of the output. The port `body_spatial_velocities` supplies
     these velocities as a MultibodyPlant does: a list of V_WB over the plant's
     bodies, expressed in the world. Each beam is cast at its own firing time,
-    with S and the geometry at their poses of that time, and its point is
-    expressed in S at that time.
+    with S and the geometry at their poses of that time. The point that the beam
+    measures is expressed in S at that time.
 
     The field `instance` of a point is the number of the structure that was hit.
     A structure is a model, or all geometries whose names are equal up to the
@@ -145,8 +145,8 @@ class Lidar(LeafSystem):
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
     of this hierarchy that have changed. `geometry` (from `geometry_port`) lists
-    the geometry, and is computed only after a change. Without it, the LiDAR
-    lists all geometry at every scan, which in a world of thousands of
+    the geometry, and is computed only after a change. Without this port, the
+    LiDAR lists all geometry at every scan, which in a world of thousands of
     geometries takes longer than the scan.
 
     Attributes:
@@ -354,7 +354,7 @@ class Lidar(LeafSystem):
         Rays can be cast on this scene.
 
         Raises:
-            RuntimeError: the Context is not the one of this LiDAR.
+            RuntimeError: the Context does not belong to this LiDAR.
         """
         scene = self._eval_all(context).scene
         assert scene is not None
@@ -364,11 +364,11 @@ class Lidar(LeafSystem):
         """Returns the geometry of each point of `scan` in a Context.
 
         The geometry is None for a point without a surface, such as rain. To
-        find the body of a geometry, ask the SceneGraph's inspector for its
-        frame and the plant for the frame's body.
+        find the body of a geometry, ask the SceneGraph's inspector for the
+        geometry's frame, and the plant for this frame's body.
 
         Raises:
-            RuntimeError: the Context is not the one of this LiDAR.
+            RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
         _, met, geometries = self._measured.Eval(context)
@@ -380,7 +380,7 @@ class Lidar(LeafSystem):
         """Returns instance id -> visible geometries of this structure.
 
         Raises:
-            RuntimeError: the Context is not the one of this LiDAR.
+            RuntimeError: the Context does not belong to this LiDAR.
 
         Example:
             gids = lidar.EvalInstances(lidar_context)[scan["instance"][0]]
@@ -413,12 +413,13 @@ class Lidar(LeafSystem):
 
         Args:
             context: context of the LiDAR.
-            p_WR: (N, 3) origins in the world, or (3,) if all share one [m].
+            p_WR: (N, 3) origins in the world, or (3,) if all rays have the same
+                origin [m].
             d_W: (N, 3) unit directions in the world.
-            max_range: greatest range [m], one for all or (N,).
+            max_range: greatest range [m], one for all rays or (N,).
 
         Raises:
-            RuntimeError: the Context is not the one of this LiDAR.
+            RuntimeError: the Context does not belong to this LiDAR.
             ValueError: shapes do not match, a direction has another length than
                 1, or a number is not finite (ranges may be infinite).
         """
@@ -474,7 +475,7 @@ class Lidar(LeafSystem):
         """Returns all that the LiDAR sees, at the poses of a Context.
 
         Raises:
-            RuntimeError: the Context is not the one of this LiDAR.
+            RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
         is_limited = self._frame_poses.HasValue(context)
@@ -759,10 +760,11 @@ class SeenGeometry:
         Args:
             query_object: query object of the SceneGraph, with geometry and
                 poses.
-            records: all geometry with the LiDAR's role; if None, it is listed
-                here.
+            records: all geometry with the LiDAR's role; if None, this function
+                lists the geometry.
             motions: motions of frames that move during the revolution.
-            known: frame poses that are read instead of querying the SceneGraph.
+            known: poses of frames that are known, so that the SceneGraph need
+                not be queried.
             seen: the ball within which beams can hit geometry.
             p_WS: the position of the sensor in the world, (3,) [m].
 
@@ -874,8 +876,8 @@ class BeamTable(NamedTuple):
 
     Attributes:
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
-        p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if that is
-            the origin of S.
+        p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if all
+            beams start at the origin of S.
         ring: (num_beams,) uint16 number of each beam's laser.
         t_ns: (num_beams,) uint32 firing time since the start of the revolution
             [ns].
@@ -949,8 +951,8 @@ def assemble_points(
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
             negative for returns from rain, snow or fog.
         label, instance: uint16 class and instance id of each geometry.
-        step: coordinates are rounded to multiples of this [m]; 0 to keep them
-            exact.
+        step: step to whose multiples coordinates are rounded [m]; 0 for exact
+            coordinates.
     """
     # As names of their own, fields are fast.
     beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity

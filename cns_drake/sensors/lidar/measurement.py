@@ -60,9 +60,10 @@ class MeasurementModel:
     or on the geometry that other beams hit.
 
     Attributes:
-        resolution: coordinates are rounded to multiples of this step [m], and
-            intensities to 12 bits. With 0, neither is rounded. Steps that are
-            powers of two stay exact in float32 and compress well.
+        resolution: step to whose multiples coordinates are rounded [m];
+            intensities are rounded to 12 bits. With 0, neither is rounded.
+            Coordinates that are multiples of a power of two are exact in
+            float32 and compress well.
         range_noise: standard deviation of the Gaussian error of a range,
             along the beam and before rounding [m].
         dropout: probability that a return is lost.

@@ -278,10 +278,11 @@ class SpinningPattern(BeamPattern):
 
     In the sensor frame S (x forward, y left, z up) the revolution starts at the
     rear and goes clockwise seen from above, as Ouster's and Velodyne's units
-    turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits
-    it goes from the first limit to the last, including both, and fires only in
-    that part of the revolution. Ring 0 is the highest beam. Beams are ordered
-    as they fire: column by column, and from ring 0 downwards in each.
+    turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits,
+    the unit fires only in the part of the revolution from the first limit to
+    the last, including both limits. Ring 0 is the highest beam. Beams are
+    ordered as they fire: column by column, and in each column from ring 0
+    downwards.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].
@@ -531,9 +532,9 @@ class BeamCoverage:
     elevation and in azimuth and lie inside the field of view.
 
     The field of view consists of cells of 0.25 deg: the cells of the beams; the
-    neighbours of these cells, since rounding can move a point into them; and
-    all cells between beams that are up to 24 deg apart (a morphological
-    closing).
+    neighbours of these cells, because rounding can move a point into a
+    neighbour; and all cells between beams that are up to 24 deg apart (a
+    morphological closing).
     """
 
     def __init__(self, d_Sset: np.ndarray):
@@ -711,11 +712,11 @@ class NoddingPattern(_TimedPattern):
     Each line nods within a band of elevations of its own; the bands are of
     equal height and fill the field of view. The lines rotate about z 100 times
     a second and nod 6.18 times a second. The ratio of these rates is not a
-    simple fraction, so each frame fills gaps of the frames before.
+    simple fraction, so each frame fills gaps that earlier frames left.
 
     Attributes:
-        elevations_deg: lowest and highest elevation; line 0 has the highest
-            band between them.
+        elevations_deg: lowest and highest elevation. Line 0 has the highest
+            band between these limits.
 
     Example:
         from cns_drake import NoddingPattern

@@ -99,14 +99,15 @@ def make_beam_pattern(
     Args:
         preset: a key of `LIDAR_PRESETS`, whose values name the data sheets
             (field `source`).
-        period: duration of a revolution [s]; by default that of the data sheet.
-        num_columns: columns in a revolution; by default those of the data
+        period: duration of a revolution [s]; by default the duration in the
+            data sheet.
+        num_columns: columns in a revolution; by default the number in the data
             sheet. If the lasers of a unit fire at a fixed rate, the period
             determines this number.
-        min_range: nearest range that is measured [m]; by default that of the
-            data sheet.
-        max_range: farthest range that is measured [m]; by default that of the
-            data sheet.
+        min_range: nearest range that is measured [m]; by default the value in
+            the data sheet.
+        max_range: farthest range that is measured [m]; by default the value in
+            the data sheet.
 
     Raises:
         ValueError: there is no preset of that name, `num_columns` is given for

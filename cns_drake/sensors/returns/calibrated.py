@@ -112,8 +112,8 @@ class CalibratedReturns:
     def reach(self, max_range: float) -> float:
         """Returns how far rays must be cast [m], given the maximum range [m].
 
-        The result exceeds the maximum range, since range noise can bring a
-        farther surface into range.
+        The result exceeds the maximum range, because range noise can bring a
+        surface beyond the maximum range into range.
         """
         return max_range + 8.0 * self.sheet.range_noise
 
@@ -318,8 +318,8 @@ class CalibratedTurn:
     Attributes:
         d_Sset: (N, 3) true unit directions of the beams in S.
         height: (N,) height of each beam's laser above the origin of S [m].
-        blocks: for each run of consecutive beams at the same laser height: this
-            height, and a slice that selects the beams.
+        blocks: for each run of consecutive beams with the same laser height,
+            this height and a slice that selects the beams.
         reported: (N, 3) unit directions in S that the unit reports.
         p_SLset: (N, 3) position of each beam's laser in S [m].
         beam: (N,) number of each beam in firing order.

@@ -104,7 +104,7 @@ def report_echoes(
     range_error: np.ndarray,
     gain: np.ndarray,
 ) -> Reported:
-    """Returns the points that the unit reports for the light it receives.
+    """Returns the points that the unit reports for the received light.
 
     Light from distances that differ by less than half a pulse length forms one
     echo. The distance of the echo is the mean of these distances, weighted by

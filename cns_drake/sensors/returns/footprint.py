@@ -1,11 +1,11 @@
 """The width of a beam: additional rays next to edges.
 
-A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from its
-axis; w is the radius at 1 / e^2. If a neighbouring beam hits another surface,
-an additional ray is cast at a random place in the half of the beam towards this
-neighbour. It represents this half of the beam, so half of the light goes to the
-surface that the additional ray hits. On average over many beams, this
-reproduces the full profile of irradiance.
+A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from the
+beam's axis; w is the radius at 1 / e^2. If a neighbouring beam hits another
+surface, an additional ray is cast at a random place in the half of the beam
+towards this neighbour. The additional ray represents this half of the beam, so
+half of the light goes to the surface that the additional ray hits. On average
+over many beams, this reproduces the full profile of irradiance.
 """
 
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Sides(NamedTuple):
     Attributes:
         row: (P,) index of the beam among the beams of the revolution.
         neighbour: (P,) index of the neighbouring beam beyond the edge.
-        share: (P,) fraction of its beam's light that the ray represents.
+        share: (P,) fraction of the beam's light that the ray represents.
         d_Wset: (P, 3) unit directions in the world.
         reach: (P,) float32 length to cast, just beyond the nearer surface [m].
     """
@@ -60,7 +60,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     Args:
         shots: the N beams.
         orders: (2, N) two orders of the beams. Beams that are consecutive in
-            one of them are neighbours.
+            one of the two orders are neighbours.
         hits: hits of the N beams' axes.
     """
     farthest = _NEIGHBOURS * shots.divergence
@@ -185,8 +185,8 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
         hits: hits of the N beams' axes.
 
     Returns:
-        (N,) fraction of each beam's light that its axis represents; its
-        additional rays represent the rest.
+        (N,) fraction of each beam's light that its axis represents; the
+        additional rays of the beam represent the other light.
     """
     rest = np.ones(len(hits.ranges))
     for side in range(len(sides.row)):

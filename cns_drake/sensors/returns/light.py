@@ -113,7 +113,7 @@ class Light(NamedTuple):
         beam: (N,) int64 number of each portion's beam.
         distance: (N,) float64, from the time of flight [m].
         energy: (N,) float64 product of reflectivity, cosine of incidence, and
-            fraction of the beam's light that got there and back.
+            fraction of the beam's light that reaches the surface and returns.
         geometry: (N,) int32 index of the reflecting geometry.
     """
 
@@ -136,7 +136,7 @@ def reflect(
 
     Args:
         beam: (N,) number of the beam of each ray.
-        share: (N,) fraction of its beam's light that a ray represents.
+        share: (N,) fraction of a beam's light that each ray represents.
         distance: (N,) length of each ray's path to the surface [m].
         geometry: (N,) index of the geometry that each ray hits.
         cosine: (N,) cosine of the angle of incidence.

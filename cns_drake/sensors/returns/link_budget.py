@@ -1,15 +1,15 @@
 """The strength of an echo, its detection and its error.
 
-One equation holds for all surfaces, the LiDAR equation of an extended target
-(Wagner et al., ISPRS Journal 60, 2006):
+The same equation holds for all surfaces: the LiDAR equation of an extended
+target (Wagner et al., ISPRS Journal 60, 2006):
 
     SNR(e, r) = S e exp(-2 (alpha + alpha_0) r) / r^2
 
 Here e is the target's reflectivity times the cosine of incidence, and alpha is
-the extinction of the weather. S and alpha_0 are constants of the unit. They
-follow from two rows of its data sheet: the ranges at 80 % and at 10 %
-reflectivity. alpha_0 accounts for the whole deviation of these rows from 1 /
-r^2.
+the extinction of the weather. S and alpha_0 are constants of the unit. S and
+alpha_0 follow from two rows of the unit's data sheet: the ranges at 80 % and at
+10 % reflectivity. alpha_0 accounts for the whole deviation of these rows from 1
+/ r^2.
 """
 
 from dataclasses import dataclass

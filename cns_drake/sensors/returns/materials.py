@@ -26,11 +26,11 @@ class Materials(NamedTuple):
         kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (for volumes of
             leaves), `SPRAYS` (for sheets that stand for leaves on a twig) or
             `BEADS` (for the beads of road markings, which reflect light back to
-            its source even if it grazes the road; EN 1436 measures them at
-            1.24 deg).
-        reflectivity: (G,) float32 reflectivity. For a retro-reflector, it is
-            relative to a Lambertian target of reflectivity 1 that faces the
-            beam.
+            its source even at grazing incidence; EN 1436 measures road markings
+            at 1.24 deg).
+        reflectivity: (G,) float32 reflectivity. The reflectivity of a
+            retro-reflector is relative to a Lambertian target of reflectivity 1
+            that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
         rough: (G,) float32 factor k of rough surfaces: the cosine of incidence
             is replaced by cos + k sin^2.

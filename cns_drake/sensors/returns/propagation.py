@@ -7,7 +7,7 @@ clump of leaves or twig pass the same leaf area before they hit a leaf, in every
 scan of every drive.
 
 A glass pane reflects the fraction R of the light like a mirror and transmits
-the fraction T, by Fresnel's equations for both of its faces. Light returns
+the fraction T, by Fresnel's equations for both faces of the pane. Light returns
 directly from a pane in two ways: scattered by dust on the pane, and mirrored if
 the beam hits the pane at right angles.
 """
@@ -64,10 +64,10 @@ class Ways(NamedTuple):
         d_Wset: (N, 3) unit directions in the world.
         time: (N,) float32 firing time as a fraction of the revolution.
         length: (N,) length of the path so far [m].
-        energy: (N,) fraction of the beam's light that gets to the origin and
-            back.
-        depth: (N,) optical depth of foliage that each ray can still pass before
-            it hits a leaf.
+        energy: (N,) fraction of the beam's light that reaches the origin and
+            returns.
+        depth: (N,) optical depth of foliage that each ray still passes before
+            the ray hits a leaf.
         inside: (N,) index of the geometry inside which each ray begins; -1 for
             none.
         reach: (N,) float32, the range beyond which a ray need not be followed
@@ -100,7 +100,7 @@ def start_ways(
 
     Args:
         shots: the beams.
-        rest: (N,) fraction of its beam's light that the ray along the axis
+        rest: (N,) fraction of each beam's light that the ray along the axis
             carries.
         hits: hits of the rays along the axes.
         sides: the additional rays.

@@ -1,7 +1,7 @@
 """Counter-based random numbers, without the state of a generator.
 
-A random number depends only on a key, a beam and its index among the numbers of
-this beam, and not on other beams or on the order of computation.
+A random number depends only on a key, a beam and the number's index among the
+numbers of this beam, and not on other beams or on the order of computation.
 """
 
 import numpy as np

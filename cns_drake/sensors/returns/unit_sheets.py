@@ -20,7 +20,7 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Response:
-    """How a unit converts energy to intensity. Data sheets do not state this.
+    """How a unit converts energy to intensity, which no data sheet states.
 
     Attributes:
         slope: the intensity of a diffuse target is `full` plus `slope` times
@@ -31,9 +31,10 @@ class Response:
         far: range up to which the unit compensates intensity for distance [m],
             if `slope` is not 0. With a slope of 0, the unit compensates at
             every range.
-        floor: intensities below this are reported as 0, whatever the gain.
-        least: echoes of less energy are not reported even at close range, where
-            the unit turns its power down.
+        floor: least intensity. Lower intensities are reported as 0, whatever
+            the gain.
+        least: least energy of a reported echo, even at close range, where the
+            unit reduces its power.
         gain: standard deviation of the gain over the lasers; the mean gain is
             1.
         dim: lowers the gains of dim lasers. If a gain is more than one standard
@@ -77,8 +78,9 @@ class Head:
             [deg], its height above the origin [m], and a factor by which its
             range errors are multiplied.
         alternate: range offset [m]. Every second laser, starting with the
-            first, measures this much too far and the other lasers this much too
-            near. The offset is part of the lasers' range errors.
+            first, measures ranges that are too long by this offset; all other
+            lasers measure ranges that are too short by this offset. The offset
+            is part of the lasers' range errors.
         tick_deg: step in which azimuths are reported [deg]; 0 for exact
             azimuths. With a step, each laser has an azimuth offset of its own,
             of up to one step.

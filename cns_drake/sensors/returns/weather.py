@@ -17,7 +17,8 @@ Fog is a homogeneous medium. With the meteorological visibility V [m], its
 extinction is alpha = ln 20 / V [1/m], and its back-scatter coefficient is 0.046
 / V [1/(m sr)] (Rasshofer et al., 2011).
 
-The section "Limits" of docs/notes/calibrated_returns.md says what is missing.
+The section "Limits" of docs/notes/calibrated_returns.md lists what the model
+lacks.
 """
 
 from dataclasses import dataclass
@@ -137,14 +138,14 @@ class Scattering(NamedTuple):
 
     Attributes:
         distances: (R,) increasing distances [m].
-        counts: (R,) mean number of drops per beam that are detected and nearer
-            than each distance.
+        counts: (R,) mean number of drops per beam that are detected within each
+            distance.
         energies: (R, Q) quantiles of the energy of a drop's echo at each
             distance.
         fog_energies: (R,) energy of the echo of fog at each distance; 0 without
             fog.
-        fog_counts: (R,) share of the light from fog that comes from nearer than
-            each distance.
+        fog_counts: (R,) share of the light from fog that comes from within each
+            distance.
     """
 
     distances: np.ndarray
@@ -175,8 +176,8 @@ def tabulate_scattering(
         weather: fog, rain and snowfall.
         budget: link budget of the LiDAR: SNR by distance and reflectivity.
         divergence: half angle of a beam [rad].
-        resolution: distance below which two echoes merge: half the length of a
-            pulse [m].
+        resolution: distance between two echoes below which they merge: half the
+            length of a pulse [m].
         min_range: least range of the LiDAR [m].
     """
     # Slow to import, and most drives have clear air.
