@@ -81,13 +81,14 @@ from evaluation.study.collection import (
     find_recordings,
 )
 from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.parts import MakePart, StudyFiles
+from evaluation.study.parts import MakePart
 from evaluation.study.recorded import (
     ExtractionJobs,
     RecordedCondition,
     chosen_sessions,
     recorded_comparisons,
 )
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask

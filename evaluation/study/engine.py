@@ -27,11 +27,11 @@ from evaluation.results.table import (
     made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import StudyFiles
 from evaluation.study.removed_descriptors import (
     remove_descriptors,
-    restore_descriptors,
+    renew_removed_descriptors,
 )
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
 
 # What a study takes is told if it takes longer, as costs of jobs say [s].
@@ -119,7 +119,7 @@ class Engine:
             self.on_note(text)
         make_folder(self.output)
         jobs = list(self.jobs.values())
-        restore_descriptors(jobs)
+        renew_removed_descriptors(jobs)
         told = forecast(jobs, cluster, least=_LONG)
         if told is not None:
             self.on_note(

@@ -29,8 +29,9 @@ from evaluation.methods import MethodConfig
 from evaluation.recognition import description
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import FeatureFiles, Part
+from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
+from evaluation.study.study_files import FeatureFiles
 
 # Divisions of a cell's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 2

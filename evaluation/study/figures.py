@@ -23,12 +23,13 @@ from evaluation.report.page_data import (
 from evaluation.results.drawing import PIXELS
 from evaluation.study.collection import MapDrives, Recordings
 from evaluation.study.feature_extraction import DriveSummary
-from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.recorded import ExtractionJobs
 from evaluation.study.sources import (
     DriveSource,
     RecordingSource,
 )
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.task import job_name
 
 # Format of pictures on the page.

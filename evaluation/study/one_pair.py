@@ -16,7 +16,8 @@ from evaluation.change.drive_change import DriveMap
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
-from evaluation.study.parts import Part, StudyFiles
+from evaluation.study.parts import Part
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.task import (
     Held,
     Jobs,

@@ -23,7 +23,7 @@ from evaluation.study.feature_extraction import (
     Further,
 )
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.parts import FeatureFiles
+from evaluation.study.study_files import FeatureFiles
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result
 
 # Expected seconds: for the maps of a drive of 3000 scans, and for its places or

@@ -31,7 +31,7 @@ def remove_descriptors(jobs: Iterable[Job]) -> None:
             job.step.files.remove_descriptors()
 
 
-def restore_descriptors(jobs: Collection[Job]) -> None:
+def renew_removed_descriptors(jobs: Collection[Job]) -> None:
     """Lets jobs compute removed descriptors again that new results need.
 
     Args:
@@ -62,4 +62,4 @@ def restore_descriptors(jobs: Collection[Job]) -> None:
                     stale.add(step.part.path)
                     needed += inputs
     for part in needed:
-        part.restore()
+        part.discard_if_value_removed()

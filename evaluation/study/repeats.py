@@ -11,7 +11,7 @@ from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import described_key
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.parts import StudyFiles
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
 
 

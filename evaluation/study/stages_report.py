@@ -36,7 +36,7 @@ from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.feature_extraction import Further
 from evaluation.study.method_costs import measure_method_costs
-from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.recorded import (
     ExtractionJobs,
     RecordedCondition,
@@ -44,9 +44,10 @@ from evaluation.study.recorded import (
 )
 from evaluation.study.removed_descriptors import (
     remove_descriptors,
-    restore_descriptors,
+    renew_removed_descriptors,
 )
 from evaluation.study.repeats import Repeat, repeats_of
+from evaluation.study.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Pair, Result, Task
@@ -149,7 +150,7 @@ class StagesReport:
         if self._costed_pairs:
             needs = tuple(job.name for job in jobs)
             jobs.append(self._cost_job(self._costed_pairs[0], needs))
-        restore_descriptors(jobs)
+        renew_removed_descriptors(jobs)
         return jobs
 
     @property

@@ -24,8 +24,9 @@ from evaluation.study.feature_extraction import (
     map_source,
 )
 from evaluation.study.measurements import DescribedSource
-from evaluation.study.parts import MakePart, Part, StudyFiles
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import DriveSource
+from evaluation.study.study_files import StudyFiles
 
 # Length of a drive through a shipped city, about [m].
 USUAL_LENGTH = 1400.0

@@ -22,8 +22,9 @@ from evaluation.study.feature_extraction import (
     extract_features,
 )
 from evaluation.study.measurements import measure_method
-from evaluation.study.parts import FeatureFiles, MakePart, Part
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import RecordingSource
+from evaluation.study.study_files import FeatureFiles
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ import pytest
 from evaluation.methods import shipped_methods
 from evaluation.recognition import costs, search
 from evaluation.study.collection import find_recordings
-from evaluation.study.parts import StudyFiles
 from evaluation.study.stages_report import StagesReport
+from evaluation.study.study_files import StudyFiles
 
 pytestmark = pytest.mark.slow
 

@@ -16,8 +16,9 @@ from evaluation.study import measurements
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.measurements import measure_places
-from evaluation.study.parts import FeatureFiles, MakePart, Part
+from evaluation.study.parts import MakePart, Part
 from evaluation.study.sources import RecordingSource
+from evaluation.study.study_files import FeatureFiles
 
 METHODS = (
     MethodChoice("solid"),

@@ -17,7 +17,8 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from evaluation.study import parts
-from evaluation.study.parts import MakePart, Part, decode, encode
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.value_encoding import decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 
@@ -307,7 +308,7 @@ def test_a_step_whose_part_holds_something_else_is_not_done(tmp_path):
 
 def test_a_value_that_is_removed_keeps_its_results(tmp_path):
     part = Part(tmp_path / "one.data")
-    part.restore()
+    part.discard_if_value_removed()
     part.write(INPUTS, np.arange(10_000.0))
     result = MakePart(Part(tmp_path / "result.data"), summed, (("a", part),))
     result.run(Reporter())
@@ -322,23 +323,23 @@ def test_a_value_that_is_removed_keeps_its_results(tmp_path):
         with pytest.raises(InputError, match="its value was removed"):
             part.read()
     (read,) = result.parts()
-    read.restore()
+    read.discard_if_value_removed()
     assert not part.path.exists()
     assert not nothing_left(result)
     with pytest.raises(InputError, match=r"one\.data"):
         part.remove_value()
     part.write(INPUTS, np.arange(10_000.0))
-    part.restore()  # There is nothing to restore.
+    part.discard_if_value_removed()  # Nothing to discard.
     assert len(part.read()) == 10_000
     assert nothing_left(result)
 
 
-def test_a_damaged_part_is_not_restored(tmp_path):
+def test_a_damaged_part_is_not_discarded(tmp_path):
     part = Part(tmp_path / "one.data")
     part.write(INPUTS, [1])
     content = part.path.read_bytes()[:-1]
     part.path.write_bytes(content)
-    part.restore()
+    part.discard_if_value_removed()
     assert part.path.read_bytes() == content
 
 

@@ -1,0 +1,94 @@
+"""Where the files of a study are in its folder."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cns_drake.base.files import file_name
+from evaluation.study.parts import Part
+
+
+@dataclass(frozen=True)
+class FeatureFiles:
+    """The files (`Part`) with all that a study needs of a recording.
+
+    These are the drive's poses and map, its scans at places and queries, and,
+    in one file for each method, the descriptors of these scans.
+
+    Attributes:
+        folder: folder of the files.
+    """
+
+    folder: Path
+
+    @property
+    def drive(self) -> Part:
+        """The file with the drive's poses and map, a `DriveSummary`."""
+        return Part(self.folder / "drive.data")
+
+    @property
+    def fine(self) -> Part:
+        """The file with the cloud for pictures, an array (K, 3)."""
+        return Part(self.folder / "fine.data")
+
+    @property
+    def scans(self) -> Part:
+        """The file with the drive's scans at places and queries.
+
+        For a drive with a map, the file contains a `KeptScans`; otherwise a
+        list of scans (N, 3).
+        """
+        return Part(self.folder / "scans.data")
+
+    def described(self, key: str) -> Part:
+        """Returns the file with a method's descriptors of the drive.
+
+        The file contains a `DriveNames` and a `DriveDescriptors`.
+
+        Args:
+            key: `MethodChoice.key` of the method. For descriptors by a second
+                protocol, what `described_key` of
+                `evaluation.study.feature_extraction` returns.
+        """
+        return Part(self.folder / f"described_{file_name(key)}.data")
+
+    def remove_descriptors(self) -> None:
+        """Removes all descriptors, once results were made from them.
+
+        Descriptors take three quarters of the space; see `Part.remove_value`.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        for path in sorted(self.folder.glob("described_*.data")):
+            Part(path).remove_value()
+
+
+@dataclass(frozen=True)
+class StudyFiles:
+    """The paths of all files of a study.
+
+    Attributes:
+        output: folder of the study.
+    """
+
+    output: Path
+
+    @property
+    def figures(self) -> Path:
+        """The folder of all figures."""
+        return self.output / "figures"
+
+    def features(self, recording: str) -> FeatureFiles:
+        """Returns the files with a recording's map and descriptors."""
+        folder = self.output / "parts" / "features"
+        return FeatureFiles(folder / file_name(recording))
+
+    def part(self, kind: str, *names: str) -> Part:
+        """Returns the file of an intermediate result.
+
+        Args:
+            kind: kind of result, such as `changes`; the name of a folder.
+            names: names of the drives to which the result belongs.
+        """
+        name = ",".join(map(file_name, names))
+        return Part(self.output / "parts" / kind / f"{name}.data")
