@@ -32,8 +32,9 @@ def make_uniform_spline(
     point. At the parameter i * spacing, the spline passes near control point i.
     If all control points lie on a straight line, the spline is this line.
 
-    A bound on all control points is also a bound on the spline. A bound on
-    their difference quotients is also a bound on its derivatives.
+    A bound on all control points is also a bound on the spline. A bound on the
+    difference quotients of the control points is also a bound on the
+    derivatives of the spline.
 
     Args:
         control_points: (N, D) points of any dimension D, N >= 3.
@@ -67,7 +68,8 @@ class SplineDerivatives:
 
         The list contains the values, the first derivatives, the second
         derivatives, and so on. Each entry has the shape (N, D) for a spline of
-        D dimensions. Parameters beyond an end of the spline count as this end.
+        D dimensions. At parameters beyond an end of the spline, the results are
+        those at this end.
         """
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]

@@ -38,8 +38,8 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 
     Args:
         positions: (N,) path parameters [m] at evenly spaced times, one for each
-            `KNOT_PERIOD` [s]. The first three are equal, and so are the last
-            three, so that the drive starts and ends at rest.
+            `KNOT_PERIOD` [s]. The first three are equal, and the last three are
+            equal, so that the drive starts and ends at rest.
     """
     return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
@@ -90,7 +90,7 @@ def find_speed_profile(
 
 
 def drive_positions(profile: SpeedProfile) -> np.ndarray:
-    """Returns where the drive is on its path at evenly spaced times.
+    """Returns the drive's positions on its path at evenly spaced times.
 
     Args:
         profile: speeds of the drive along the path.

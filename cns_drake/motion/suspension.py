@@ -129,11 +129,11 @@ class Suspension:
 
     The body heaves, rolls and pitches. Each wheel moves up and down between its
     spring and its tyre. The coordinates are the heave of the body, positive
-    upwards [m]; its roll and pitch about x and y of B, positive with the right
-    side down and the nose down [rad]; and the heights of the wheels [m]. All
-    coordinates are zero at rest on a level road. The body rotates about the
-    point on the ground below its centre of mass. The model has no anti-dive or
-    anti-squat geometry.
+    upwards [m]; the roll and pitch of the body about x and y of B, positive
+    with the right side down and the nose down [rad]; and the heights of the
+    wheels [m]. All coordinates are zero at rest on a level road. The body
+    rotates about the point on the ground below its centre of mass. The model
+    has no anti-dive or anti-squat geometry.
     """
 
     # The source of the shipped rates has the same centre of rotation.
@@ -199,7 +199,8 @@ class Suspension:
         Args:
             inputs: (W + 3,) constant loads: height of the road below each of
                 the W wheels [m], then the specific force along x, y and z of B,
-                minus its value for a car at rest on a level road [m/s^2].
+                minus the specific force on a car at rest on a level road
+                [m/s^2].
         """
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))
 
@@ -278,10 +279,10 @@ def ride_on_springs(
 ) -> Trajectory:
     """Returns a drive in which the body heaves, rolls and pitches.
 
-    The vehicle follows the same path at the same speed. Its springs react to
-    the acceleration of the body's centre of mass, to gravity on slopes, and to
-    the road profile below each wheel. The road also falls to the right with the
-    slope `crossfall` [m/m].
+    The vehicle follows the same path at the same speed. The vehicle's springs
+    react to the acceleration of the body's centre of mass, to gravity on
+    slopes, and to the road profile below each wheel. The road also falls to the
+    right with the slope `crossfall` [m/m].
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS

@@ -92,9 +92,9 @@ class BodyRide:
     """The motion X_FB(t) of a body B relative to the frame F of its path.
 
     At rest on a level road, B equals F. Heave, roll and pitch and their first
-    and second derivatives are given at evenly spaced times. In between they are
-    polynomials of degree 5, so that accelerations have no jumps. The body
-    rotates about a point on the ground, by its pitch and then by its roll.
+    and second derivatives are given at evenly spaced times. Between these times
+    they are polynomials of degree 5, so that accelerations have no jumps. The
+    body rotates about a point on the ground, by its pitch and then by its roll.
     """
 
     def __init__(
@@ -209,12 +209,12 @@ class Moments(NamedTuple):
 class Trajectory:
     """The motion X_WB(t) of a vehicle along a lane path.
 
-    F is the frame of the path: its origin on the ground follows the path, with
-    x along the tangent, and y horizontal to the left. On a slope, F pitches
-    with the road; F never rolls. The vehicle frame B equals F, unless the body
-    moves on springs relative to F. Velocities and accelerations are exact
-    derivatives of splines, and not differences of samples. The motion starts
-    and ends at rest.
+    F is the frame of the path: its origin on the ground follows the path, x
+    points along the tangent of the path, and y horizontally to the left. On a
+    slope, F pitches with the road; F never rolls. The vehicle frame B equals F,
+    unless the body moves on springs relative to F. Velocities and accelerations
+    are exact derivatives of splines, and not differences of samples. The motion
+    starts and ends at rest.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):

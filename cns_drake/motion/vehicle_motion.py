@@ -51,12 +51,12 @@ class WheelMotion:
     """Steering, rolling and suspension travel of a wheel without slip.
 
     The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, where r is
-    its radius. Let s be the vehicle's speed and m its turn rate about the z
-    axis, both per unit of the path parameter. The velocity of the wheel over
-    the ground is then v = (s - m y, m x), expressed in the vehicle frame. The
-    wheel rolls in this direction: tan(d) = m x / (s - m y) gives its steering
-    angle d, so that a wheel on the rear axle (x = 0) is not steered. The
-    rolling rate is the length of v divided by r.
+    the wheel's radius. Let s be the vehicle's speed and m its turn rate about
+    the z axis, both per unit of the path parameter. The velocity of the wheel
+    over the ground is then v = (s - m y, m x), expressed in the vehicle frame.
+    The wheel rolls in this direction: tan(d) = m x / (s - m y) gives its
+    steering angle d, so that a wheel on the rear axle (x = 0) is not steered.
+    The rolling rate is the length of v divided by r.
 
     While the body moves on its springs, the wheel stays on the road's surface
     in the world: relative to the body, it moves up by as much as the body moves
@@ -157,7 +157,7 @@ class VehicleMotion(LeafSystem):
 
     The vehicle's floating base B follows the trajectory. Revolute joints about
     the y axis of B roll the wheels and revolute joints about z steer them, so
-    that no wheel slips. Prismatic joints along z of B keep their wheels on the
+    that no wheel slips. Prismatic joints along z of B keep the wheels on the
     ground. The joints of all other models keep their default positions.
 
     .. pydrake_system::
@@ -347,9 +347,9 @@ class Sweep(NamedTuple):
 class VehicleSweep(LeafSystem):
     """A system that returns poses of a vehicle just after the current time.
 
-    A LiDAR needs these poses because it rotates during a frame: some beams of a
-    scan are cast later than the time of the scan, for which the SceneGraph has
-    poses.
+    A LiDAR needs these poses because it rotates during a frame: most beams of a
+    scan are cast after the time of the scan, but the SceneGraph has poses only
+    for the time of the scan.
 
     .. pydrake_system::
 

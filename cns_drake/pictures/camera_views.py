@@ -61,8 +61,8 @@ class View(BaseModel):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns where points are in the picture of the camera.
 
-        Points outside the picture are left out, but not points that an object
-        hides.
+        Points outside the picture are left out. Occluded points are not left
+        out.
 
         Args:
             p_WQset: (N, 3) points in W [m].

@@ -42,16 +42,17 @@ class StageDifference:
     """The differences between two stages, as lists of parts of structures.
 
     The two stages are "this stage" and "the other stage". If a structure is
-    higher in one stage, its "upper parts" are those above its height in the
-    other stage.
+    higher in one stage, its "upper parts" are the parts above the structure's
+    height in the other stage.
 
     Attributes:
         common: what exists in both stages, with the shape in this stage.
         additional: what exists only in this stage: whole structures, and upper
-            parts of structures that are higher in this stage.
+            parts of structures that are higher in this stage than in the other
+            stage.
         absent: whole structures that exist only in the other stage.
-        lower: for structures that are lower in this stage, their upper parts,
-            with the shape in the other stage.
+        lower: upper parts of structures that are lower in this stage than in
+            the other stage, with the shape in the other stage.
     """
 
     common: list[Part] = field(default_factory=list)
@@ -93,7 +94,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns which parts of structures exist in one stage, and which in both.
+    """Returns which parts of structures exist in one or in both stages.
 
     A structure that was moved, or has another shape of the same height, counts
     as common to both stages.

@@ -106,7 +106,7 @@ class ShownStages:
         other: a stage with which the stage of the drive is compared; None to
             show no differences.
         other_name: name of this other stage.
-        stage: name of the stage of the drive; None if it belongs to no map.
+        stage: name of the stage of the drive; None if the drive has no map.
         stages: names of all stages of the map, the earliest first.
     """
 
@@ -132,8 +132,8 @@ def make_drive_page(
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: the moving bodies,
     - `/route`: a ribbon along the route,
-    - `/scans/<k>`: LiDAR points coloured by height; each appears when it was
-      measured,
+    - `/scans/<k>`: LiDAR points coloured by height; each point appears at the
+      time of its measurement,
     - `/stage_difference/additional/<class>`: parts of the city that are missing
       or lower in the other stage; they are not in `/city`,
     - `/stage_difference/absent/<class>`: structures that exist only in the

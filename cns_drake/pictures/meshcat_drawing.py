@@ -98,7 +98,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 
     Args:
         meshcat: Meshcat's server.
-        path: path of the cone in Meshcat. The frame is that of this path.
+        path: path of the cone in Meshcat, to which the frame belongs.
     """
     meshcat.SetObject(
         path,

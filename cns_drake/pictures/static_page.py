@@ -58,15 +58,16 @@ def make_static_page(
 ) -> str:
     """Returns a Meshcat scene as a web page that needs no server.
 
-    It is the page that Drake makes, but with compressed commands, so that a
-    city takes a third of the space. Browsers can decompress them since 2023.
+    The page is that of Drake, but with compressed commands, so that a city
+    takes a third of the space. Browsers can decompress such commands since
+    2023.
 
     Args:
         meshcat: the server with the scene.
         title: title of the page, plain text.
         body: HTML that precedes the scene and is visible while the scene loads.
-        script: JavaScript module that runs when the page is ready. In it,
-            `commands` is a JavaScript promise of the scene's commands.
+        script: JavaScript module that runs when the page is ready. In this
+            module, `commands` is a JavaScript promise of the scene's commands.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)

@@ -2,7 +2,8 @@
 
 A ray that misses the polyhedron around a shape also misses the shape, unless
 the ray starts between polyhedron and shape. Rays are therefore cast on the
-polyhedra first, and only the few that hit are cast on the shapes themselves.
+polyhedra first, and only the few rays that hit a polyhedron are cast on the
+shapes themselves.
 
 Rays that run along the axis of a capsule are cast in closed form, because
 Embree's rounded segments lose most rays within 1e-3 rad of their axis. Only
@@ -193,7 +194,7 @@ class CapsuleAxes:
 
         Args:
             rays: N rays.
-            hits: their hits as Embree found them, changed in place.
+            hits: hits of the N rays as Embree found them, changed in place.
         """
         seen = [one for one in self._found if one[1].in_sight]
         if not (seen and len(rays.d_Sset)):

@@ -3,7 +3,7 @@
 Curved shapes are not tessellated: Embree intersects spheres, cones, discs and
 rounded segments exactly (in float32), and an ellipsoid is an instance of the
 unit sphere. A curved shape in a scene slows down all rays of the scene by a
-third (measured), even rays that meet only triangles. Curved shapes that never
+third (measured), even rays that hit only triangles. Curved shapes that never
 move are therefore in a second hierarchy. The first hierarchy contains polyhedra
 around these shapes; only the few rays that hit a polyhedron are cast on the
 second hierarchy. Curved shapes that move are in the first hierarchy themselves,
@@ -108,7 +108,8 @@ def merge_second(group: RayGroup) -> Iterator[Primitives]:
 
     A group that cannot move adds its curved shapes; any other group adds
     nothing. A ray is cast on the second hierarchy only if it hits one of the
-    polyhedra around curved shapes, or starts in one (see `merge_first`).
+    polyhedra around curved shapes, or starts in such a polyhedron (see
+    `merge_first`).
     """
     if group.frame_id is None:
         yield from merge_curved(_numbered(group))
@@ -519,8 +520,8 @@ class EmbreeScene:
         Args:
             rays: the rays.
             with_normals: whether to find normals as well.
-            solid: shapes that rays can hit: flat and curved ones (`SOLID`), or
-                only curved ones (`CURVED`).
+            solid: shapes that rays can hit: flat and curved shapes (`SOLID`),
+                or only curved shapes (`CURVED`).
         """
         hits = self._first.cast(
             rays, mask=solid | PROXY, with_normals=with_normals

@@ -33,7 +33,7 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose X_WF of a frame F, computed if it is not known.
+        """Returns the pose X_WF of a frame F, computed if it is unknown.
 
         Args:
             frame: the frame F.
@@ -142,8 +142,7 @@ class MovingGroups:
         Args:
             calc_X_WF: function that returns the pose of a frame in the world.
             motions: motions of frames that move during the LiDAR's revolution.
-            known: poses that are used, where they exist, instead of calling
-                `calc_X_WF`.
+            known: known poses, for which `calc_X_WF` is not called.
             seen: ball in the world that contains all rays.
 
         Returns:

@@ -58,7 +58,7 @@ class RayCastingScene:
 
     Coordinates are relative to a point O in the middle of the merged geometry,
     so that float32 resolves 1e-5 m within 200 m of O, wherever the world's
-    origin is. If the sensor is more than 1 km from that middle, O is near the
+    origin is. If the sensor is more than 1 km from this middle, O is near the
     sensor instead.
     """
 
@@ -128,10 +128,9 @@ class RayCastingScene:
         Args:
             calc_X_WF: function that returns the pose of a frame in the world.
             motions: motions of frames that move during the LiDAR's revolution.
-            known: poses that are used, where they exist, instead of calling
-                `calc_X_WF`.
-            seen: ball that contains all rays; geometry outside of it is not
-                moved.
+            known: known poses, for which `calc_X_WF` is not called.
+            seen: ball that contains all rays; geometry outside of the ball is
+                not moved.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
@@ -171,7 +170,7 @@ class RayCastingScene:
         """Returns the first hits of N rays from one or several poses of S.
 
         S is a sensor, such as a LiDAR, which may move during its revolution.
-        Ray i has direction i. Of every other array, ray i uses entry i mod n,
+        Ray i has direction i. From every other array, ray i uses entry i mod n,
         where n is the length of the array.
 
         Args:
@@ -181,7 +180,7 @@ class RayCastingScene:
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world.
             times: (T,) times at which rays are cast, from 0 at the start of the
                 revolution to 1 at its end; by default 0.
-            with_normals: whether to return also the normals of the surfaces, as
+            with_normals: whether to also return the normals of the surfaces, as
                 they are at the start of the revolution.
             exact: whether rays are cast on triangles in double precision, from
                 exact origins. A cast then takes several times as long; the

@@ -85,17 +85,17 @@ class RayGroup:
 
     Attributes:
         frame_id: the frame F to which the group is fixed; None for the world.
-        X_FL: (4, 4) affine map from L to F. It is not rigid for an ellipsoid,
-            since an ellipsoid is the unit sphere in L.
+        X_FL: (4, 4) affine map from L to F. The map is not rigid for an
+            ellipsoid, because an ellipsoid is the unit sphere in L.
         members: the geometry of the group, expressed in L. A half space has a
             group of its own; its surface is z = 0 in L.
         is_merged_world: whether the group is the merged geometry that never
             moves; L then has the axes of the world and the origin of O.
         X_OL: (3, 4) affine map from L to the scene's frame O, at the start of a
-            revolution; it does not exist before `place` is called.
+            revolution; missing until `place` is called.
         motion: motion of F during the revolution; None if F does not move.
-        in_sight: whether rays can meet the group. If not, `X_OL` and `motion`
-            are those of an earlier revolution.
+        in_sight: whether rays can meet the group. If rays cannot meet the
+            group, `X_OL` and `motion` are those of an earlier revolution.
     """
 
     frame_id: FrameId | None
@@ -146,7 +146,7 @@ class RayGroup:
         """Returns a key of the group's shapes and their poses in the group.
 
         Groups with equal keys can share one Embree scene. A key is valid as
-        long as the surfaces of its group exist in memory.
+        long as the surfaces of the group exist in memory.
         """
         shapes = tuple(
             (
@@ -183,8 +183,9 @@ def group_geometries(
 
     Returns:
         p_WO, (3,) [m]: the middle of the geometry that never moves or, if the
-        sensor is far from there, a point near the sensor. The groups: first the
-        geometry that never moves (if there is any), last the half spaces.
+        sensor is far from this middle, a point near the sensor. The groups:
+        first the geometry that never moves (if there is any), last the half
+        spaces.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)

@@ -16,9 +16,9 @@ class Rays(NamedTuple):
     """N rays, cast from one or several poses of a sensor S.
 
     O is the frame of the scene: its axes are those of the world, and its origin
-    is so near to the sensor that float32 is precise. Ray i has direction i. In
-    all other arrays, entry i mod n belongs to ray i, where n is the length of
-    the array.
+    is near enough to the sensor for float32 to be precise. Ray i has direction
+    i. In all other arrays, entry i mod n belongs to ray i, where n is the
+    length of the array.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].
@@ -56,7 +56,7 @@ class Rays(NamedTuple):
 
 @compiled
 def rotate(R_FSset: np.ndarray, d_Sset: np.ndarray) -> np.ndarray:
-    """Returns directions, given in a frame S, as expressed in a frame F.
+    """Returns directions of a frame S, expressed in a frame F.
 
     Direction i is rotated by orientation i mod L. Products are added in a fixed
     order, because the results of a matrix library depend on the processor.

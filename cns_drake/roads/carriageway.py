@@ -40,8 +40,8 @@ class Areas:
         sidewalks: areas beside the roads and around all corners, at kerb
             height.
         medians: strips with kerbs between the two directions.
-        parking_bays: (name of the road, side) -> area of the bays. The side,
-            "left" or "right", is as seen in the road's direction `forward`.
+        parking_bays: (name of the road, side) -> area of the bays. The side is
+            "left" or "right", as seen in the road's direction `forward`.
     """
 
     carriageway: MultiPolygon
@@ -101,10 +101,11 @@ def junction_area(
 ) -> BaseGeometry:
     """Returns the area between the ends of a junction's roads.
 
-    The area is made in three steps. All roads are extended to the junction's
-    position and united; the corners between them are filled, so that kerbs have
-    the junction's radius; the roads outside the junction are cut off. At a dead
-    end, the area is a disc around the end of the road.
+    The area is made in three steps. First, all roads are extended to the
+    junction's position and united. Second, the corners between the roads are
+    filled, so that kerbs have the junction's radius. Third, the roads outside
+    the junction are cut off. At a dead end, the area is a disc around the end
+    of the road.
     """
     stubs = [_arm_centreline(roads[arm.road], arm) for arm in junction.arms]
     parts = [

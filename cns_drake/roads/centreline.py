@@ -137,11 +137,11 @@ def blend(
     Both points are included. If the line straight ahead of the start meets the
     line behind the end, the curve consists of these two lines and the widest
     allowed arc that touches both lines, as a driver turns. Otherwise (parallel
-    lanes that are offset, S-bends) it is a cubic Hermite curve.
+    lanes that are offset, S-bends) the curve is a cubic Hermite curve.
 
     Args:
-        p_start, p_end: the points [m].
-        heading_start, heading_end: directions there [rad].
+        p_start, p_end: the points [m]. heading_start, heading_end: directions
+        at these points [rad].
         spacing: approximate distance between two points of the curve [m].
         max_radius: greatest radius of the arc [m].
     """

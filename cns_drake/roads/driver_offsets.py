@@ -1,9 +1,9 @@
 """How a driver departs from the line of a route or of waypoints.
 
 The paths of two people who drive along the same route differ by about half a
-metre for some 50 m at a time, and sometimes by a lane. Here, the offset from
-the line is an Ornstein-Uhlenbeck process over the distance, smoothed so that a
-car can be steered along it. Lane changes are added to this offset.
+metre over stretches of some 50 m, and sometimes by a lane. Here, the offset
+from the line is an Ornstein-Uhlenbeck process over the distance, smoothed so
+that a car can follow it. Lane changes are added to this offset.
 """
 
 import math
@@ -71,8 +71,8 @@ def driven_path(
     above. Where this is not possible, the car stays on `path`.
 
     Args:
-        path: the path of a driver who does neither, with points every
-            `FINE_SPACING`.
+        path: the path of a driver who neither wanders nor changes lanes, with
+            points every `FINE_SPACING`.
         spacing: distance between the points of the result [m].
         obstacles: index of the edges of obstacles, such as kerbs and walls.
         source: text with which error messages begin.

@@ -88,8 +88,8 @@ class RoadNetwork:
     ) -> Connection:
         """Returns the path through a junction from one lane to another.
 
-        The path need not be legal; see `RoadNetwork.is_legal`. Its points are
-        about `spacing` apart [m].
+        The path need not be legal; see `RoadNetwork.is_legal`. The points of
+        the path are about `spacing` apart [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a
@@ -153,10 +153,11 @@ class RoadNetwork:
         """Returns whether traffic may take a path through a junction.
 
         A left turn leads from the innermost lane to the innermost lane, and a
-        right turn from the outermost to the outermost. A path straight on leads
-        to the lane with the same number, counted from the middle of the road.
-        Between one-way roads, such as those of a roundabout, every path leads
-        to the lane with the same number, counted from the kerb on the right.
+        right turn from the outermost lane to the outermost lane. A path
+        straight on leads to the lane with the same number, counted from the
+        middle of the road. Between one-way roads, such as those of a
+        roundabout, every path leads to the lane with the same number, counted
+        from the kerb on the right.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
         if all(self._is_one_way(lane) for lane in (incoming, outgoing)):

@@ -126,7 +126,7 @@ def read_roads_file(path: Path | str) -> RoadsFile:
 
     Raises:
         InputError: the file cannot be read, is not YAML, or has an unknown key,
-            a missing one or a value of the wrong type.
+            a missing key or a value of the wrong type.
     """
     path = Path(path)
     return validated(RoadsFile, _with_defaults(read_yaml(path)), path)
@@ -175,8 +175,8 @@ class LaneRef(NamedTuple):
 class Road:
     """A road between two junctions, which ends at the junctions' areas.
 
-    The centreline is the middle of the carriageway, also for a one-way road or
-    one with more lanes in one direction. Arc lengths ("stations") are measured
+    The centreline is the middle of the carriageway, also on a one-way road or a
+    road with more lanes in one direction. Arc lengths ("stations") are measured
     along the whole centreline, from the position of the start junction; the
     road itself extends from `first_station` to `last_station`. Lateral offsets
     are positive to the left of the direction `forward`.
@@ -280,8 +280,8 @@ class Road:
     ) -> np.ndarray:
         """Returns evenly spaced stations (N,) between the junctions' areas [m].
 
-        They are at most `spacing` apart. The first and the last station are
-        `clearance` away from the ends of the road.
+        The stations are at most `spacing` apart. The first and the last station
+        are `clearance` away from the ends of the road.
         """
         first = self.first_station + clearance
         last = self.last_station - clearance
@@ -292,10 +292,10 @@ class Road:
         return self.evaluate(self.stations(spacing))[:, :3]
 
     def lane_offset(self, direction: Direction, lane: int) -> float:
-        """Returns how far a lane's middle is to the left of the centreline [m].
+        """Returns the distance of a lane's middle from the centreline [m].
 
-        Left is as seen in the direction `forward`; lanes on the right have
-        negative offsets.
+        The distance is positive for a lane to the left of the centreline, as
+        seen in the direction `forward`, and negative for a lane to the right.
 
         Raises:
             ValueError: the road has no such lane.
@@ -370,7 +370,7 @@ class Junction:
         position: x and y of the point where the centrelines meet [m].
         height: height z of the junction [m].
         kerb_radius: radius of the kerb round each corner [m].
-        arms: the ends of its roads, in counter-clockwise order.
+        arms: the ends of the junction's roads, in counter-clockwise order.
     """
 
     name: str

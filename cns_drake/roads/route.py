@@ -95,7 +95,8 @@ def make_lane_path(
     change of lane (`RoadNetwork.is_legal`). Lanes change only along a leg.
     Within a junction, the lower speed limit of the two roads holds. If the next
     leg leads back on the same road, the car turns round in a loop to the left:
-    at the leg's end, or as near to the junction as there is room.
+    at the leg's `end` or, without an `end`, as near to the junction as there is
+    room.
 
     Args:
         network: the road network.
@@ -365,7 +366,7 @@ def draw_route(
 ) -> Route:
     """Returns a random legal route, preferably along roads not yet driven.
 
-    The total length of its roads is at least `length` [m].
+    The total length of the route's roads is at least `length` [m].
 
     Raises:
         InputError: no route in the network can be continued without end.

@@ -108,13 +108,13 @@ def find_loop(
 ) -> Loop:
     """Returns a U-turn into the opposite lane that fits into an area.
 
-    Several places along the lane are tried, and the first one that has enough
+    Several places along the lane are tried, and the first place with enough
     room is chosen.
 
     Args:
         lanes_at: function that takes a distance along the lane [m], and returns
-            the pose there: x, y [m] and heading [rad], (3,); and the distance
-            to the opposite lane on the left [m].
+            the pose at this distance: x, y [m] and heading [rad], (3,); and the
+            distance to the opposite lane on the left [m].
         centres: (N,) distances along the lane at which the centre of the loop
             may be, in the order in which they are tried [m].
         area: the area in which the whole car must stay.

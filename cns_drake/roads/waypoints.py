@@ -56,7 +56,7 @@ def load_waypoint_path(
     Raises:
         InputError: a line of the file is not usable, or the path turns too
             sharply, is too short or is too long for a drive. The message names
-            the file and, if the fault is in one line, this line.
+            the file and, if the fault is in a single line, the line.
     """
     path = Path(path)
     points, lines = read_waypoints(path)

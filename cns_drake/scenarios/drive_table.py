@@ -53,13 +53,13 @@ def drive_rows(
     folder: Path,
     sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[DriveRow]:
-    """Returns the table rows of those drives of a map whose stage exists.
+    """Returns the table rows of a map's drives whose stages exist.
 
     Args:
         folder: folder of the map.
-        sizes: stage -> its numbers of structures and triangles, if known. For a
-            stage without an entry, the world is loaded to count them, which
-            takes long.
+        sizes: stage -> numbers of structures and triangles in the stage, if
+            known. For a stage without an entry, the world is loaded to count
+            structures and triangles, which takes long.
 
     Raises:
         InputError: if a drive cannot be read or planned, or its stage cannot

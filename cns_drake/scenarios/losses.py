@@ -1,10 +1,10 @@
 """Structures that are missing from the city of a drive, as experiments say.
 
-A share of the buildings and plants is missing, namely those nearest to a random
-place: a drive with a greater share lacks everything that a drive with a smaller
-share lacks. The removed structures can also be limited to those that an earlier
-stage lacks; the city is then between the two stages. In addition, structures of
-chosen classes can be missing at random.
+A share of the buildings and plants is missing. The missing structures are those
+nearest to a random place, so a drive with a greater share lacks everything that
+a drive with a smaller share lacks. The removed structures can also be limited
+to those that an earlier stage lacks; the city is then between the two stages.
+In addition, structures of chosen classes can be missing at random.
 """
 
 from collections.abc import Mapping, Sequence, Set

@@ -47,7 +47,8 @@ _STEEP = 0.7
 class DrivePlan:
     """The plan of a scenario's drive: its roads and its trajectory.
 
-    Both are read or planned when they are first used, and only once.
+    The roads are read, and the trajectory is planned, only once: when they are
+    first used.
 
     Attributes:
         scenario: the scenario.
@@ -82,7 +83,7 @@ class DrivePlan:
         return self._on_springs(self._rigid_motion)
 
     def trajectory_at(self, positions: np.ndarray) -> Trajectory:
-        """Returns the motion of a car that keeps its distance to others.
+        """Returns the motion of a car that keeps its distance to other cars.
 
         Args:
             positions: (N,) distances along the path at evenly spaced times [m],

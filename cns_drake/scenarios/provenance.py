@@ -98,7 +98,7 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
 
     Args:
         scenario: the scenario.
-        inputs: digests of its files, see `digest_inputs`.
+        inputs: digests of the scenario's files, see `digest_inputs`.
     """
     places: dict[str, object] = {
         field: Path(place).name
@@ -129,7 +129,7 @@ def recording_code() -> str:
 
 
 def digest_file(path: Path, watch: FileWatch | None = None) -> str:
-    """Returns the SHA-256 digest of a file and, for a model, of what it names.
+    """Returns the SHA-256 digest of a file, or of a model and its files.
 
     A model in SDF or URDF names other files, such as meshes.
 

@@ -250,7 +250,8 @@ class TransientConfig(Section):
 
     `roadsides` is applied first, so all other switches also change the objects
     that `roadsides` adds. Apart from that, the switches are independent: the
-    effect of each depends only on the seed and on the names of structures.
+    effect of each switch depends only on the seed and on the names of
+    structures.
 
     Attributes:
         seed: seed of all random numbers.
@@ -269,7 +270,7 @@ class TransientConfig(Section):
             road works: fences, skips or diggers beside the road, and a new kerb
             stone that reaches 0.3 m into the road.
         furniture: share of the poles, lamps and signs that are replaced by new
-            ones up to 2 m away.
+            poles, lamps and signs up to 2 m away.
         roadsides: share of the free places beside kerbs, within 30 m of the
             drive, that get hedges, garden walls, bushes, young trees, garages
             or parked cars. Only the cars depend on the seed; all other added
@@ -544,7 +545,7 @@ class Scenario(Section):
             returns: `ideal` or `calibrated`. With `calibrated`, the settings
                 for noise and losses of ideal returns are removed; with `ideal`,
                 weather, echoes and errors of the unit are removed.
-            weather: the weather; by default that of the scenario.
+            weather: the weather; by default the scenario's own weather.
         """
         if returns == "ideal":
             update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
@@ -619,7 +620,7 @@ class Scenario(Section):
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
-        The LiDARs keep their poses and the settings of their measurements.
+        The LiDARs keep their poses and all settings of how they measure.
 
         Args:
             preset: name of the model's preset, such as `vlp-16`.

@@ -154,8 +154,8 @@ def find_files(values: dict, path: Path) -> None:
 
     Args:
         values: the fields, which are changed.
-        path: the file that contains the fields; relative paths start at its
-            folder.
+        path: the file that contains the fields. Relative paths start at the
+            folder of this file.
 
     Raises:
         InputError: a value cannot be a path.
@@ -229,14 +229,14 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 
 
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
-    """Returns the scenario's fields that are set, ready for JSON.
+    """Returns the fields that are set in a scenario, ready for JSON.
 
     The field `imu.kalibr` becomes `imu.yaml`: a recording contains the noise of
     its IMU in a file of this name.
 
     Args:
         folder: folder to which the paths of map, world, waypoints and SUMO
-            trace are made relative. None keeps only their names.
+            trace are made relative. None keeps only the names of these files.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
     for fields, field in (

@@ -22,9 +22,8 @@ def collected_errors() -> Iterator[list[str]]:
     """Context manager that collects the errors that Drake logs.
 
     The context variable is the list of error messages, which are not printed.
-    Drake's warnings are printed at the end of the `with` block. After an
-    exception they are not printed, because a command prints only one line for
-    an error.
+    Drake's warnings are printed at the end of the `with` block, except after an
+    exception, because a command prints only one line for an error.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

@@ -55,7 +55,7 @@ class ModelFinder:
         self._places = [*map(Path, model_paths), *named, *near]
 
     def find(self, uri: str, folder: Path) -> Path | None:
-        """Returns the file or folder of a URI; None if it does not exist.
+        """Returns the file or folder of a URI, or None if there is none.
 
         Args:
             uri: `model://<name>/...`, an absolute path, or a relative path.
@@ -199,7 +199,7 @@ def is_gazebo_world(path: Path, root: Element) -> bool:
 
     Args:
         path: the SDF file.
-        root: its root element.
+        root: the root element of the file.
     """
     if root.find("world") is None and root.find("model") is None:
         return False
@@ -224,7 +224,7 @@ def simplify_world(
 
     Args:
         path: the SDF file.
-        root: its root element.
+        root: the root element of the file.
         model_paths: folders in which `model://` is searched first.
 
     Returns:

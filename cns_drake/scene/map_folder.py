@@ -104,8 +104,8 @@ class MapFolder:
 def drive_name(path: Path) -> str:
     """Returns the name of the drive that a scenario file describes.
 
-    For `<map>/sequence_04.yaml` it is `<map>_04`. For any other file it is the
-    file's name without the suffix.
+    The name of `<map>/sequence_04.yaml` is `<map>_04`. The name of any other
+    file is the file's name without the suffix.
     """
     if path.stem.startswith("sequence_"):
         number = path.stem.removeprefix("sequence_")
@@ -117,8 +117,8 @@ def check_new_map(output: Path) -> None:
     """Checks that a new map can be written to a folder.
 
     Raises:
-        InputError: the folder exists already, or its name contains more than
-            ASCII letters, digits and underscores.
+        InputError: the folder exists already, or its name contains other
+            characters than ASCII letters, digits and underscores.
     """
     if os.path.lexists(output):
         raise InputError(

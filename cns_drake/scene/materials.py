@@ -50,10 +50,10 @@ OF_CLASSES: dict[str, str] = _TABLE["of_classes"]
 def as_cell(semantic_class: str, parts: Mapping[str, str]) -> str:
     """Returns the cell `material` of a structure's row in the structure table.
 
-    The cell is a list of words. The first word is the material of most parts;
-    this word is left out if it is the usual material of the class. One word
-    `part=material` follows for each part with another material. `from_cell`
-    reads the cell.
+    The cell is a list of words. The first word is the material of most parts,
+    and is left out if this is the usual material of the class. For each part
+    with another material, a word `part=material` follows. `from_cell` reads the
+    cell.
 
     Args:
         semantic_class: class of the structure.

@@ -1,4 +1,4 @@
-"""Finds contents of mesh files that the readers of these files ignore.
+"""Finds contents of mesh files that Open3D and Drake ignore.
 
 Open3D reads glTF, COLLADA, STL and PLY, and Drake reads OBJ. Both read some
 files only in part, without a warning. This module refuses such a file if

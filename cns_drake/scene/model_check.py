@@ -1,8 +1,8 @@
 """Checks models before Drake parses them.
 
-Without these checks, libsdformat uses only a part of a text that is not a
-number or a valid size, or replaces the text by 1. Other such texts, and long
-names, crash the process in Drake.
+Without these checks, a text that is not a number or a valid size can have three
+effects: libsdformat uses only a part of the text, libsdformat replaces the text
+by 1, or Drake crashes the process. Long names crash the process, too.
 """
 
 import math

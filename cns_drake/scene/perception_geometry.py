@@ -103,7 +103,7 @@ def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
 def check_shape(name: str, shape: Shape) -> None:
     """Checks that a shape is not too large.
 
-    Meshes are not checked, since only their files contain their size.
+    Meshes are not checked, because only the mesh files contain the size.
 
     Raises:
         InputError: the shape is too large; the message names the geometry.
@@ -130,7 +130,7 @@ def read_perception_geometry(
     Args:
         inspector: inspector of the SceneGraph.
         keep_frame: returns whether geometry on a frame is wanted; by default
-            all frames are.
+            geometry on all frames is wanted.
 
     Raises:
         InputError: a geometry cannot be read; see
@@ -370,11 +370,11 @@ def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
     The value is a function of the Context. It is computed anew only after
     geometry has been added, removed, replaced, reshaped, or given another role.
     A new pose of a frame does not count. Drake's own `geometry_version` cannot
-    serve for this, because some changes of perception geometry do not change
-    it.
+    replace this port, because some changes of perception geometry do not change
+    `geometry_version`.
 
     The first call with a role adds the port to the SceneGraph, and must come
-    before a Diagram is built from it.
+    before a Diagram is built from this SceneGraph.
 
     Raises:
         RuntimeError: the SceneGraph is already part of a Diagram.

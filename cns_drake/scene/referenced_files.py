@@ -35,7 +35,8 @@ class FileWatch:
     def take_down(self, path: str) -> os.stat_result | None:
         """Records the status of a file, for a later call of `changed`.
 
-        If this is called again for the same file, the first status is kept.
+        If the function is called again for the same file, the first status is
+        kept.
 
         Returns:
             The current status; None if the file does not exist.

@@ -26,8 +26,8 @@ def kind_in_name(name: str) -> str:
     """Returns the kind with which the name of a structure begins.
 
     Names are made of a kind and a number, such as `row_house_017` for the kind
-    `row_house`. An object that stands on the lot of a building before it is
-    built is named after the building first: `office_003_lot_02_bench`.
+    `row_house`. The name of an object that stands on the lot of a future
+    building begins with the name of the building: `office_003_lot_02_bench`.
     """
     own = re.sub(r".*_lot_\d+_", "", name)
     # OpenStreetMap's numbers have the letter of node, way or relation.
@@ -46,12 +46,12 @@ class StructureEntry:
         reflectivity: reflectivity of the structure's surfaces near 900 nm, from
             0 to 1; None if it follows from material and colour.
         causes: fields of the scenario's section `transient` that changed the
-            structure; empty if it is as in the stage's file.
+            structure; empty if the structure is as in the stage's file.
         materials: name of a part -> name of its material. An empty name stands
-            for all parts that are not named; without it, they have the usual
-            material of the class.
-        kind: what the structure is, such as `row_house` or `bench`; by default,
-            what its name begins with.
+            for all parts that are not named. Without an empty name, these parts
+            have the usual material of the class.
+        kind: what the structure is, such as `row_house` or `bench`; by default
+            the kind with which the name begins.
     """
 
     instance: int

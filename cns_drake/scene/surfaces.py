@@ -57,7 +57,7 @@ class CylinderSurface:
 
 @dataclass(frozen=True)
 class CapsuleSurface:
-    """A capsule centred on G, its axis along z of G.
+    """A capsule centred on G, whose axis is the z axis of G.
 
     Attributes:
         radius: radius of the cylinder and of the two half spheres [m].
@@ -101,8 +101,8 @@ def merge_triangles(
         members: an index, the pose X_TG and the surface of each geometry.
 
     Returns:
-        The surface in T; for each of its M triangles, the index that was given
-        with its geometry, (M,) int32.
+        The surface in T; and (M,) int32, for each of the surface's M triangles
+        the index that was given with the triangle's geometry.
     """
     vertices: list[np.ndarray] = [np.zeros((0, 3))]
     triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]
@@ -122,7 +122,7 @@ def merge_triangles(
 
 
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
-    """Returns triangles for any surface; curved ones are inscribed.
+    """Returns triangles of any surface, inscribed in curved surfaces.
 
     A plane becomes a square of 200 m centred on G. A circle around the z axis
     of G has `sides` sides; a half sphere has half as many circles of latitude.

@@ -219,8 +219,8 @@ def load_world(
         structures: structure table; by default `structures.csv` in the world's
             folder, if it exists.
         without: names of structures to leave out.
-        model_paths: folders in which `model://` is searched, before those of
-            GZ_SIM_RESOURCE_PATH and SDF_PATH.
+        model_paths: folders in which `model://` is searched, before the folders
+            in GZ_SIM_RESOURCE_PATH and SDF_PATH.
 
     Raises:
         InputError: a file is missing or cannot be parsed, a structure to leave

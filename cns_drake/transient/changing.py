@@ -144,7 +144,8 @@ class Bay:
             rng: the random generator.
 
         Returns:
-            The middle (2,) [m] and yaw [rad] of the car; None if it is too big.
+            The middle (2,) [m] and yaw [rad] of the car; None if the car is too
+            big for the bay.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across = rng.uniform(size=2)

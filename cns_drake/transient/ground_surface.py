@@ -111,7 +111,7 @@ class GroundSurface:
         return float(z.min()) if len(z) else default
 
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
-        """Returns how much higher the ground is at `new` than at `old` [m].
+        """Returns the height of the ground at `new` minus that at `old` [m].
 
         The result is 0 if there is no ground at one of these places.
 

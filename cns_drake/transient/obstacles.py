@@ -41,8 +41,8 @@ class Obstacles:
 
         Args:
             area: the area, seen from above [m].
-            within: area of search. Parts of obstacles outside of it do not
-                count.
+            within: area of search. Parts of obstacles outside of this area do
+                not count.
             ignored: names of obstacles that do not count.
         """
         return min(

@@ -56,7 +56,7 @@ _NOT_THROUGH = frozenset({"building", "car", "truck", "bus", "other-structure"})
 def put_up_scaffolds(around: Surroundings, share: float) -> None:
     """Puts up scaffolds in front of a share of the buildings along a drive.
 
-    A building without free space in front of it gets no scaffold.
+    A building without free space in front gets no scaffold.
 
     Args:
         around: surroundings of the drive, which are changed.
@@ -130,7 +130,7 @@ def scaffold(length: float, height: float, rng: np.random.Generator) -> Model:
     Args:
         length: length of the scaffold [m].
         height: height of the facade [m].
-        rng: random generator for its variant.
+        rng: random generator for the variant of the scaffold.
     """
     lifts = max(int(height / _LIFT), 1)
     bays = max(round(length / _BAY), 1)

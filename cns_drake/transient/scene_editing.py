@@ -48,7 +48,7 @@ class Look(NamedTuple):
         rgb: diffuse colour, from 0 to 1.
         reflectivity: reflectivity near 900 nm, from 0 to 1; None if it follows
             from the material and the colour.
-        material: name of the material; None if it is the usual one of the
+        material: name of the material; None for the usual material of the
             class.
     """
 
@@ -479,7 +479,8 @@ class Surroundings:
         These are the area `kept_free` and the footprints of some structures.
 
         Args:
-            ignored: classes whose structures are no obstacles; all others are.
+            ignored: classes whose structures are no obstacles; structures of
+                all other classes are obstacles.
             classes: classes whose structures are obstacles, if `ignored` is
                 None.
         """

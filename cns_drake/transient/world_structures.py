@@ -83,10 +83,10 @@ class LoadedStructure:
 
     Attributes:
         name: name of the structure.
-        semantic_class: its class, a key of
+        semantic_class: class of the structure, a key of
             `cns_drake.scene.semantics.CLASS_IDS`.
-        kind: what it is, such as `row_house` or `bench`.
-        parts: its geometries.
+        kind: what the structure is, such as `row_house` or `bench`.
+        parts: geometries of the structure.
     """
 
     name: str
@@ -136,7 +136,7 @@ def read_structures(
     Args:
         world: the world, not yet part of a diagram.
         wanted: returns whether the structure with a name is wanted; by default
-            all are.
+            all structures are wanted.
 
     Raises:
         InputError: a mesh cannot be read.
