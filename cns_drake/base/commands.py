@@ -99,8 +99,8 @@ class Command(TyperCommand):
     """A command-line command whose help comes from its function's docstring.
 
     The section `Args` of the docstring contains the help of options and
-    arguments. An option without an entry there keeps the help of its own
-    declaration.
+    arguments. An option without an entry in this section keeps the help of its
+    own declaration.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ def former_options(
     Args:
         replaced: option of an earlier version -> the option that replaces it,
             such as `--lidar`. If a user gives the earlier option, an error
-            names the new one.
+            names the new option.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -181,12 +181,13 @@ def given_options(context: typer.Context) -> list[str]:
 def check_only_with(
     context: typer.Context, chosen: str, allowed: Collection[str]
 ) -> None:
-    """Refuses options that have no effect together with a chosen one.
+    """Refuses options that have no effect together with a chosen option.
 
     Args:
         context: context of the command that runs.
         chosen: name of the chosen option's parameter.
-        allowed: names of all parameters that have an effect with it.
+        allowed: names of all parameters that have an effect together with the
+            chosen option.
 
     Raises:
         InputError: another option was given; the message names both.
@@ -211,10 +212,11 @@ def with_options(
     line, the parameter is replaced by the options of the group.
 
     Args:
-        keyword: name of that parameter.
+        keyword: name of the parameter for the whole group.
         options: name -> (type, default) of each option of the group.
         make: function that is called with the options' values as keyword
-            arguments. What it returns is passed to the command as `keyword`.
+            arguments. The result of this function is passed to the command as
+            `keyword`.
     """
     added = [
         inspect.Parameter(

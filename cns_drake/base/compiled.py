@@ -22,15 +22,15 @@ def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
     The machine code stays in the user's cache folder between runs, under a hash
-    of its source code, so that all installations and releases with the same
+    of the source code, so that all installations and releases with the same
     source code share the compiled function. If the cache folder cannot be
     written, each process compiles the function again. If several processes need
     the same function at once, one process compiles the function, and the others
     wait.
 
-    A compiled function may call only compiled functions of its own folder. If
-    any file in that folder changes, all of its functions are compiled again;
-    changes in other folders would go unnoticed.
+    A compiled function may call only compiled functions of its own folder,
+    because changes in other folders go unnoticed. If any file in the folder
+    changes, all functions of the folder are compiled again.
 
     In compiled functions, assign array elements one at a time. If an array is
     assigned to a slice of another, numba also compiles an error message about

@@ -36,7 +36,7 @@ def write_csv(
     """Writes a CSV file.
 
     Args:
-        path: the file; an existing one is replaced.
+        path: the file; an existing file is replaced.
         header: names of the columns, written as the first line.
         rows: cells of each further line, as for
             `cns_drake.base.csv_files.csv_text`.
@@ -90,14 +90,15 @@ def read_records(
 
     Args:
         path: the file.
-        columns: names of the columns that the file must have. It may have more.
+        columns: names of the columns that the file must have. The file may have
+            further columns.
 
     Returns:
         For each row, its line number and a dictionary column -> cell.
 
     Raises:
         InputError: the file cannot be read as CSV (see
-            `cns_drake.base.csv_files.read_rows`), a column is missing or there
+            `cns_drake.base.csv_files.read_rows`), a column is missing or occurs
             twice, or a row has more or fewer cells than there are columns.
     """
     (_, names), *rows = read_rows(path) or [(1, [])]

@@ -23,7 +23,7 @@ power = np.vectorize(math.pow, otypes=[float])
 def smooth_step(u: np.ndarray) -> np.ndarray:
     """Returns a quintic from 0 at u = 0 to 1 at u = 1.
 
-    Its first and second derivatives are zero at both ends.
+    The first and second derivatives of the quintic are zero at both ends.
     """
     return power(u, 3) * (10 - 15 * u + 6 * u**2)
 

@@ -37,8 +37,8 @@ _PACKAGES = {
 class InputError(Exception):
     """An error in the user's input, with a message of one line.
 
-    The message names the file (or argument), the field where there is one, and
-    the fault. The command line prints it and exits with status 2.
+    The message names the file (or argument), the field if there is one, and the
+    fault. The command line prints the message and exits with status 2.
 
     Attributes:
         exit_status: exit status of a command that ends with this error.
@@ -152,13 +152,13 @@ def describe_validation_error(
     """Returns one line about the most important fault that pydantic found.
 
     Unknown fields are reported first, and missing fields last: an unknown field
-    may be the missing one, misspelt.
+    may be a misspelt missing field.
 
     Args:
         source: name of the file or argument, with which the line begins.
         error: what pydantic raised.
-        model: the model that was validated. If it is given, the line suggests a
-            name for an unknown field.
+        model: the model that was validated. If given, the line suggests a name
+            for an unknown field.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -189,7 +189,7 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
 def nearest_field(
     model: type[BaseModel], place: Sequence[str | int]
 ) -> str | None:
-    """Returns the known field whose spelling is closest to an unknown one.
+    """Returns the known field whose spelling is closest to an unknown field.
 
     `place` lists the keys and indices that lead to the unknown field, and ends
     with the field's name.
@@ -202,7 +202,7 @@ def did_you_mean(given: object, names: Iterable[str]) -> str:
 
     Args:
         given: the misspelt name.
-        names: the known names. If none of them is similar, the result is "".
+        names: the known names. If no known name is similar, the result is "".
     """
     near = _nearest(given, names)
     return f"; did you mean {near}?" if near else ""
@@ -235,8 +235,8 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 def shows_traceback() -> bool:
     """Returns whether `--traceback` was given on the command line.
 
-    The process of a job has the arguments of its parent process, and so the
-    same answer.
+    The process of a job has the arguments of its parent process, and therefore
+    returns the same.
     """
     return TRACEBACK_OPTION in sys.argv
 

@@ -49,11 +49,12 @@ def user_errors(path: Path | str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def completing(path: Path) -> Iterator[Path]:
-    """Yields a temporary path to write; it becomes the file `path`.
+    """Yields a temporary path to write, which becomes the file `path`.
 
     When the block ends normally, the temporary file is flushed to the disk and
-    renamed to `path`. On an exception it is removed. If another process is
-    writing the same file, the block waits until that file is complete.
+    renamed to `path`. On an exception, the temporary file is removed. If
+    another process is writing the same file, the block waits until that file is
+    complete.
 
     Raises:
         InputError: if the file cannot be written, or `path` is a folder, a
@@ -76,10 +77,10 @@ def completing(path: Path) -> Iterator[Path]:
 def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     """Yields a temporary folder that becomes `folder` when the block ends.
 
-    The last part of its path is the same as in `folder`, because files written
-    to it may contain this name; only the parent folder differs. On an exception
-    the temporary folder is removed. An existing `folder` that is not empty is
-    replaced if `replaces` is true; otherwise it is an error.
+    The temporary folder has the name of `folder`, because files that are
+    written to it may contain this name; only the parent folder differs. On an
+    exception the temporary folder is removed. An existing `folder` that is not
+    empty is replaced if `replaces` is true; otherwise it is an error.
 
     Raises:
         InputError: if `folder` cannot be written, is not empty and `replaces`
@@ -112,7 +113,7 @@ def remove_folder(folder: Path) -> None:
     original name.
 
     Raises:
-        InputError: if it cannot be removed.
+        InputError: if the folder cannot be removed.
     """
     part = part_path(folder)
     with user_errors(folder):
@@ -187,7 +188,7 @@ def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
     `decode_text` describes the possible encodings.
 
     Raises:
-        InputError: if it cannot be read, or is no text.
+        InputError: if the file cannot be read, or is not text.
     """
     try:
         return decode_text(read_bytes(path, limit))
@@ -198,7 +199,7 @@ def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
 def decode_text(data: bytes) -> str:
     """Returns the text in UTF-8 bytes, or in UTF-16 with a byte order mark.
 
-    Editors of Windows begin files with such a mark; it is removed.
+    A byte order mark, with which editors of Windows begin files, is removed.
 
     Raises:
         UnicodeDecodeError: the bytes are in neither encoding.
@@ -210,9 +211,10 @@ def decode_text(data: bytes) -> str:
 def file_name(text: str) -> str:
     """Turns a text into a file name that cannot lead to another folder.
 
-    Use it for the names of the drive, map and stage in a recording before they
-    become parts of paths. Usual names stay as they are. In unusual names,
-    unsafe characters are replaced such that different names stay different.
+    Use this function for the names of the drive, map and stage in a recording
+    before these names become parts of paths. Usual names stay as they are. In
+    unusual names, unsafe characters are replaced such that different names stay
+    different.
     """
     name = "".join(
         c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)
@@ -255,7 +257,7 @@ def open_plain(path: Path, flags: int) -> int:
     """Opens a file for writing, and returns its file descriptor.
 
     The file is created if it does not exist. Symbolic links are not followed,
-    since they may lead to another user's file. If the path is a pipe, the
+    because they may lead to another user's file. If the path is a pipe, the
     function does not wait for a reader.
 
     Args:
@@ -311,7 +313,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """Checks before a long run that a file can be written at its end.
+    """Checks before a long run that a file can be written after the run.
 
     Creates the folder if need be and leaves nothing else behind.
 

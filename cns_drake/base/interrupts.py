@@ -20,10 +20,11 @@ def interrupt_on_termination(once: bool = False) -> None:
     """Makes SIGTERM raise KeyboardInterrupt, so that open files are closed.
 
     Args:
-        once: whether further SIGTERM signals are ignored after the first. Then
-            only SIGKILL can end a process that hangs, so set `once` only if a
-            parent process can send SIGKILL. By default, a second SIGTERM also
-            raises KeyboardInterrupt, and so interrupts the closing of files.
+        once: whether further SIGTERM signals are ignored after the first. With
+            `once`, only SIGKILL can end a process that hangs, so set `once`
+            only if a parent process can send SIGKILL. By default, a second
+            SIGTERM also raises KeyboardInterrupt, and so interrupts the closing
+            of files.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -62,7 +63,7 @@ def uninterrupted() -> Iterator[None]:
 
     An extension module that is interrupted while it is initialised fails with
     another error, or crashes the process later. Blocking the signals would not
-    help: a library's threads can receive them as well.
+    help, because a library's threads can receive the signals as well.
     """
     waiting: list[int] = []
     try:
@@ -79,8 +80,8 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
 
     Without the delay, KeyboardInterrupt can be raised while the arguments of a
     C++ function are being converted, which is reported as a wrong type. Only
-    the first interrupt is delayed. A second one takes effect at once, and
-    further ones are ignored, so that files can be closed.
+    the first interrupt is delayed. A second interrupt takes effect at once, and
+    further interrupts are ignored, so that files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []

@@ -16,14 +16,15 @@ def to_jpeg(
 ) -> bytes:
     """Returns a picture as JPEG.
 
-    A picture of more than 8 bits, such as that of a thermal camera, gets the
-    contrast between its darkest and brightest pixels, without the outer 1 %.
+    A picture of more than 8 bits, such as that of a thermal camera, is scaled
+    so that its darkest and brightest pixels, without the outer 1 %, become
+    black and white.
 
     Args:
         picture: the picture.
         quality: quality of the JPEG, as Pillow defines it.
         longest: greatest width and height [pixels]. A larger picture is reduced
-            to this size, in place. None for no limit.
+            to this size; this changes `picture`. None for no limit.
     """
     if picture.mode in ("I", "F") or picture.mode.startswith("I;16"):
         picture = _to_8_bits(picture)

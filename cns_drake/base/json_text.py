@@ -31,8 +31,9 @@ def parse_json(data: bytes) -> Any:
     """Returns the value of UTF-8 bytes that hold JSON.
 
     Raises:
-        ValueError: if it is not JSON, is nested too deep, has a key twice, or
-            holds text that cannot stand in a file, terminal or path.
+        ValueError: if the bytes are not JSON, are nested too deep, contain a
+            key twice, or hold text that a file, terminal or path cannot
+            contain.
     """
     text = data.decode("utf-8-sig")
     brackets = _NO_BRACKET.sub(b"", _STRING.sub(b"", data))

@@ -10,8 +10,8 @@ def natural_key(text: str) -> tuple:
     """Returns the key by which names are sorted in natural order.
 
     Digits in a name count as whole numbers: 9 comes before 10, `v9` before
-    `v10`, and `2012-2-4` before `2012-10-28`. Among names that differ only in
-    leading zeros, the order is that of text.
+    `v10`, and `2012-2-4` before `2012-10-28`. Names that differ only in leading
+    zeros are in the order of text.
     """
     # Text and numbers alternate. Of two numbers, the longer one is greater.
     return tuple(
@@ -27,7 +27,7 @@ def listed(folder: Path, pattern: str = "*") -> list[Path]:
     `._000001.bin` next to the user's files.
 
     Args:
-        folder: the folder; if there is none, the result is empty.
+        folder: the folder. If the folder does not exist, the result is empty.
         pattern: pattern of the names, as for `Path.glob`.
     """
     found = [path for path in folder.glob(pattern) if not _is_hidden(path)]

@@ -1,7 +1,7 @@
 """A check that `import evaluation` imports this project's package.
 
 Many projects have a folder `evaluation`. The simulator needs its own package
-`evaluation` only for studies, and refuses any other package of that name.
+`evaluation` only for studies, and refuses any other package named `evaluation`.
 """
 
 from importlib.util import find_spec

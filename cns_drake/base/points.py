@@ -26,7 +26,7 @@ def check_range(points: np.ndarray, limit: float, first: int = 0) -> None:
     """Raises an error if a coordinate is too large to be real.
 
     Such coordinates come from misread bytes. Values that are not finite are
-    allowed, since many sensors store them for beams without a return.
+    allowed, because many sensors store such values for beams without a return.
 
     Args:
         points: (N,) structured array.

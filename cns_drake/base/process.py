@@ -19,6 +19,6 @@ def collect_garbage_seldom() -> None:
     """Makes Python's garbage collector run less often in this process.
 
     Imports and compilation create many objects that are never freed. At
-    Python's default, scanning them takes up to a tenth of the time.
+    Python's default, scanning these objects takes up to a tenth of the time.
     """
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])

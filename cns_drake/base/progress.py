@@ -1,9 +1,9 @@
-"""Progress reports of long tasks: what they do, and how far they are.
+"""Progress reports of long tasks: what a task does, and how far it is.
 
-A task reports its progress as a library writes to a log, whoever called it. The
-caller chooses the listener that receives the reports: the command line shows
-them on stderr, and the process of a job sends them to its parent process. By
-default, they are ignored.
+A task reports its progress as a library writes to a log, without knowing who
+reads the reports. The caller chooses the listener that receives the reports:
+the command line shows them on stderr, and the process of a job sends them to
+its parent process. By default, they are ignored.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class Listener:
 
         Args:
             activity: what is done, such as `reading the stage`.
-            done: how much of it is done.
-            total: how much there is to do; 0 if that is not known.
+            done: how much of the activity is done.
+            total: how much there is to do; 0 if this is unknown.
             unit: what `done` and `total` count, such as `scans`.
         """
 
@@ -127,9 +127,9 @@ def track(
 
     Args:
         items: the items.
-        activity: what is done with them, such as `reading scans`.
-        total: their number.
-        unit: what they are.
+        activity: what is done with the items, such as `reading scans`.
+        total: number of items.
+        unit: what the items are, such as `scans`.
     """
     around = _loops.get()
     try:

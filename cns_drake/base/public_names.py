@@ -13,8 +13,8 @@ def attach(
     """Returns the functions `__getattr__` and `__dir__` and the list `__all__`.
 
     A package that assigns them in its `__init__.py` imports each of its public
-    names when the name is first used. The stub `__init__.pyi` next to it lists
-    the public names and the modules that define them.
+    names when the name is first used. The stub `__init__.pyi` next to this file
+    lists the public names and the modules that define them.
 
     Args:
         package: the package's `__name__`.

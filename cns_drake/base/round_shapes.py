@@ -8,8 +8,8 @@ def revolved(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns a convex polyhedron that approximates a solid of revolution.
 
-    It is the convex hull of regular polygons around the z axis, and of their
-    mirror images at z = 0.
+    The polyhedron is the convex hull of regular polygons around the z axis, and
+    of the polygons mirrored at z = 0.
 
     Args:
         radius: (N,) circumradii of the polygons [m].

@@ -16,8 +16,8 @@ def start(program: str, load: Callable[[], Callable[[], None]]) -> None:
     """Imports and runs a program; reports errors and interrupts in one line.
 
     After an `InputError`, the process exits with the status of the error. After
-    an interrupt (Ctrl-C or SIGTERM), it ends without a traceback. An interrupt
-    during the import takes effect when the import is complete.
+    an interrupt (Ctrl-C or SIGTERM), the process ends without a traceback. An
+    interrupt during the import takes effect when the import is complete.
 
     Args:
         program: name of the program.

@@ -68,9 +68,9 @@ def make_program(
         summary: text at the beginning of the program's help.
         epilog: text at the end of the program's help.
         renamed: name of a former command -> the command that replaces it, such
-            as `simulate`, or `cns-eval pr --scores` if another program has it.
-            Calling a former command is an error whose message names the new
-            one.
+            as `simulate`, or `cns-eval pr --scores` if the command belongs to
+            another program. Calling a former command is an error whose message
+            names the new one.
         groups: heading -> commands that the help lists under it; by default
             there is a single heading for all commands.
     """
@@ -141,15 +141,15 @@ def run(
 
     The exit status is 0 on success, 1 if jobs failed, and 130 after an
     interrupt or SIGTERM; open files are closed first. For bad usage or input,
-    unusable files, lack of memory and missing system libraries, it is 2. In all
-    these cases of failure, one line on stderr names the fault. A traceback is
-    shown only with `--traceback`.
+    unusable files, lack of memory and missing system libraries, the exit status
+    is 2. In all these cases of failure, one line on stderr names the fault. A
+    traceback is shown only with `--traceback`.
 
     Args:
         app: the command line.
         program: name of the program, with which messages begin.
-        display: shows what the program does while it is open; it is closed
-            before the line that names a fault is written.
+        display: shows what the program does while the display is open. The
+            display is closed before the line that names a fault is written.
     """
     message: str | None = None
     collect_garbage_seldom()

@@ -109,11 +109,12 @@ def read_elements(
     Args:
         path: the file.
         root: required tag of the top element; None for any tag.
-        encoding: encoding of the file; by default the one that it declares.
+        encoding: encoding of the file; by default the encoding that the file
+            declares.
 
     Raises:
-        InputError: if it cannot be read, is no XML, has another root, holds a
-            document type, is nested too deep or has too many elements.
+        InputError: if the file cannot be read, is not XML, has another root,
+            holds a document type, is nested too deep or has too many elements.
     """
     parser = expat.ParserCreate(encoding)
     depth = count = 0

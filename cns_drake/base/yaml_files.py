@@ -91,7 +91,7 @@ def read_yaml(path: Path) -> Any:
 def parse_yaml(text: str | bytes, loader: type = YamlLoader) -> Any:
     """Returns the content of a YAML document.
 
-    A document whose aliases expand to too many values is refused, since a few
+    A document whose aliases expand to too many values is refused, because a few
     lines of aliases could fill the memory. A repeated key is an error; YAML
     libraries would silently use the last value. Some values are errors because
     libraries read them in different ways: yes, no, on and off without quotes;

@@ -1,5 +1,5 @@
 """Vehicles and pedestrians that move while a drive is recorded.
 
-Their motion is planned before the drive, from the roads and a seed. During the
-drive, the poses are interpolated from this plan.
+The motion of these road users is planned before the drive, from the roads and a
+seed. During the drive, the poses are interpolated from this plan.
 """

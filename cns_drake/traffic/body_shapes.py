@@ -48,7 +48,7 @@ class Limb(NamedTuple):
         name: name of the limb.
         joint: position of the limb's joint in the frame of the body [m].
         swing: amplitude of the limb's swing at walking speed [rad], negative if
-            it first swings backwards.
+            the limb first swings backwards.
         shapes: the shapes of which the limb consists.
     """
 
@@ -92,7 +92,7 @@ def vehicle_limbs(
 
     Args:
         kind: kind of the vehicle.
-        rng: random generator for its colour and variant.
+        rng: random generator for the vehicle's colour and variant.
     """
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     if kind.name in ("bicycle", "motorcycle"):

@@ -115,8 +115,8 @@ def read_fcd(path: Path) -> FcdTrace:
     """Reads a SUMO trace from a file.
 
     Raises:
-        InputError: the file cannot be read or is not a trace, its times are not
-            evenly spaced, or it is empty.
+        InputError: the file cannot be read or is not a trace, or the trace is
+            empty or has times that are not evenly spaced.
     """
     root = read_elements(path, "fcd-export")
     steps = list(root.all("timestep"))

@@ -55,8 +55,8 @@ class Piece:
     """A piece of a vehicle's path: part of a lane, or a path in a junction.
 
     A path through a junction is called a way. A vehicle waits in the lane
-    before the way until all conflicting ways are free, so that it never stops
-    on the way.
+    before the way until all conflicting ways are free, so a vehicle never stops
+    on a way.
 
     Attributes:
         points: (N, 3) points along the middle of the piece, in driving
@@ -129,7 +129,7 @@ class Walkway:
             is free of objects [m]: distances from the middle of the strip,
             positive to the right. None if the whole width is free.
         narrow: (N,) for each point, whether pedestrians fit only if they face
-            along the walkway; None if they always fit.
+            along the walkway; None if pedestrians fit everywhere.
     """
 
     points: np.ndarray
@@ -292,8 +292,9 @@ def with_unmarked_crossings(
         things: outlines of objects as seen from above [m].
 
     Returns:
-        The graph with the additional crossings. The walkways, cut where these
-        crossings begin and end, and new walkways over the crossings.
+        The graph with the additional crossings; and the walkways, which are cut
+        where these crossings begin and end, with new walkways over the
+        crossings.
     """
     sides = [k for k, way in enumerate(walkways) if way.crossing < 0]
     lines = [LineString(walkways[k].points[:, :2]) for k in sides]
@@ -436,7 +437,7 @@ def length_of(points: np.ndarray) -> float:
 
 
 def distances_along(points: np.ndarray) -> np.ndarray:
-    """Returns how far along a polyline each of its points is [m].
+    """Returns the distances of a polyline's points along the polyline [m].
 
     The first point is at 0.
 
@@ -451,7 +452,7 @@ def distances_along(points: np.ndarray) -> np.ndarray:
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
-    """Returns pieces without those that vehicles cannot leave or reach.
+    """Returns the pieces that vehicles can both reach and leave.
 
     Three kinds of pieces are removed: lanes that lead nowhere, pieces that lead
     only to such lanes, and pieces to which no remaining piece leads. The

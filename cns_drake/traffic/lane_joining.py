@@ -28,7 +28,7 @@ class DirectedLane(NamedTuple):
     """A lane of a map, in its driving direction.
 
     Attributes:
-        points: (N, 3) points along its middle [m].
+        points: (N, 3) points along the middle of the lane [m].
         limit: speed limit [m/s].
         connects: whether the lane is in a junction, where it connects two
             lanes.

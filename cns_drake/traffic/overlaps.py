@@ -11,7 +11,8 @@ from cns_drake.base.compiled import compiled
 def boxes_overlap(a: Any, b: Any, half_a: Any, half_b: Any) -> bool:
     """Returns whether two rectangles a and b overlap.
 
-    They overlap if their projections on the axes of both rectangles overlap.
+    Two rectangles overlap if their projections on the axes of both rectangles
+    overlap.
 
     Args:
         a, b: x and y of each centre [m], and heading [rad], (3,).

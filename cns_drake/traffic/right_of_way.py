@@ -1,11 +1,11 @@
 """Rules for who may enter a junction: first come, first served.
 
-A vehicle may enter its path ("way") through a junction under three conditions:
-vehicles on conflicting ways will have passed when it gets there; there is room
-for it in the lane after the junction; and its signal is green or, without a
-signal, it has stopped at the line. If a vehicle with the right of way is slower
-than expected, later vehicles wait for it on their ways. Earlier vehicles never
-wait for later ones, so no vehicle waits forever.
+A vehicle may enter its path ("way") through a junction under three conditions.
+Vehicles on conflicting ways will have passed when the vehicle gets there. The
+lane after the junction has room for the vehicle. The signal is green or,
+without a signal, the vehicle has stopped at the line. If a vehicle with the
+right of way is slower than expected, later vehicles wait for it on their ways.
+Earlier vehicles never wait for later vehicles, so no vehicle waits forever.
 """
 
 from typing import Any

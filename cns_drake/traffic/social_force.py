@@ -89,8 +89,8 @@ class Paths(NamedTuple):
     Attributes:
         paths: (2 W,) records of the walkways, once in each direction.
         points: (M, 3) points in walking direction [m].
-        tangents: (M, 2) unit vectors from each point to the next. The vector of
-            a path's last point is that of the point before.
+        tangents: (M, 2) unit vectors from each point to the next. The last
+            point of a path has the vector of the point before.
         limits: (M, 2) least and greatest offset to the right [m].
         narrow: (M,) bool, where pedestrians must face along their path to fit.
     """
@@ -180,9 +180,10 @@ def social_forces(
 def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
     """Moves pedestrians, as far as paths are free, by forces (N, 2) [m/s^2].
 
-    A pedestrian takes a step if it can then stop on its path, away from the
-    places where all others can stop. Otherwise it brakes; the place where it
-    stops has been free since the previous step.
+    A pedestrian takes a step if the pedestrian can then still stop on its path,
+    away from the places where all other pedestrians can stop. Otherwise the
+    pedestrian brakes, and stops at a place that has been free since the
+    previous step.
     """
     for i in range(len(walkers)):
         one = walkers[i]

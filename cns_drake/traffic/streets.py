@@ -2,8 +2,8 @@
 
 All signals have the same cycle. The green time of a junction is divided among
 its phases in proportion to the incoming flow. The offsets of the junctions are
-chosen so that vehicles that leave one junction on green wait little at the next
-one (a green wave, where possible).
+chosen so that vehicles that leave a junction on green wait little at the next
+junction (a green wave, where possible).
 """
 
 import math
@@ -267,10 +267,11 @@ class Streets(NamedTuple):
         begin, clear, joint: (2, P + C, P + C) see
             `cns_drake.traffic.streets.find_conflicts`.
         over: (P, C) place on a crossing's line where a path through a junction
-            leads over the crossing [m]; NaN if it does not.
+            leads over the crossing [m]; NaN if the path does not cross.
         until: (K, P + C) float32 time until the ego car reaches the piece or
-            crossing [s]; 0 while it is there, inf if it never comes.
-        ego_rear, ego_front: (K, P) float32 distances along a piece of the ego
+        crossing [s]; 0 while the ego car is there, inf if the ego car never
+        gets there. ego_rear, ego_front: (K, P) float32 distances along a piece
+        of the ego
             car's rear and front while it is on the piece [m].
         ego_speed: (K, P) float32 speed of the ego car along the piece [m/s];
             negative against its direction.
@@ -411,9 +412,9 @@ def find_conflicts(
     """Returns where paths of vehicles, and crossings, are in conflict.
 
     A path through a junction is called a way. Two different ways are in
-    conflict if the areas that vehicles sweep on them overlap; a way and a
-    crossing, if the swept area overlaps the crossing. A lane is in conflict
-    only with crossings whose attribute `marked` is False.
+    conflict if the areas that vehicles sweep on them overlap. A way and a
+    crossing are in conflict if the area swept on the way overlaps the crossing.
+    A lane is in conflict only with crossings whose attribute `marked` is False.
 
     Args:
         graph: lane graph with P pieces (ways and parts of lanes) and C
@@ -428,9 +429,9 @@ def find_conflicts(
           b [m]; inf without a conflict, or if a is a crossing.
         - Distance of a vehicle's rear along a at which it leaves the area of b
           [m]; 0 without a conflict, or if a is a crossing.
-        - `SPLIT` for two ways that overlap only at their beginning, since they
-          come from the same lane; `MERGE` for two that overlap only at their
-          end, since they lead to the same lane; otherwise 0.
+        - `SPLIT` for two ways that overlap only at their beginning, because
+          they come from the same lane; `MERGE` for two ways that overlap only
+          at their end, because they lead to the same lane; otherwise 0.
     """
     small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
@@ -578,7 +579,7 @@ def _find_ego(
 def places_on(
     streets: Streets, pieces: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns x, y and z of places that are given by a piece and a distance.
+    """Returns x, y and z of places, given by pieces and distances.
 
     Beyond its ends, a piece goes straight on.
 

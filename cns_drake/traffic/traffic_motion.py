@@ -179,8 +179,8 @@ class TrafficMotion(LeafSystem):
       they are registered.
     - `frame_poses`: the same poses as a `KnownPoses`, one array for all limbs.
     - `body_spatial_velocities`: list of the velocities V_WL of all limbs,
-      expressed in W. A LiDAR computes from them where the limbs are at each
-      moment of a revolution.
+      expressed in W. From these velocities, a LiDAR computes where the limbs
+      are at each moment of a revolution.
     - `moving_instances`: (N,) instance ids of the vehicles and pedestrians that
       are faster than `MOVING_SPEED`.
     - `objects`: a `RecordedObjects`, for recorders.
@@ -296,7 +296,8 @@ def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
 
     Args:
         plan: the planned traffic.
-        first: instance id of the first body; the others follow.
+        first: instance id of the first body; the ids of the other bodies
+            follow.
 
     Raises:
         InputError: there are not enough ids.
@@ -422,7 +423,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects a LiDAR to traffic, so that it labels moving bodies as moving.
+    """Connects a LiDAR to traffic, whose moving bodies it labels as moving.
 
     Args:
         builder: builder of a diagram with both systems.

@@ -84,7 +84,7 @@ class _Run(NamedTuple):
 
 
 def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
-    """Divides a car's path among the lanes and junction paths that it follows.
+    """Divides a car's path into the lanes and junction paths it follows.
 
     Args:
         graph: the lane graph.
@@ -92,7 +92,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
 
     Returns:
         The parts of the path in driving order, each with the number of the lane
-        or junction path in `graph.pieces`, or -1 where the car follows none.
+        or junction path in `graph.pieces`, or -1 where the car follows no lane
+        or junction path.
     """
     lines = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
     tree = shapely.STRtree(lines)
@@ -172,8 +173,8 @@ def find_runs(graph: LaneGraph, points: np.ndarray) -> list[_Run]:
 class Follower:
     """The ego car in a simulation of traffic, which follows other vehicles.
 
-    The car follows its path by the Intelligent Driver Model, asks for the right
-    of way like other vehicles, and keeps the speed limits of its drive.
+    The car drives along its path by the Intelligent Driver Model, asks for the
+    right of way like other vehicles, and keeps the speed limits of its drive.
 
     Attributes:
         u: distances along the path at all time steps so far [m].
@@ -403,14 +404,14 @@ class Tracks:
     Between two of these times, every coordinate is a cubic polynomial with a
     continuous rate (Catmull-Rom spline). In the first and the last interval of
     a body, the coordinate is a parabola; before the first and after the last
-    time, it is a straight line.
+    time, the coordinate is a straight line.
 
     Attributes:
         dt: time between two of the times [s].
         values: (K, N, D) coordinates; angles have no jumps.
         present: (K, N) bool, whether a body exists at each time; None if all
-            bodies always exist. Between two times, a body exists if it exists
-            at both times.
+            bodies always exist. Between two times, a body exists if the body
+            exists at both times.
     """
 
     dt: float
@@ -554,7 +555,7 @@ def plan_traffic(
         vehicles, walkers: requested numbers of vehicles and pedestrians.
         seed: seed of the random kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
-            vehicles, the longest time that the drive may take.
+            vehicles, this is the longest time that the drive may take.
         ego: function that takes times (K,) [s], and returns positions (K, 2)
             [m] and headings (K,) [rad] of the ego car. If the ego car follows
             other vehicles, only its first position counts.
@@ -699,8 +700,8 @@ class Trial:
     def is_over(self, num_steps: int) -> bool:
         """Returns whether the simulation can end before its last time step.
 
-        This is so if the ego car follows other vehicles, and arrived at least
-        20 time steps ago.
+        The simulation can end if the ego car follows other vehicles, and
+        arrived at least 20 time steps ago.
 
         Args:
             num_steps: number of time steps simulated so far.

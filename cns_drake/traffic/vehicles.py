@@ -3,7 +3,7 @@
 Vehicles follow each other by the Intelligent Driver Model of Treiber, Hennecke,
 Helbing (see `VehicleKind`). They change lanes by MOBIL of Kesting, Treiber,
 Helbing (2007): a driver changes lanes if the driver gains more acceleration
-than others lose, and no other vehicle has to brake hard.
+than other drivers lose, and no other vehicle has to brake hard.
 """
 
 from collections.abc import Sequence
@@ -215,8 +215,8 @@ def place_vehicles(
         rng: the random generator.
 
     Returns:
-        Records of dtype `VEHICLE` of those vehicles for which a place was
-        found; the index in `kinds` of each of them.
+        Records of dtype `VEHICLE` of the vehicles for which a place was found;
+        and the index of each of these vehicles in `kinds`.
     """
     free = np.flatnonzero(~streets.pieces["is_way"])
     lengths = streets.pieces["length"]
@@ -393,8 +393,8 @@ def find_ahead(
 ) -> tuple[float, float]:
     """Returns the gap to the next vehicle ahead [m], and its speed [m/s].
 
-    Only vehicles on the given piece count. If none is ahead there, the gap is
-    infinite and the speed 0.
+    Only vehicles on the given piece count. If no vehicle is ahead on this
+    piece, the gap is infinite and the speed 0.
 
     Args:
         traffic: the vehicles, listed by the pieces of the lane graph on which
@@ -422,7 +422,7 @@ def free_acceleration(car: Any, v0: float) -> float:
 
     Args:
         car: the vehicle, a record of dtype `VEHICLE`.
-        v0: its desired speed [m/s].
+        v0: the vehicle's desired speed [m/s].
     """
     if v0 < 0.01:
         return -car.b
@@ -483,8 +483,8 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
     Returns:
         Number of the first lane on the vehicle's path that meets the crossing;
         the distance that the vehicle drives until its front reaches the
-        crossing [m]; and the distance until its rear has left it [m]. Without
-        such a lane, the result is -1, inf and inf.
+        crossing [m]; and the distance until the vehicle's rear has left the
+        crossing [m]. Without such a lane, the result is -1, inf and inf.
     """
     begin = -car.s
     number = len(streets.pieces) + c
@@ -503,15 +503,15 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
 
 @compiled
 def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
-    """Returns what the i-th vehicle must stop for, and whom it must follow.
+    """Returns where vehicle i must stop, and which vehicle it must follow.
 
     The i-th vehicle stops before any crossing that pedestrians use, whether the
     crossing lies in a junction or not. It also stops where its path through a
     junction meets the path of a vehicle that was permitted to enter earlier and
     has not yet passed this place. If both vehicles come from the same lane, or
-    leave for the same lane, the i-th vehicle follows the earlier one instead.
-    Vehicles wait only for vehicles that were permitted earlier, so no vehicle
-    waits forever.
+    leave for the same lane, the i-th vehicle follows the earlier vehicle
+    instead. Vehicles wait only for vehicles that were permitted earlier, so no
+    vehicle waits forever.
 
     Args:
         traffic: all vehicles and crossings.
@@ -578,8 +578,8 @@ def rear_on_way(streets: Streets, car: Any) -> float:
 
     Args:
         streets: arrays of all lanes and paths in junctions.
-        car: the vehicle, a record of dtype `VEHICLE`. The path is the one
-            that is reserved for this vehicle, in the record's field `held`.
+        car: the vehicle, a record of dtype `VEHICLE`. The path is the path that
+            is reserved for this vehicle, in the record's field `held`.
     """
     rear = car.s - car.length
     if car.path[CURRENT] == car.held:

@@ -58,8 +58,8 @@ def room_for_walkers(walkways: Sequence[Walkway]) -> int:
 def gait_rate(speed: np.ndarray) -> np.ndarray:
     """Returns the rate at which the phase of pedestrians' gait changes [rad/s].
 
-    `speed` contains the walking speeds [m/s]. A stride consists of two steps;
-    its length is 0.4 m plus the distance walked in 0.7 s.
+    `speed` contains the walking speeds [m/s]. A stride consists of two steps.
+    The length of a stride is 0.4 m plus the distance walked in 0.7 s.
     """
     return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
 
@@ -102,7 +102,7 @@ class Crowd:
 
         Args:
             t: time at which the step begins [s].
-            seed: seed of the random choice of their next walkways.
+            seed: seed of the random choice of the pedestrians' next walkways.
         """
         crossings, walkers = self._crossings, self.walkers
         opened = crossings["opened"]
@@ -241,8 +241,7 @@ class Crowd:
         [rad].
 
         Args:
-            walkers: (...) records of pedestrians, which can be those of several
-                times.
+            walkers: (...) records of pedestrians, at one or several times.
         """
         paths, points, *_ = self._paths
         path = paths[walkers["path"]]

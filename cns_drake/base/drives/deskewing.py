@@ -54,10 +54,11 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     expressed in the LiDAR's frame at that time. The pose at that time comes
     from cubic splines through the recorded poses around the scan: one for
     positions, and scipy's RotationSpline, with smooth angular rates, for
-    rotations. With this pose the point is transformed to the world, and from
-    there, with the pose at the stamp, to the LiDAR's frame S at the stamp.
+    rotations. This pose transforms the point to the world; the pose at the
+    stamp then transforms the point to the LiDAR's frame S at the stamp.
 
-    If no pose is recorded after the last scan, its motion is extrapolated.
+    If no pose is recorded after the last scan, the motion during this scan is
+    extrapolated.
 
     Args:
         drive: drive whose scans have a field `t` [ns].

@@ -78,7 +78,7 @@ def driven_way(scenario: Mapping | None) -> dict | None:
 
     Returns:
         Field -> value, without fields that are empty or zero. None if there is
-        no scenario, or if it has neither a route nor waypoints.
+        no scenario, or if the scenario has neither a route nor waypoints.
     """
     if scenario is None or not any(scenario.get(name) for name in _PATHS):
         return None
@@ -119,7 +119,7 @@ class Drive(abc.ABC):
 
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
-        world_frame: name of W as the recording states it.
+        world_frame: name of W, as stated in the recording.
 
     Example:
         from evaluation import open_drive
@@ -229,8 +229,8 @@ class Drive(abc.ABC):
     def files(self) -> tuple[Path, ...]:
         """All files from which the drive, its scans and its labels are read.
 
-        Results of the drive are kept until one of these files changes. A drive
-        that is not read from files has none.
+        Results of the drive are kept until one of these files changes. For a
+        drive that is not read from files, the list is empty.
         """
         return ()
 
@@ -252,8 +252,8 @@ class Drive(abc.ABC):
         """Settings of the drive's LiDAR from the scenario; empty without any.
 
         A scenario may have several LiDARs. If the name of the drive ends in
-        `_<lidar>`, the settings of that LiDAR are returned, otherwise those of
-        the first one.
+        `_<lidar>`, the settings of that LiDAR are returned, otherwise the
+        settings of the first LiDAR.
         """
         lidars = (self.scenario or {}).get("lidars")
         if not isinstance(lidars, dict) or not lidars:
@@ -306,8 +306,8 @@ class DriveNames:
     """Name, world frame and map of a drive, without its scans.
 
     Use this object instead of an open drive to check whether two drives have
-    the same world (`cns_drake.base.drives.drive.check_same_world`). Of the
-    scenario, only the field `map` is kept.
+    the same world (`cns_drake.base.drives.drive.check_same_world`). Only the
+    field `map` of the scenario is kept.
     """
 
     name: str
@@ -336,7 +336,8 @@ def check_same_world(
     same map.
 
     Raises:
-        InputError: if they name different world frames, or different maps.
+        InputError: if the drives name different world frames, or different
+            maps.
     """
     frames = first.world_frame, second.world_frame
     if frames[0] != frames[1]:

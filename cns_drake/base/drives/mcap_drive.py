@@ -44,21 +44,21 @@ class McapDrive(Drive):
     `instance` of each point. Images come from the first topic of compressed
     images.
 
-    Scan i is the i-th point cloud of the LiDAR by log time. Its pose is that of
-    the `/odometry` message with exactly the same stamp, composed with the pose
-    of the LiDAR on the vehicle from `/tf_static`. Poses are not interpolated.
-    At the start and end of the recording, scans without a pose or labels are
-    left out, and a note says so. This happens, for example, if the recording
-    was cut off and repaired.
+    Scan i is the i-th point cloud of the LiDAR by log time. The pose of the
+    scan is the pose in the `/odometry` message with exactly the same stamp,
+    composed with the pose of the LiDAR on the vehicle from `/tf_static`. Poses
+    are not interpolated. At the start and end of the recording, scans without a
+    pose or labels are left out, and a note says so. This happens, for example,
+    if the recording was cut off and repaired.
 
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
 
-    Opening reads the file's index; reading a scan reads one chunk. The first
-    use of stamps or poses reads the chunks that hold odometry. If the file does
-    not state that log times equal stamps, the first use of stamps also reads
-    all clouds. Recordings of cns-drake contain this statement, and each of
-    their chunks holds one topic.
+    Opening a drive reads the file's index; reading a scan reads one chunk. The
+    first use of stamps or poses reads the chunks that hold odometry. If the
+    file does not state that log times equal stamps, the first use of stamps
+    also reads all clouds. Recordings of cns-drake contain this statement, and
+    each chunk in them holds only one topic.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):
@@ -199,8 +199,9 @@ class McapDrive(Drive):
     def distortion_note(self) -> str | None:
         """A note for the user if the scans contain motion distortion.
 
-        The value is None if the scans contain none, and for recordings of real
-        LiDARs, which do not state whether their scans are distorted.
+        The value is None if the scans contain no motion distortion, and for
+        recordings of real LiDARs, which do not state whether their scans are
+        distorted.
         """
         if not self.lidar_section.get("motion_distortion"):
             return None

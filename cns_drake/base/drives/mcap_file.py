@@ -1,11 +1,12 @@
 """Random access to the messages of an MCAP file.
 
-The `mcap` package reads messages in the order of time: all of them, or those of
-an interval. Reading a scan by its number needs the location of each message of
-a topic, and the one chunk that contains it. Both come from the index at the end
-of a complete file, so that opening a file of gigabytes reads a few kilobytes.
-The format makes this index optional. If the message counts at the end of the
-file do not confirm the index, the whole file is read once.
+The `mcap` package reads messages in the order of time: all messages, or the
+messages of an interval. To read a scan by its number, this module finds the
+location of each message of a topic, and reads only the chunk that contains the
+scan. The locations come from the index at the end of a complete file, so that
+opening a file of gigabytes reads a few kilobytes. The format makes this index
+optional. If the message counts at the end of the file do not confirm the index,
+the whole file is read once.
 
 The `mcap` package checks only the checksums of chunks, and trusts the sizes
 that a chunk declares. This module refuses damaged or hostile records.
@@ -203,7 +204,7 @@ class _Contents:
 class McapFile:
     """An MCAP file, open for reading single messages.
 
-    The file is opened for each access only. The last two chunks that were read
+    The file is open only during each access. The last two chunks that were read
     stay in memory uncompressed, since messages are mostly read in order.
 
     If a topic has several channels, for example because several nodes publish
@@ -257,8 +258,8 @@ class McapFile:
     def step_back_ns(self, topic: str) -> int:
         """Returns the largest decrease of the log time between messages [ns].
 
-        The messages are those of one topic, in the order in which they were
-        written. The result is 0 if the log times never decrease.
+        The messages belong to one topic, and are taken in the order in which
+        they were written. The result is 0 if the log times never decrease.
 
         Raises:
             InputError: if the index cannot be read.

@@ -35,7 +35,7 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
 
     Args:
         data: the message, serialised as CDR.
-        message_type: its type, such as `nav_msgs/msg/Odometry`.
+        message_type: type of the message, such as `nav_msgs/msg/Odometry`.
 
     Raises:
         ValueError: the data are not a message of this type, or are longer than
@@ -165,7 +165,7 @@ class StaticTransforms:
 
         Raises:
             InputError: no transforms lead from the frame to the ancestor, or
-                one of them is not a rigid transform.
+                one of these transforms is not rigid.
         """
         X_CF = np.eye(4)
         child = frame

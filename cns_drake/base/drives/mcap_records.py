@@ -1,9 +1,9 @@
 """The records of an MCAP file, read from its beginning without an index.
 
-The readers of the `mcap` package need an intact file and trust the sizes that
-it declares. Here every size is checked against the file and a limit before
-memory is reserved, and every checksum is checked. After a damaged part, reading
-continues at the next intact chunk.
+The readers of the `mcap` package need an intact file, and trust the sizes that
+the file declares. Here every size is checked against the file and a limit
+before memory is reserved, and every checksum is checked. After a damaged part,
+reading continues at the next intact chunk.
 """
 
 from collections.abc import Callable, Iterator
@@ -191,8 +191,8 @@ def locate_records(
     Yields:
         Two offsets [bytes], and the record. For a record in a chunk, the
         offsets are those of the chunk in the file and of the record in the
-        uncompressed chunk. For any other record, they are its offset in the
-        file and 0.
+        uncompressed chunk. For any other record, the offsets are that of the
+        record in the file, and 0.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)

@@ -1,8 +1,8 @@
 """Messages of poses and of IMUs as rows of an array.
 
 A drive has thousands of such messages, and decoding a message takes longer than
-reading it. After the names of its frames, such a message contains only doubles.
-A message that differs from the first message only in its stamp and its doubles
+reading it. After the names of frames, such a message contains only doubles. A
+message that differs from the first message only in its stamp and its doubles
 therefore has the same layout, and its bytes are copied without decoding.
 """
 

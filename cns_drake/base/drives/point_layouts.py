@@ -193,10 +193,10 @@ def to_layout(
         points: (N,) with the fields x y z intensity ring t.
         layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
             have.
-        num_rings: number of rings of the LiDAR. With it, the layout `velodyne`
-            counts rings from the lowest, as Velodyne's driver does.
+        num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
+            counts rings from the lowest ring, as Velodyne's driver does.
         is_calibrated: whether the intensities are calibrated, from 0 to 255.
-            Otherwise they are from 0 to 1.
+            Otherwise intensities are from 0 to 1.
 
     Returns:
         (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
@@ -259,7 +259,7 @@ def from_layout(
         `autoware`, `time_stamp` and `channel` become `t` and `ring`, and
         intensities are scaled to 0 to 1 unless they are calibrated. A
         floating-point `t` in seconds or nanoseconds becomes whole nanoseconds;
-        it stays as it is if its values fit neither unit.
+        a `t` whose values fit neither unit stays unchanged.
 
     Raises:
         ValueError: the numbers of labels and points differ.

@@ -1,8 +1,8 @@
 """ROS 2 message types: Python classes, definitions, hashes, serialisation.
 
 Most types come from rosbags' table of ROS 2 Humble. The types that this table
-lacks are in the module `messages`: those of vision_msgs in version 4, as in
-Humble, and those of foxglove_msgs after Foxglove's schemas. A recording
+lacks are in the module `messages`: the types of vision_msgs in version 4, as in
+Humble, and the types of foxglove_msgs after Foxglove's schemas. A recording
 contains the definitions of its message types.
 """
 

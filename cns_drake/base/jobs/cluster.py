@@ -52,8 +52,9 @@ class Cluster:
     Attributes:
         num_workers: how many jobs run on this machine at a time.
         scheduler: address of a Dask scheduler, such as `tcp://10.0.0.1:8786`,
-            whose workers run the jobs; None to run them on this machine. The
-            workers must have this package installed and share the file system.
+            whose workers run the jobs; None to run the jobs on this machine.
+            The workers must have this package installed and share the file
+            system.
     """
 
     num_workers: int = 1
@@ -90,7 +91,8 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
             machine, one for each core.
 
     Raises:
-        InputError: if both are given, or the number is not from 1 to 1024.
+        InputError: if both options are given, or the number is not from 1 to
+            1024.
     """
     if num_jobs is not None:
         if scheduler is not None:

@@ -2,8 +2,8 @@
 
 Results with equal fingerprints are equal. A fingerprint covers the modules that
 the code imports, directly or indirectly, so that changes to other modules leave
-results valid. It also covers the versions of the libraries that influence
-numbers.
+results valid. A fingerprint also covers the versions of the libraries that
+influence numbers.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
     folder. It also includes the versions of libraries.
 
     Args:
-        modules: full names; `<package>.*` stands for all modules in it.
+        modules: full names; `<package>.*` stands for all modules in a package.
         without: packages to leave out even if they are imported.
     """
     named: list[_Module] = []
@@ -59,10 +59,10 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 
 
 def script_digest(path: Path) -> str:
-    """Returns a digest of a Python file and of everything it imports.
+    """Returns a digest of a Python file and everything that it imports.
 
-    It covers imported files in the same folder, imported modules of this
-    project, and the versions of libraries; see
+    The digest covers imported files in the same folder, imported modules of
+    this project, and the versions of libraries; see
     `cns_drake.base.jobs.fingerprint.code_digest`.
 
     Raises:

@@ -25,10 +25,10 @@ _JOB_MEMORY = 1.2e9
 
 
 def measure_slowness() -> float:
-    """Returns how much slower this machine is than the one of the costs.
+    """Returns how much slower this machine is than that of the job costs.
 
     A fixed piece of work is timed, which takes about a second. Other load on
-    the machine at that time makes the result greater.
+    the machine during this second makes the result greater.
     """
     doing("measuring this machine")
     points, queries = np.random.default_rng(1).random((2, _POINTS, 3))
@@ -42,8 +42,7 @@ def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
     """Returns the time in which jobs can be done, at best [s].
 
     Args:
-        jobs: the jobs. Jobs that they need and that are not among them count as
-            done.
+        jobs: the jobs. Needed jobs that are not among these jobs count as done.
         num_workers: number of jobs that run at a time.
     """
     ends: Mapping[str, float] = _end_times({job.name: job for job in jobs})

@@ -88,12 +88,12 @@ def run_process(
         job: a pickled `cns_drake.base.jobs.step.Step`.
         on_message: called with each message of the job, as the `send` of a
             `cns_drake.base.jobs.step.Reporter`.
-        is_wanted: called again and again; when it returns False, the process is
-            ended.
+        is_wanted: called repeatedly; when this function returns False, the
+            process is ended.
 
     Raises:
         JobError: the job cannot be done.
-        ProcessDiedError: its process ended before it was done.
+        ProcessDiedError: the process ended before the job was done.
     """
     ours, theirs = Pipe()
     with ours:

@@ -54,7 +54,8 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster, unit: str = "jobs") -> None:
         unit: what the jobs are, such as `cities`.
 
     Raises:
-        FailedJobsError: if some could not be done; all are named.
+        FailedJobsError: if jobs could not be done; the error names all of these
+            jobs.
         InputError: if the scheduler does not answer.
     """
     by_name = _by_name(jobs)

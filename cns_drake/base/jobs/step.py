@@ -53,7 +53,8 @@ class Step(abc.ABC):
     """A piece of work whose result is files.
 
     Each subclass is a frozen dataclass, defined at the top level of a module,
-    so that any process can unpickle and run a step. Paths in it are absolute.
+    so that any process can unpickle and run a step. Paths in a step are
+    absolute.
     """
 
     @property
@@ -71,7 +72,7 @@ class Step(abc.ABC):
         """Returns whether all files of the step exist and are up to date.
 
         Raises:
-            InputError: a file that has to be read for this cannot be read.
+            InputError: a file that this check needs cannot be read.
         """
 
     @abc.abstractmethod
@@ -95,12 +96,12 @@ class Step(abc.ABC):
 
 @dataclass(frozen=True)
 class Steps(Step):
-    """Several steps run in order; steps that are done already are skipped.
+    """Several steps that run in order, except steps that are already done.
 
     Attributes:
         place: the file or folder that only one process at a time may write; see
             `Step.output`.
-        steps: the steps, in an order in which each finds its inputs.
+        steps: the steps, in an order in which each step finds its inputs.
     """
 
     place: Path
