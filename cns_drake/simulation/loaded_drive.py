@@ -34,8 +34,10 @@ from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_motion import traffic_structures
+from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
+from cns_drake.traffic.walkway_clearing import kept_clear
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.ground_surface import GROUND_CLASSES
 from cns_drake.transient.world_structures import read_structures
@@ -221,10 +223,8 @@ def plan_scenario_traffic(
     if wanted.walkers:
         world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
         things = _sidewalk_obstacles(world)
-        walkways = lane_graph.kept_clear(walkways, things)
-        graph, walkways = lane_graph.with_unmarked_crossings(
-            graph, walkways, things
-        )
+        walkways = kept_clear(walkways, things)
+        graph, walkways = with_unmarked_crossings(graph, walkways, things)
     follows = scenario.driver.follows
     plan = traffic_plan.plan_traffic(
         graph,

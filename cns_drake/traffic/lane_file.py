@@ -14,7 +14,8 @@ from cns_drake.base.files import read_bytes
 from cns_drake.base.input_models import InputModel
 from cns_drake.base.json_text import parse_json
 from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway
+from cns_drake.traffic.polylines import resampled
 
 # Distance between the points of a lane in a file [m].
 _FILE_SPACING = 1.0

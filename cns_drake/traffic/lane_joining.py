@@ -7,13 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_graph import (
-    SPACING,
-    LaneGraph,
-    Piece,
-    length_of,
-    resampled,
-)
+from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.polylines import SPACING, length_of, resampled
 
 # A lane must have room for any vehicle. A shorter one is part of the ways that
 # lead over it [m].

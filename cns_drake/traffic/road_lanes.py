@@ -12,7 +12,8 @@ from cns_drake.roads.centreline import blend
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import ENDS, End, Junction, LaneRef, Road
 from cns_drake.traffic import lane_graph
-from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway, resampled
+from cns_drake.traffic.lane_graph import LaneGraph, Piece, Walkway
+from cns_drake.traffic.polylines import distances_along, length_of, resampled
 
 # Distance of stop lines from the end of a road with a crossing [m].
 _STOP_LINE = 4.5
@@ -102,11 +103,11 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
             across = abs(np.sin(heading - axes[junction]))
             phase = int(across > np.sin(np.pi / 4))
         for way, last in _ways(onward, ref, long):
-            length = lane_graph.length_of(lines[ref])
+            length = length_of(lines[ref])
             parts = [
                 _shortened(lines[ref], length - _trims_of(ref, trims)[1], 0)
             ]
-            length = lane_graph.length_of(lines[last])
+            length = length_of(lines[last])
             head = _shortened(
                 lines[last], 0, length - _trims_of(last, trims)[0]
             )
@@ -148,7 +149,7 @@ def _trims_of(
 
 def _shortened(line: np.ndarray, start: float, end: float) -> np.ndarray:
     """Returns a line (N, 3) shortened at both ends [m]."""
-    along = lane_graph.distances_along(line)
+    along = distances_along(line)
     low, high = start, along[-1] - end
     inside = along[(along > low + 1e-3) & (along < high - 1e-3)]
     wanted = np.concatenate([[low], inside, [high]])
@@ -362,7 +363,7 @@ def _corner_walkways(
         z = np.linspace(p[2], q[2], len(line))
         width = min(_walked_width(network.roads[key[0]]) for key in (a, b))
         points = np.column_stack([line, z])
-        if lane_graph.length_of(points) < _SHORTEST:
+        if length_of(points) < _SHORTEST:
             continue
         found.append(
             Walkway(resampled(points), _half_width(width), nodes[a], nodes[b])

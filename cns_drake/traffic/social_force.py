@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.overlaps import boxes_overlap
+from cns_drake.traffic.polylines import SPACING
 from cns_drake.traffic.streets import STEP
 
 # Relaxation time [s].

@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from cns_drake.traffic.lane_graph import SPACING, Walkway, length_of
+from cns_drake.traffic.lane_graph import Walkway
+from cns_drake.traffic.polylines import SPACING, length_of
 from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.social_force import (

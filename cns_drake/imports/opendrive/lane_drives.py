@@ -11,8 +11,9 @@ from cns_drake.imports.drives import search
 from cns_drake.imports.drives.search import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
 from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import Walkway, resampled
+from cns_drake.traffic.lane_graph import Walkway
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes, usual_limit
+from cns_drake.traffic.polylines import resampled
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].

@@ -28,8 +28,8 @@ from cns_drake.imports.options import DriveOn
 from cns_drake.roads.centreline import blend
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
+from cns_drake.traffic.polylines import SPACING
 
 # A way through a junction is a turn if its heading changes by more than this.
 _STRAIGHT_DEG = 35.0

@@ -15,6 +15,7 @@ from shapely.ops import substring
 from cns_drake.imports.foreign_city import Street, ends_at_nodes
 from cns_drake.imports.openstreetmap.streets import KERB_HEIGHT
 from cns_drake.traffic import lane_graph
+from cns_drake.traffic.polylines import resampled
 
 # Distance from the kerb to the middle of a walked strip [m].
 _FROM_KERB = 1.3
@@ -206,7 +207,7 @@ class _Strips:
     ) -> lane_graph.Walkway:
         height = np.full(len(line), KERB_HEIGHT)
         return lane_graph.Walkway(
-            lane_graph.resampled(np.column_stack([line, height])),
+            resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_PATH,
             self._node(a),
             self._node(b),

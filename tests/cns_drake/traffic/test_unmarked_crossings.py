@@ -13,12 +13,12 @@ from cns_drake.traffic.lane_graph import (
     Piece,
     Walkway,
     make_crossing,
-    with_unmarked_crossings,
 )
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
 from cns_drake.traffic.streets import EgoBox, make_streets
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
+from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicles import (
     accelerations,
     advance,
