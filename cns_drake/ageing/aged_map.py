@@ -2,7 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 import shutil
 
@@ -11,10 +11,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
-from cns_drake.ageing import kinds
-from cns_drake.ageing.history import TAKEN_DOWN, AgeingCity, Event
+from cns_drake.ageing.events import Event
+from cns_drake.ageing.history import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.rates import check_years
+from cns_drake.ageing.years import check_years
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, is_there, user_errors
@@ -27,7 +27,6 @@ from cns_drake.city.generation.generate import (
     triangles_in,
 )
 from cns_drake.city.geometry import Mesh, MeshShape, Structure
-from cns_drake.city.growth import stage_structures
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
@@ -50,10 +49,6 @@ _MAX_SEED = 2**63
 _HALF_CAR = 1.3
 # Distance between the places along a drive [m].
 _SPACING = 0.5
-# In each past year, a tree was lower by this height [m].
-_GROWTH = 0.4
-# Trees were never lower than this [m].
-_LEAST_TREE = 2.0
 
 
 @dataclass(frozen=True)
@@ -138,7 +133,7 @@ def age_map(
         events: list[Event] = []
         for stage, year in stages.items():
             if year < 0:
-                standing, passed = past(world, year)
+                standing, passed = world.structures_in(year)
                 events += passed if year == min(wanted) else []
                 writing.stage(stage, year, standing)
             while city.year < year:
@@ -174,50 +169,6 @@ def _swept_area(trajectory: Trajectory) -> BaseGeometry:
     times = np.linspace(0.0, trajectory.duration, number)
     _, p_WB = trajectory.poses(times)
     return shapely.LineString(p_WB[:, :2]).buffer(_HALF_CAR)
-
-
-def past(
-    world: OldWorld, year: int
-) -> tuple[dict[str, Structure | None], list[Event]]:
-    """Returns a city as it was in a past year, and the events since then.
-
-    Buildings that were built after that year are missing, and their lots have
-    another use. Trees are smaller.
-
-    Args:
-        world: the city of today, with the buildings' years of construction.
-        year: the year relative to today, negative.
-
-    Returns:
-        Name of each structure -> the structure, or None if it is the same as
-        today; and the events in order of time.
-    """
-    assert world.today is not None  # The caller has checked it.
-    standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
-    events = []
-    for name, thing in world.things.items():
-        built = world.built.get(name)
-        if built is not None and built - world.today > year:
-            events.append(Event(built - world.today, "built", name))
-            del standing[name]
-            lot = world.structure(name)
-            rng = np.random.default_rng(built)
-            use = stage_structures.use_by_size(lot)
-            for one in stage_structures.lot_objects(
-                lot, use, {"hatchback": 1}, rng
-            ):
-                standing[one.name] = one
-                gone = Event(events[-1].year, TAKEN_DOWN, one.name)
-                events.append(replace(gone, detail="empty plot"))
-        elif thing.semantic_class == "vegetation":
-            height = thing.top - thing.bottom
-            if height > _LEAST_TREE and thing.kind == kinds.TREE:
-                young = max(height + _GROWTH * year, _LEAST_TREE)
-                whole = world.structure(name)
-                model = stage_structures.younger_plant(whole.model, young)
-                standing[name] = replace(whole, model=model)
-    events.sort(key=lambda one: one.year)
-    return standing, events
 
 
 class _Writing:

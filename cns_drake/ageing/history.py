@@ -17,6 +17,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import kinds, plots
+from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import MOVED, Tally
@@ -29,9 +30,10 @@ from cns_drake.city.geometry import (
     from_above,
     polygons_of,
 )
-from cns_drake.city.growth import stage_structures
+from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.growth.lowering import top_of
 from cns_drake.city.placement.frontage import lines_along, lot_at
+from cns_drake.city.plants.plant_sizes import scaled_plant
 from cns_drake.city.plants.trees import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
 from cns_drake.scene.materials import MATERIALS
@@ -86,32 +88,6 @@ _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
 
-# A structure is put up as a consequence of another event.
-PUT_UP = "put_up"
-# A structure is removed as a consequence of another event.
-TAKEN_DOWN = "taken_down"
-
-
-@dataclass(frozen=True)
-class Event:
-    """A row of `history.csv`: what happened to a structure in a year.
-
-    Attributes:
-        year: year relative to today, which is 0.
-        event: kind of event, such as `demolished` or `planted`.
-        structure: name of the structure.
-        successor: name of the structure that takes its place; "" if there is
-            none.
-        detail: further text on the event, such as the height of a new tree.
-    """
-
-    year: int
-    event: str
-    structure: str
-    successor: str = ""
-    detail: str = ""
-
-
 @dataclass
 class _Lot:
     """A plot and what stands on it.
@@ -153,8 +129,8 @@ class _Tree:
     replanted: int = 0
 
     def structure(self) -> Structure:
-        share = round(self.height / self.full, 4)
-        model = stage_structures.scaled_plant(self.whole.model, share)
+        factor = round(self.height / self.full, 4)
+        model = scaled_plant(self.whole.model, factor)
         return replace(self.whole, name=self.name, model=model)
 
 
@@ -532,9 +508,7 @@ class AgeingCity:
         bare = lot.plot.thing(name, "building", model)
         cars = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
         rng = self._rng("lot", name)
-        for one in stage_structures.lot_objects(
-            bare, stage_structures.use_by_size(bare), cars, rng
-        ):
+        for one in lot_objects(bare, use_by_size(bare), cars, rng):
             if not self.near(one.footprint_W):
                 self._put(one, event="empty plot")
                 lot.parts.append(one.name)

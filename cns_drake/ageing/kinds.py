@@ -4,7 +4,9 @@ from pathlib import Path
 
 from cns_drake.base.yaml_files import parse_yaml
 
+# Trees, the plants that grow.
 TREE = "tree"
+# Ground of parking bays, which is part of the streets.
 PARKING_BAYS = "parking_bays"
 _TABLE = parse_yaml(Path(__file__).with_name("kinds.yaml").read_bytes())
 _LISTS = {use: frozenset(text.split()) for use, text in _TABLE.items()}
@@ -25,9 +27,9 @@ def is_signal(kind: str) -> bool:
     return _is_one_of("signals", kind)
 
 
-def is_public(kind: str) -> bool:
+def is_never_built_on(kind: str) -> bool:
     """Returns whether nobody builds on ground of a kind, such as a park."""
-    return not _LISTS["public"].isdisjoint(kind.split("_"))
+    return not _LISTS["never_built_on"].isdisjoint(kind.split("_"))
 
 
 def _is_one_of(use: str, kind: str) -> bool:

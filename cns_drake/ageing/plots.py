@@ -28,12 +28,10 @@ from cns_drake.city.geometry import (
     polygons_of,
     unit_normals,
 )
+from cns_drake.city.geometry.rectangles import largest_rectangle
+from cns_drake.city.growth.building_sites import building_site
+from cns_drake.city.growth.lot_uses import lot_objects
 from cns_drake.city.growth.lowering import lowered, top_of
-from cns_drake.city.growth.stage_structures import (
-    building_site,
-    largest_rectangle,
-    lot_objects,
-)
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.transient.putting_up import scaffold
 

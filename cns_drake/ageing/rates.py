@@ -1,9 +1,8 @@
 """The yearly rates of events in a city, and counts of the events."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 
 from scipy.stats import poisson
@@ -22,7 +21,6 @@ DEFAULT_RATES: Mapping[str, float] = {
         Path(__file__).with_name("rates.yaml").read_bytes()
     ).items()
 }
-LAST_YEAR = 200
 
 
 def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
@@ -80,24 +78,6 @@ def check_rates(found: object, source: object) -> dict[str, float]:
     return found
 
 
-def check_years(years: Iterable[int]) -> tuple[int, ...]:
-    """Checks the years of an aged map, relative to today, and returns them.
-
-    Raises:
-        InputError: the years do not ascend, or a year is more than 200 years
-            from today.
-    """
-    found = tuple(years)
-    text = " ".join(map(str, found))
-    if not found or any(a >= b for a, b in pairwise(found)):
-        raise InputError(f"--years: {text or 'none'}: not in ascending order")
-    if max(map(abs, found)) > LAST_YEAR:
-        raise InputError(
-            f"--years: {text}: none may be beyond {LAST_YEAR} years"
-        )
-    return found
-
-
 @dataclass
 class Tally:
     """Counts how often events happened to the objects of a city.
@@ -116,19 +96,21 @@ class Tally:
     exposure: Counter[str] = field(default_factory=Counter)
     number: Counter[str] = field(default_factory=Counter)
 
-    def count(self, event: str, share: float, hit: bool, things: int) -> None:
+    def count(
+        self, event: str, probability: float, hit: bool, num_at_risk: int
+    ) -> None:
         """Counts one random trial of an event.
 
         Args:
             event: name of the event.
-            share: probability of the event in this trial.
+            probability: probability of the event in this trial.
             hit: whether the event happened.
-            things: number of objects that this trial adds to `exposure`, the
-                number of objects at risk. Use 0 if an earlier trial has already
-                added these objects.
+            num_at_risk: number of objects at risk that this trial adds to
+                `exposure`. Use 0 if an earlier trial has already added these
+                objects.
         """
-        self.expected[event] += share
-        self.exposure[event] += things
+        self.expected[event] += probability
+        self.exposure[event] += num_at_risk
         self.number[event] += hit
 
     def to_csv(self) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from cns_drake.ageing.rates import LAST_YEAR
+from cns_drake.ageing.years import LAST_YEAR
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint

@@ -14,12 +14,8 @@ from typing import Any
 import numpy as np
 
 from cns_drake.ageing.aged_map import age_map
-from cns_drake.ageing.rates import (
-    DEFAULT_RATES,
-    LAST_YEAR,
-    check_rates,
-    read_rates,
-)
+from cns_drake.ageing.rates import DEFAULT_RATES, check_rates, read_rates
+from cns_drake.ageing.years import LAST_YEAR
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.cluster import Cluster
@@ -150,7 +146,7 @@ class MadeMaps:
             InputError: years, or a rate, are out of range.
         """
         if type(years) is not int or not 1 <= years <= LAST_YEAR:
-            raise InputError(f"years: {years!r} is not from 0 to {LAST_YEAR}")
+            raise InputError(f"years: {years!r} is not from 1 to {LAST_YEAR}")
         key = self._key(drive, rates, seed)
         self._ages.setdefault(key, set()).add(years)
         return str(drive.map), str(drive.stage)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cns_drake.ageing.aged_map import HISTORY_NAME
-from cns_drake.ageing.history import PUT_UP, TAKEN_DOWN
+from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.fingerprint import fingerprint

@@ -12,7 +12,7 @@ from scipy.stats import poisson
 import shapely
 
 from cns_drake.ageing import plots
-from cns_drake.ageing.aged_map import age_map, past
+from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.history import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import (
@@ -24,7 +24,6 @@ from cns_drake.ageing.plots import (
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
     Tally,
-    check_years,
     poisson_p,
     read_rates,
 )
@@ -411,25 +410,17 @@ def test_the_past_lacks_younger_buildings(town, tmp_path):
                 built = 2020 if row["name"] == houses[0] else 1950
             table.writerow({**row, "built": built})
     world = OldWorld(MapFolder(folder))
-    before, events = past(world, -10)
+    before, events = world.structures_in(-10)
     assert houses[0] not in before
     assert houses[1] in before
     assert not events[0].year
-    after, _ = past(world, 0)
+    after, _ = world.structures_in(0)
     assert houses[0] in after
     age_map(folder, [-10, 0, 2], 1, _BUSY, tmp_path / "old")
     text = (tmp_path / "old" / "stage_02.sdf").read_text()
     assert f'"{houses[0]}/' not in text
     assert f'"{houses[1]}/' in text
     assert not (tmp_path / "old" / "stage_04.sdf").exists()
-
-
-@pytest.mark.parametrize(
-    "years", [[], [2, 2], [5, 1], [1, 201], [-201, 0]], ids=str
-)
-def test_faulty_years(years):
-    with pytest.raises(InputError, match="--years"):
-        check_years(years)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Buildings of less height, young plants, building sites and lots."""
+"""Buildings of less height, building sites and lots."""
 
 from helpers.building_checks import (
     cast,
@@ -14,17 +14,10 @@ from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.mesh import box_mesh
 from cns_drake.city.geometry.structures import Structure, part_mesh
+from cns_drake.city.growth.building_sites import building_site
+from cns_drake.city.growth.lot_uses import USES, lot_objects, use_by_size
 from cns_drake.city.growth.lowering import cut_at, enclosed, lowered, top_of
-from cns_drake.city.growth.stage_structures import (
-    USES,
-    GrowingCity,
-    building_site,
-    largest_rectangle,
-    lot_objects,
-    use_by_size,
-    younger_plant,
-)
-from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Growth, Stage, Stages
 
 # Height of the walls that the edge of the roof covers [m].
@@ -104,22 +97,6 @@ def test_heights_have_meshes_of_their_own():
         assert one.meshes[mesh].to_obj() == other.meshes[mesh].to_obj()
 
 
-@pytest.mark.parametrize("species", ["palm", "spruce", "hedge", "plane_tree"])
-def test_a_younger_plant_is_alike(species):
-    plant = OBJECTS[species].build(np.random.default_rng(4))
-
-    def extent(model):
-        corners = np.concatenate(
-            [part_mesh(p, model.meshes).vertices for p in model.parts]
-        )
-        return np.array([corners.min(axis=0), corners.max(axis=0)])
-
-    top = extent(plant)[1, 2]
-    young = younger_plant(plant, 0.4 * top)
-    np.testing.assert_allclose(extent(young), 0.4 * extent(plant), atol=2e-3)
-    assert younger_plant(plant, top) is plant
-
-
 def test_a_site_stands_on_its_lot():
     whole = typical_model("museum")
     site = building_site(whole, 20.0, "museum", seed=2)
@@ -140,16 +117,6 @@ def test_a_site_stands_on_its_lot():
 def test_a_lot_too_small_for_a_frame_has_none():
     with pytest.raises(ValueError, match="sites: k: its lot is too small"):
         building_site(typical_model("kiosk_row"), 9.0, "k", 1)
-
-
-def test_the_rectangle_lies_within_the_lot():
-    corner = box(0, 0, 20, 10).union(box(0, 0, 8, 25))
-    inner = largest_rectangle(corner)
-    assert corner.covers(inner)
-    assert inner.area == pytest.approx(200.0)
-    round_lot = box(0, 0, 30, 20).buffer(-6).buffer(6)
-    assert round_lot.buffer(0.02).covers(largest_rectangle(round_lot))
-    assert largest_rectangle(box(1, 2, 5, 9)).equals(box(1, 2, 5, 9))
 
 
 @pytest.mark.parametrize("use", USES)

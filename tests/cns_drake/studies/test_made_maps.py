@@ -116,8 +116,8 @@ def test_a_city_is_drawn_anew_for_each_version(town, tmp_path, steps):
 @pytest.mark.parametrize(
     ("years", "rates", "fault"),
     [
-        (0, 1.0, "years: 0 is not from 0 to 200"),
-        (201, 1.0, "years: 201 is not from 0 to 200"),
+        (0, 1.0, "years: 0 is not from 1 to 200"),
+        (201, 1.0, "years: 201 is not from 1 to 200"),
         (-1, 1.0, "years: -1 is not"),
         (2.5, 1.0, "years: 2.5 is not"),
         (True, 1.0, "years: True is not"),

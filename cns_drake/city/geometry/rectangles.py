@@ -1,0 +1,40 @@
+"""Rectangles within polygons."""
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+# A rectangle is chosen between at most this many lines in each direction.
+_MOST_LINES = 12
+
+
+def largest_rectangle(footprint: BaseGeometry) -> Polygon:
+    """Returns a large axis-aligned rectangle that lies within a footprint.
+
+    The sides of the rectangle pass through corners of the footprint. It is the
+    largest such rectangle, unless the footprint has so many corners that only
+    some are tried. If no such rectangle lies within the footprint, the result
+    is tiny.
+    """
+    corners = shapely.get_coordinates(footprint.simplify(0.05))
+    xs, ys = (_evenly_chosen(np.unique(np.round(c, 3))) for c in corners.T)
+    x0, x1 = (xs[k] for k in np.triu_indices(len(xs), 1))
+    y0, y1 = (ys[k] for k in np.triu_indices(len(ys), 1))
+    sides = x0[:, None], y0[None], x1[:, None], y1[None]
+    boxes = shapely.box(*sides).reshape(-1)
+    room = footprint.buffer(0.01)
+    shapely.prepare(room)
+    inside = boxes[shapely.covers(room, boxes)]
+    if len(inside) == 0:
+        x, y = footprint.representative_point().coords[0]
+        return box(x - 0.1, y - 0.1, x + 0.1, y + 0.1)
+    return max(inside, key=lambda one: one.area)
+
+
+def _evenly_chosen(values: np.ndarray) -> np.ndarray:
+    """Returns at most `_MOST_LINES` of increasing values, evenly chosen."""
+    if len(values) <= _MOST_LINES:
+        return values
+    kept = np.linspace(0, len(values) - 1, _MOST_LINES).round().astype(int)
+    return values[kept]
