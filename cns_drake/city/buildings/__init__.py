@@ -1,9 +1,10 @@
 """Buildings of every archetype, random or fixed (landmarks).
 
 An archetype is a kind of building. `archetypes.yaml` contains the limits of
-size and the colours of each archetype, and a subclass of `Building` draws and
-builds it. To add an archetype, write an entry of `archetypes.yaml` and a
-subclass, and add the subclass to `BUILDERS`. `sample` returns one building:
+size and the colours of each archetype, and a subclass of `Building` samples and
+builds its buildings. To add an archetype, write an entry of `archetypes.yaml`
+and a subclass, and add the subclass to `BUILDERS`. `sample` returns one
+building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -101,10 +102,11 @@ def sample(
         height: height of the parapet, ridge or spire [m]. Only roof equipment
             and chimneys may rise above it.
         rng: random generator for all parameters.
-        name: name of the structure; the names of its own meshes begin with it.
+        name: name of the structure, with which the names of the building's own
+            meshes begin.
         blind_edges: edges of the footprint towards neighbours, numbered
-            counter-clockwise from the front. No part crosses these edges: at
-            them, the building has plain walls or keeps a distance.
+            counter-clockwise from the front. No part crosses these edges: along
+            these edges, the building has plain walls or keeps a distance.
 
     Raises:
         ValueError: the archetype needs a rectangular footprint, or cannot be

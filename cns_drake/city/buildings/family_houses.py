@@ -104,8 +104,8 @@ class DetachedHouse(_FamilyHouse):
 
     The parameter `plan` is `box` (one main wing), `ell` (with a second wing in
     front), `tee` (with a second wing at the back) or `cross` (with both). The
-    garage is on the right and the front wing on the left; if `mirrored`, they
-    change sides.
+    garage is on the right and the front wing on the left; if `mirrored`, the
+    garage is on the left and the front wing on the right.
     """
 
     def draw(self) -> None:

@@ -78,8 +78,8 @@ class Landmark(Building):
     def build(self) -> None:
         """Adds the parts of the landmark's model.
 
-        The model is stretched to the size of the building's site, which must be
-        a rectangle, and to the building's height.
+        The model is stretched to the building's height, and to the size of the
+        building's site, which must be a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
         model = _read(self.folder)

@@ -104,7 +104,7 @@ class Site:
         """Returns the blind edges of one of several units side by side.
 
         Edges between two units are blind. The left edge of the first unit, and
-        the right edge of the last one, are blind if the same edge of the site
+        the right edge of the last unit, are blind if the same edge of the site
         is blind. The result is a set of edge numbers: 3 is the left edge, and 1
         the right edge.
 
@@ -165,13 +165,13 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         overhang: greatest distance by which eaves, balconies and canopies reach
             outside the footprint [m].
         any_outline: whether the footprint can be any simple polygon; otherwise
-            it must be a rectangle.
+            the footprint must be a rectangle.
         party_walls: whether a building can stand wall to wall with a neighbour;
-            otherwise it keeps the distance `overhang` from the edges of the
-            footprint towards neighbours.
-        colours: name of a part -> colours, of which each building has one at
-            random; or the name of an earlier part, whose colour this part has
-            as well. Parts without an entry have the colour of the first part.
+            otherwise a building keeps the distance `overhang` from the edges of
+            its footprint towards neighbours.
+        colours: name of a part -> colours, one of which each building gets at
+            random; or the name of an earlier part with the same colour. Parts
+            without an entry have the colour of the first part.
         choices: further lists of colours, by name, for single elements of a
             building.
         materials: names of the parts that are made of many pieces, such as
@@ -218,8 +218,8 @@ class Assembly(Dice):
     def draw_roof_items(self, kinds: str, low: int, high: int) -> list[str]:
         """Returns the kinds of a random number of objects on the roof.
 
-        They are the first of `kinds`, which spaces separate. Their number is at
-        least `low` and less than `high`.
+        The result contains the first kinds in `kinds`, which are separated by
+        spaces. The number of objects is at least `low` and less than `high`.
         """
         return kinds.split()[: self.whole(low, high)]
 
@@ -329,8 +329,8 @@ class Assembly(Dice):
     ) -> MeshShape:
         """Returns a mesh of the folder `object_meshes` as a shape for `place`.
 
-        `mesh` is the name of its file without `.obj`. `scale` contains the
-        scale factors along x, y and z.
+        `mesh` is the name of the mesh's file without `.obj`. `scale` contains
+        the scale factors along x, y and z.
         """
         self.meshes[mesh] = object_mesh(mesh)
         return MeshShape(mesh, scale)
@@ -364,7 +364,7 @@ class Building(Assembly, abc.ABC):
     The constructor calls `draw`, which samples the sizes and the style of the
     building, and then samples its colours. From these attributes, `build` makes
     the parts of the building. Only roof equipment and chimneys may rise above
-    its `height` [m].
+    the building's `height` [m].
     """
 
     def __init__(
@@ -397,7 +397,8 @@ class Building(Assembly, abc.ABC):
         """Sets the attributes that differ between buildings of one archetype.
 
         Lengths are in metres. Do not change the order in which random numbers
-        are sampled, because it determines the numbers that a building gets.
+        are sampled, because this order determines the numbers that a building
+        gets.
         """
 
     @abc.abstractmethod

@@ -218,10 +218,10 @@ def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
 
     Args:
         width: width of the bar [m].
-        z0: height of its lower end [m].
-        z1: height of its upper end [m].
-        depth: distance of its front behind the wall [m]; negative if the bar
-            protrudes.
+        z0: height of the bar's lower end [m].
+        z1: height of the bar's upper end [m].
+        depth: distance of the bar's front behind the wall [m]; negative if the
+            bar protrudes.
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
@@ -234,7 +234,7 @@ def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
 def gate(width: float, height: float, depth: float = 0.3) -> Bay:
     """Returns a bay with a ribbed roller shutter in its middle.
 
-    The shutter is `width` wide (less in a narrow bay), `height` high, and
+    The shutter is `width` wide (narrower in a narrow bay), `height` high, and
     `depth` behind the wall [m].
     """
 
@@ -328,7 +328,7 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
     """Returns a layout with one more bay, in the middle of each wall.
 
     The bay is `width` wide [m] and replaces the reliefs that it touches. Walls
-    shorter than the bay stay as they are.
+    shorter than the bay stay unchanged.
     """
 
     def combined(edge: int, length: float) -> list[Relief]:

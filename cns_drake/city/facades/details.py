@@ -76,7 +76,7 @@ class WallFrame:
         """Returns a place in the building's frame as x and y [m].
 
         The place is given in wall coordinates: `x` along the wall, and `y`
-        outwards from it.
+        outwards.
         """
         return self._start + x * self._along + y * self._outward
 
@@ -85,7 +85,8 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
     """Returns a flat canopy with a fascia, hung on two slanted rods.
 
     The mesh is in wall coordinates [m]. The canopy extends from x0 to x1 along
-    the wall and by `reach` out of it; its underside is at the height `z`.
+    the wall, and by `reach` out of the wall; the underside of the canopy is at
+    the height `z`.
     """
     rods = [
         beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
@@ -101,8 +102,8 @@ def front_canopy(
     """Returns a canopy above a door in the middle of the front wall.
 
     The mesh is in the building's frame. `outline` contains the corners of the
-    walls, `half` is half the canopy's width, `reach` is how far it extends out
-    of the wall, and `z` is its height [m].
+    walls, `half` is half the canopy's width, `reach` is how far the canopy
+    extends out of the wall, and `z` is the height of the canopy [m].
     """
     front = WallFrame(outline, 0)
     middle = front.length / 2
@@ -145,12 +146,12 @@ def awnings(
         cells: start and end of each shop along the wall [m].
         rng: random generator that chooses the shops with an awning.
         share: probability that a shop has an awning.
-        shape: four lengths of an awning [m]: how much narrower it is than its
-            shop on each side; how far it reaches out of the wall; height of its
-            lower edge; height of its upper edge.
-        door: half the width of a stretch in the middle of the wall, where the
-            door is [m]. Shops that reach into this stretch get no awning. By
-            default there is no such stretch.
+        shape: four lengths of an awning [m]: how much narrower the awning is
+            than its shop on each side; how far the awning reaches out of the
+            wall; height of the lower edge; height of the upper edge.
+        door: half the width of the stretch for the door in the middle of the
+            wall [m]. Shops that reach into this stretch get no awning. By
+            default there is no stretch for a door.
     """
     narrower, reach, z0, z1 = shape
     middle = wall.length / 2
@@ -256,7 +257,7 @@ def pilasters(
 ) -> Mesh:
     """Returns pilasters between the bays of a wall with a regular layout.
 
-    The layout is one from `cns_drake.city.facades.bays.rhythm`.
+    The layout comes from `cns_drake.city.facades.bays.rhythm`.
 
     Args:
         outline: (N, 2) corners of the walls in the building's frame,
@@ -298,8 +299,8 @@ def corner_piers(
         width: length of the pier along each of the two walls [m].
         reach: how far the piers reach out of the walls [m].
         depth: how far the piers reach into the walls, past recessed glass [m].
-        z0: height of their feet [m].
-        z1: height of their tops [m].
+        z0: height of the feet of the piers [m].
+        z1: height of the tops of the piers [m].
         skip: edges whose corners get no piers.
     """
     outline = np.asarray(outline, dtype=float)
@@ -366,8 +367,8 @@ def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
     """Returns a bar of square section between two points.
 
     Args:
-        start, end: (3,) middles of the two ends [m]. They must not lie
-            vertically above one another.
+        start, end: (3,) middles of the two ends [m]. One end must not lie
+        vertically above the other end.
         width: side of the square [m].
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
@@ -494,8 +495,8 @@ def add_railing(
         out: the building under assembly, which gets the parts.
         part: name of the part.
         wall: the wall.
-        start: first point: distances along the wall and out of it [m].
-        end: last point: distances along the wall and out of it [m].
+        start: first point: distances along the wall and out of the wall [m].
+        end: last point: distances along the wall and out of the wall [m].
         z: height of the floor [m].
         finish: colour and material.
     """
@@ -524,8 +525,8 @@ def add_bay_window(
 ) -> None:
     """Adds a bay window that stands on the ground or hangs on the wall.
 
-    It has a row of windows for each storey. Its materials are `glass`, `roof`
-    and `walls`.
+    The bay window has a row of windows for each storey, and the materials
+    `glass`, `roof` and `walls`.
 
     Args:
         out: the building under assembly, which gets the parts.
@@ -533,10 +534,12 @@ def add_bay_window(
         x: middle of the window along the wall [m].
         width: width along the wall [m].
         reach: how far it reaches out of the wall [m].
-        z0: height of its foot; at 0 it stands on the ground [m].
+        z0: height of the foot of the bay window [m]; at 0 the bay window stands
+            on the ground.
         z1: height of its top [m].
         storeys: number of storeys between foot and top.
-        canted: whether its sides are slanted; otherwise it is a box.
+        canted: whether the sides are slanted; otherwise the bay window is a
+            box.
     """
     a, b = x - width / 2, x + width / 2
     if canted:
@@ -584,7 +587,7 @@ def add_bay_window(
 def chimney_breast(
     wall: WallFrame, x: float, width: float, reach: float, top: float
 ) -> Mesh:
-    """Returns a chimney in front of a wall, narrower above its shoulders.
+    """Returns a chimney in front of a wall, which narrows at its shoulders.
 
     Args:
         wall: the wall.

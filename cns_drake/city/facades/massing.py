@@ -106,8 +106,8 @@ def rounded(
 
     Args:
         points: (N, 2) corners of the outline [m].
-        corners: number of a corner -> its radius [m]; all other corners stay as
-            they are.
+        corners: number of a corner -> radius of the corner [m]; all other
+            corners stay unchanged.
         step: greatest length of a chord [m].
     """
 
@@ -376,8 +376,8 @@ def box(*limits: float, bottom: bool = True) -> Mesh:
 def standing(*limits: float, bottom: bool = False) -> Mesh:
     """Returns a box that stands on the ground, from x0, x1, y0, y1, z1 [m].
 
-    The box reaches down to `FOUNDATION_M` below the ground. It has a lower side
-    if `bottom` is set.
+    The box reaches down to `FOUNDATION_M` below the ground. The box has a lower
+    side if `bottom` is set.
     """
     *spot, z1 = limits
     return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
@@ -401,8 +401,8 @@ def post(
 def foundation(points: ArrayLike) -> Mesh:
     """Returns the walls of a foundation, below the outline of a building.
 
-    They reach from the ground down to `FOUNDATION_M` below it. `points`
-    contains the corners (N, 2) of the outline [m].
+    The walls reach from the ground down to `FOUNDATION_M` below the ground.
+    `points` contains the corners (N, 2) of the outline [m].
     """
     return skirt(points, points, -FOUNDATION_M, 0.0)
 
@@ -517,9 +517,9 @@ def l_shape(
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:
-    """Returns an outline (N, 2) mirrored left to right about its middle.
+    """Returns an outline (N, 2) mirrored left to right at its middle.
 
-    The front edge is still the first one, and the corners are still
+    The front edge is still the first edge, and the corners are still
     counter-clockwise.
     """
     points = np.asarray(points, dtype=float)

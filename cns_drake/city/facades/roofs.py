@@ -53,7 +53,7 @@ def gambrel_line(
         z: height of both ends [m].
         top: height of the ridge [m].
         knee: distance of the knee from the end as a share of half the span, and
-            its height as a share of the rise.
+            height of the knee as a share of the rise.
     """
     half = (b - a) / 2
     run = knee[0] * half
@@ -156,8 +156,8 @@ def gable_wall(
     """Returns the wall below a gable roof, in wall coordinates.
 
     Args:
-        line: underside of the roof as (along the wall, height) points [m]. It
-            runs from a to b, and nowhere below z.
+        line: underside of the roof as (along the wall, height) points [m]. The
+            line runs from a to b, and nowhere below z.
         a: left end of the wall [m].
         b: right end of the wall [m].
         z: height of the wall's foot [m].
@@ -205,13 +205,13 @@ def gable_glass(holes: Sequence[Patch]) -> Mesh:
 def hip(
     outline: ArrayLike, z: float, top: float, eaves: ArrayLike, fascia: float
 ) -> Mesh:
-    """Returns a hipped roof over a rectangle, with an underside at its eaves.
+    """Returns a hipped roof over a rectangle; the eaves have undersides.
 
     Args:
         outline: (4, 2) corners of the walls in the building's frame [m].
         z: height of the underside of the eaves [m].
         top: height of the ridge [m].
-        eaves: overhang [m], one number for all edges or one per edge.
+        eaves: overhang [m]: one number for all edges, or one number per edge.
         fascia: height of the vertical edge of the eaves [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
@@ -267,8 +267,8 @@ def add_chimney(
     Args:
         out: the building under assembly, which gets the parts.
         part: name of the part.
-        xyz: position of its foot, below the roof's surface, in the building's
-            frame [m].
+        xyz: position of the chimney's foot, below the roof's surface, in the
+            building's frame [m].
         finish: colour and material.
         item: `chimney` or `chimney_row`.
         yaw: heading of the chimney [rad].

@@ -98,7 +98,8 @@ def add_storeys(
         z0: height of the lowest floor [m].
         groups: number of parts, one above another.
         per_group: number of storeys in each part.
-        extras: further meshes of each storey, with z measured from its floor.
+        extras: further meshes of each storey, with z measured from the storey's
+            floor.
         part: beginning of the names of the parts.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
@@ -245,7 +246,8 @@ def shaft_walls(
         entry: the bay in front.
         slit: the bay behind.
         room: width of each bay [m].
-        rim: height of the band around the top, and how far it protrudes [m].
+        rim: height of the band around the top, and how far the band protrudes
+            [m].
         glass: depths of the openings that are glazed [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
@@ -302,7 +304,7 @@ def _add_glass(
 def cornice(
     height: float, reach: float, *, thickness: float = 0.9, steps: int = 3
 ) -> tuple[Band, ...]:
-    """Returns bands that form a cornice: each protrudes more than the last.
+    """Returns the bands of a cornice; higher bands protrude more.
 
     Args:
         height: height of the cornice's upper edge [m].

@@ -2,10 +2,10 @@
 
 A wall is described in panel coordinates: x along the wall from left to right
 (seen from outside), z up, and depth inwards; a negative depth sticks out.
-Patches painted on the panel divide it into cells with one depth each. The
-depths determine the whole surface, with every reveal, sill and ledge. The
-surface is closed, whatever the patches are. Walls around a polygon are mitred
-at its corners, so that a ledge runs around them.
+Patches on the panel divide the panel into cells with one depth each. The depths
+determine the whole surface, with every reveal, sill and ledge. The surface is
+closed for any patches. Walls around a polygon are mitred at the corners of the
+polygon, so that a ledge runs around these corners.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _WIDE_ARCH_M = 2.0
 class Band(NamedTuple):
     """A strip of wall that runs around the building at one depth [m].
 
-    It extends from the height z0 to the height z1. With a negative depth, it
-    protrudes.
+    The band extends from the height z0 to the height z1, and protrudes if the
+    depth is negative.
     """
 
     z0: float
@@ -47,8 +47,8 @@ class Band(NamedTuple):
 class Patch(NamedTuple):
     """A rectangle of the wall, pushed in by `depth` [m].
 
-    It extends from x0 to x1 along the wall, and from the height z0 to z1. With
-    a negative depth, it protrudes.
+    The patch extends from x0 to x1 along the wall, and from the height z0 to
+    z1. If the depth is negative, the patch protrudes.
     """
 
     x0: float
@@ -61,8 +61,9 @@ class Patch(NamedTuple):
 class Arch(NamedTuple):
     """A recess [m] with a round head: half an ellipse from z_spring to z1.
 
-    It extends from x0 to x1 along the wall, and begins at the height z0. It
-    must lie where the wall has depth 0, and no later relief may cover it.
+    The recess extends from x0 to x1 along the wall, and begins at the height
+    z0. It must lie where the wall has depth 0, and no later relief may cover
+    it.
     """
 
     x0: float
@@ -127,7 +128,7 @@ class WallCells:
                 different groups.
             bands: strips along the whole wall, each with its depth.
             reliefs: rectangles and arches on the wall, each with its depth;
-                later ones cover earlier ones.
+                later reliefs cover earlier reliefs.
 
         Raises:
             ValueError: a relief extends beyond the wall, or an arch lies on
@@ -195,8 +196,8 @@ def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
 def breaks(end: float, values: Sequence[float]) -> list[float]:
     """Returns the boundaries of a wall's cells along one axis, sorted [m].
 
-    They are 0, `end`, and those of the given `values` that lie between 0 and
-    `end`, each only once and rounded to millimetres.
+    The boundaries are 0, `end`, and all `values` between 0 and `end`, each only
+    once and rounded to millimetres.
     """
     inner = {round(float(v), 3) for v in values}
     return [0.0, *sorted(v for v in inner if 1e-4 < v < end - 1e-4), end]
@@ -353,8 +354,8 @@ class Facade:
 
     Attributes:
         height: height of the walls [m].
-        bands: strips around the building; a later one covers an earlier one.
-            The rest of the wall has depth 0.
+        bands: strips around the building; a later strip covers an earlier
+            strip. All other parts of the wall have depth 0.
         layout: function that takes the number and the length [m] of an edge,
             and returns the reliefs of its wall. A later relief covers an
             earlier one.
@@ -436,9 +437,10 @@ def single_wall(
     Args:
         length: length of the wall [m].
         height: height of the wall [m].
-        reliefs: reliefs, of which later ones cover earlier ones. They must not
+        reliefs: reliefs; later reliefs cover earlier reliefs. Reliefs must not
             touch the ends of the wall.
-        fronts: for each mesh of panes, the depths of its reliefs [m].
+        fronts: for each mesh of panes, the depths of the reliefs with these
+            panes [m].
 
     Raises:
         ValueError: a relief extends beyond the wall.

@@ -25,8 +25,8 @@ class Openings:
     """Collects the windows and doors of one wing, and builds its walls.
 
     The constructor takes the building under assembly, the wing, and all wings
-    of the house, which can hide parts of its walls. The edges of a wing are
-    numbered: 0 front, 1 right, 2 back, 3 left.
+    of the house, because other wings can hide parts of the wing's walls. The
+    edges of a wing are numbered: 0 front, 1 right, 2 back, 3 left.
     """
 
     def __init__(
@@ -191,7 +191,7 @@ class Openings:
             pitch: approximate distance from one window to the next [m].
             width: width of a window [m].
             margin: least distance of windows from corners [m].
-            head: height of the top of a window above its floor [m].
+            head: height of the top of a window above the storey's floor [m].
         """
         for k in range(count):
             z = floor + k * storey
@@ -215,7 +215,7 @@ class Openings:
         Args:
             edge: number of the wall.
             x: middle of the door along the wall [m].
-            floor: height of its threshold [m].
+            floor: height of the threshold [m].
             width: width of the door [m].
             height: height of the door [m].
             lights: width of the window on each side; 0 for none [m].
@@ -296,7 +296,7 @@ class Openings:
         Args:
             edge: number of the wall.
             start: where the shops begin along the wall [m].
-            end: where they end along the wall [m].
+            end: where the shops end along the wall [m].
             height: height of the ground floor [m].
             width: approximate width of a shop [m].
             awnings: share of the shops that have an awning.
@@ -332,7 +332,7 @@ class Openings:
 def sash(
     width: float, z: float, sill: float, head: float, bars: int = 0
 ) -> bays.Bay:
-    """Returns a bay with a window, given by heights above its floor.
+    """Returns a bay with a window, given by heights above a floor.
 
     The glass is 0.12 m behind the wall.
 

@@ -30,8 +30,8 @@ class Roof:
         thickness: vertical thickness of the roof [m].
         ridge: place of a gable roof's ridge, as a share of the span.
         parapet: height of a flat roof's parapet [m].
-        falling: whether a shed roof falls to the back (to the right if
-            `along_y`) instead of rising.
+        falling: whether a shed roof falls to the back instead of rising to the
+            back; with `along_y`, to the right.
     """
 
     kind: str = "gable"
@@ -172,7 +172,8 @@ def free_stretches(
 ) -> list[tuple[float, float]]:
     """Returns the stretches of a wing's wall that no other wing hides [m].
 
-    Each stretch is a pair: start and end along the wall. A blind wall has none.
+    Each stretch is a pair: start and end along the wall. A blind wall has no
+    such stretch.
 
     Args:
         wing: the wing.

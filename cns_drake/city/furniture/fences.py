@@ -20,11 +20,12 @@ class RunKind:
     Attributes:
         panel: length of a panel [m].
         height: usual height [m].
-        colours: the colours, of which each fence has one.
-        end_post: post after the last panel: its size in x, its least y, its
-            greatest y, and its height [m]; None for no post.
+        colours: colours; each fence has one of these colours.
+        end_post: post after the last panel: size in x, least y, greatest y, and
+            height [m]; None for no post.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        material: name of the material; by default the usual one of the class.
+        material: name of the material; by default the usual material of the
+            class.
     """
 
     panel: float
@@ -57,7 +58,7 @@ def run(
         name: kind of fence, a key of `RUN_KINDS`.
         rng: random generator for the colour.
         length: length along x [m]; the panels are stretched to fit.
-        height: height [m]; by default the usual one of this kind.
+        height: height [m]; by default the usual height of this kind.
 
     Raises:
         ValueError: the length or the height is not positive.

@@ -121,7 +121,7 @@ def tower_crane(
     height: float | None = None,
     reach: float | None = None,
 ) -> Model:
-    """Returns a tower crane; its mast and jib are made of whole sections.
+    """Returns a tower crane, whose mast and jib consist of whole sections.
 
     Args:
         rng: random generator for sizes and heading.

@@ -32,7 +32,7 @@ def _signal(name: str, lamps: int, x: float, y: float, z: float) -> Part:
 def traffic_light(
     rng: np.random.Generator, *, arm: float | None = None
 ) -> Model:
-    """Returns traffic lights on a mast and on its arm along +x.
+    """Returns traffic lights on a mast, and on an arm along +x.
 
     Args:
         rng: random generator for the length of the arm.

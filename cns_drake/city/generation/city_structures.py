@@ -69,7 +69,7 @@ class Streets(NamedTuple):
         furnish: function that places the objects of the streets. It is called
             after the buildings are placed and before all other objects.
         park: function that parks cars in the streets. It is called last.
-        kerbs: height of the kerb by place; None if it is `kerb_height`
+        kerbs: height of the kerb by place; None if the height is `kerb_height`
             everywhere.
     """
 
@@ -89,7 +89,7 @@ def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
     """Returns all meshes of structures, as a mapping from name to mesh.
 
     Raises:
-        ValueError: if two different meshes have the same name, or one has no
+        ValueError: if two different meshes have the same name, or a mesh has no
             faces.
     """
     meshes: dict[str, Mesh] = {}
@@ -131,8 +131,8 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     `source` is the file of the plan, named in error messages.
 
     Raises:
-        InputError: if the plan names something unknown, or something in it has
-            no room.
+        InputError: if the plan names something unknown, or something in the
+            plan has no room.
     """
     streets = Streets(
         network.areas,
@@ -157,8 +157,8 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
         source: file of the plan, named in error messages.
 
     Raises:
-        InputError: if the plan names something unknown, or something in it has
-            no room.
+        InputError: if the plan names something unknown, or something in the
+            plan has no room.
     """
     _check_names(plan, source)
     draft = Draft(streets.areas, streets.kerb_height, plan, source)

@@ -49,10 +49,10 @@ class Renaming(NamedTuple):
     """How the names in `stages.yaml` must change after a change of the city.
 
     Attributes:
-        renamed: old name -> new name of each structure that is still at the
-            same place, but has another name now.
+        renamed: old name -> new name, for each structure that is still at the
+            same place but has another name now.
         lost: names of structures that no longer exist at their place, even if
-            another structure has the name now.
+            another structure now has this name.
         unclear: patterns that match different structures than before.
     """
 
@@ -77,8 +77,8 @@ def find_renaming(
 ) -> Renaming:
     """Returns how names in `stages.yaml` must change for the current city.
 
-    A structure of the earlier city and one of the current city count as the
-    same structure if they are of one kind and at the same place.
+    A structure of the earlier city and a structure of the current city count as
+    the same structure if both are of the same kind and at the same place.
 
     Args:
         stages: the file `stages.yaml`.
@@ -353,7 +353,7 @@ def count_triangles(
 ) -> int:
     """Returns the number of triangles of shapes as LiDARs see them.
 
-    Cylinders and spheres have none.
+    Cylinders and spheres have no triangles.
 
     Args:
         shapes: the shapes.
@@ -387,8 +387,8 @@ def structure_table(
 
     The columns are instance id (from 1), name, class, label (number of the
     class), position in W [m], yaw [rad], tags, and the materials of the parts
-    (see `cns_drake.scene.materials`). If there are structures whose name does
-    not say their kind, the last column is `kind`.
+    (see `cns_drake.scene.materials`). If the name of a structure does not state
+    its kind, the table has a last column `kind`.
 
     Args:
         structures: the structures.
@@ -432,7 +432,7 @@ def render_city(
     """Returns the text of every generated file of a city, by relative path.
 
     Args:
-        world: folder of the map; relative paths start at it.
+        world: folder of the map, at which relative paths start.
         city: the city.
         progress: is called with a line of text after each step.
         stages_text: new content of `stages.yaml`; by default the file is read.
@@ -473,8 +473,8 @@ def render_stages(
         origin: comment for readers of the files about the origin of the city.
 
     Returns:
-        Relative path -> text of the file; and name of a stage -> numbers of its
-        structures and of its triangles.
+        Relative path -> text of the file; and name of a stage -> numbers of
+        structures and of triangles in the stage.
 
     Raises:
         InputError: if a structure cannot be lower, or cannot be under

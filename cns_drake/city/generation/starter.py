@@ -161,10 +161,10 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City, missing: float = _MISSING) -> dict:
-    """Returns two stages, of which the first lacks the east of the city.
+    """Returns two stages; the first stage lacks the east of the city.
 
-    The first stage lacks buildings and trees there. The result has the fields
-    of `cns_drake.city.plan.stages.Stages`.
+    The first stage lacks buildings and trees in the east. The result has the
+    fields of `cns_drake.city.plan.stages.Stages`.
 
     Args:
         city: the whole city.

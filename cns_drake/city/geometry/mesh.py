@@ -77,7 +77,7 @@ class Mesh:
         return Mesh(self.vertices, tuple(face[::-1] for face in self.faces))
 
     def to_obj(self) -> str:
-        """Returns the mesh as OBJ text, its coordinates rounded to millimetres.
+        """Returns the mesh as OBJ text, with coordinates rounded to 1 mm.
 
         Vertices that coincide after rounding are merged, and faces that
         collapse are dropped. The same mesh always gives the same text.

@@ -29,7 +29,7 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Returns whether an area in W keeps clear of all occupied ground.
+        """Returns whether an area in W is clear of all occupied ground.
 
         Args:
             geometry: the area.

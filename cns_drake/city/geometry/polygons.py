@@ -51,8 +51,8 @@ def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
 def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
     """Returns the polygons of a geometry, except slivers, in fixed order.
 
-    They are sorted by the lower left corners of their bounding boxes, so that
-    the order does not depend on how the geometry was made.
+    The polygons are sorted by the lower left corners of their bounding boxes,
+    so that the order does not depend on how the geometry was made.
     """
     parts = [
         part

@@ -56,13 +56,13 @@ Shape = MeshShape | BoxShape | CylinderShape | SphereShape
 
 
 class Finish(NamedTuple):
-    """The finish of a surface: its colour, and what it is made of.
+    """The finish of a surface: its colour and its material.
 
     Attributes:
-        rgb: colour; None for that of the structure's semantic class.
+        rgb: colour; None for the colour of the structure's semantic class.
         material: name of the material, a key of
-            `cns_drake.scene.materials.MATERIALS`; None for the usual one of the
-            structure's semantic class.
+            `cns_drake.scene.materials.MATERIALS`; None for the usual material
+            of the structure's semantic class.
     """
 
     rgb: tuple[float, float, float] | None
@@ -75,7 +75,7 @@ class Finish(NamedTuple):
         For example `[0.8, 0.7, 0.6]`, or `{brick: [0.5, 0.3, 0.2]}`.
 
         Raises:
-            ValueError: it is neither, or there is no such material.
+            ValueError: the value is neither, or there is no such material.
         """
         rgb, material = value, None
         if isinstance(value, dict) and len(value) == 1:
@@ -147,8 +147,8 @@ class Structure:
         yaw: heading of S in W [rad].
         tags: words that describe the structure, such as the name of its
             district.
-        kind: what the structure is, such as `row_house` or `bench`; by default,
-            what its name begins with.
+        kind: what the structure is, such as `row_house` or `bench`; by default
+            the kind with which the name begins.
     """
 
     name: str
@@ -182,8 +182,8 @@ class Structure:
     def with_origin(self, xyz: tuple[float, float, float]) -> "Structure":
         """Returns the same structure with the origin of S elsewhere in W.
 
-        `xyz` is the new origin [m]. Only poses change: the structure stays
-        where it is.
+        `xyz` is the new origin [m]. Only poses in S and the pose of S change:
+        the structure stays where it is.
         """
         p_WW = np.subtract(xyz, self.xyz)
         p_SS = rotation((0.0, 0.0, -self.yaw)) @ p_WW
@@ -414,9 +414,9 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
 def assemble(*parts: Part) -> Model:
     """Returns a model of the given parts.
 
-    Their meshes are read from the folder `object_meshes`. The footprint is the
-    convex hull of everything below 2.4 m (`HEADROOM`), so that crowns and signs
-    above it leave the ground free.
+    The meshes of the parts are read from the folder `object_meshes`. The
+    footprint is the convex hull of everything below 2.4 m (`HEADROOM`), so that
+    crowns and signs above this height leave the ground free.
     """
     shapes = [part.shape for part in parts]
     names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
@@ -456,7 +456,8 @@ def ground_footprint(
 def ground_triangles(structures: Iterable[Structure]) -> np.ndarray:
     """Returns the triangles (M, 3, 3) of structures, in W [m].
 
-    The meshes of the structures must be given in W, as those of the ground are.
+    The meshes of the structures must be given in W, as the meshes of the ground
+    are.
     """
     meshes = [m for one in structures for m in one.model.meshes.values()]
     found = [mesh.vertices[mesh.triangles()] for mesh in meshes]
@@ -479,7 +480,7 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     """Returns the mesh of a part, in the structure's frame S [m].
 
     Cylinders and spheres become slightly larger prisms. `meshes` maps names to
-    meshes, and contains the mesh to which the part refers, if any.
+    meshes. If the part refers to a mesh, `meshes` contains this mesh.
     """
     shape = part.shape
     scale = np.ones(3)

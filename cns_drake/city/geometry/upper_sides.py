@@ -63,7 +63,7 @@ class UpperSides:
     """The upper sides of solids, and their height at any place.
 
     The constructor takes the triangles (M, 3, 3) of all surfaces [m], and keeps
-    those that face upwards.
+    the triangles that face upwards.
     """
 
     def __init__(self, triangles: np.ndarray):

@@ -19,8 +19,8 @@ class District(NamedTuple):
     Attributes:
         plan: the entry of the district in the plan.
         area: ground of the district.
-        grounds: kind of ground, such as `lawn` -> its area. Together, these
-            areas make up `area`.
+        grounds: kind of ground, such as `lawn` -> area of this kind. Together,
+            these areas make up `area`.
         terraces: patches that are level.
     """
 

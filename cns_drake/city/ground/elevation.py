@@ -1,7 +1,8 @@
 """The height of the finished ground: level, or between sloping streets.
 
-Between streets at different heights the ground is a smooth field that meets
-every sidewalk at its height. Buildings and terraces stand on level pads in it.
+Between streets at different heights, the ground is a smooth field that meets
+every sidewalk at the height of the sidewalk. Buildings and terraces stand on
+level pads in this field.
 """
 
 from collections.abc import Iterable, Sequence
@@ -65,9 +66,9 @@ class SlopingGround:
     city, the field has no slope perpendicular to the edge.
 
     Next to a street or pad, up to a distance R, the ground changes gradually
-    from the height of the street or pad to that of the field (Shepard's
+    from the height of the street or pad to the height of the field (Shepard's
     interpolation). At the distance d, the height of the street or pad has the
-    weight 1/d - 1/R, and that of the field 1/R.
+    weight 1/d - 1/R, and the height of the field has the weight 1/R.
     """
 
     is_level = False
@@ -88,8 +89,8 @@ class SlopingGround:
                 or by place.
             streets: area of carriageways, sidewalks and medians in W [m].
             bounds: x0, y0, x1, y1 of the city in W [m].
-            pads: level areas outside the streets. Where two of them meet, the
-                first one takes precedence.
+            pads: level areas outside the streets. Where two pads meet, the
+                first pad takes precedence.
         """
         self.pads = tuple(pads)
         self._surface = surface
@@ -203,8 +204,8 @@ def make_ground(
             function that returns the heights (N,) at places (N, 2).
         streets: area of carriageways, sidewalks and medians in W [m].
         bounds: x0, y0, x1, y1 of the city in W [m].
-        pads: level areas outside the streets. Where two of them meet, the first
-            one takes precedence.
+        pads: level areas outside the streets. Where two pads meet, the first
+            pad takes precedence.
     """
     if callable(kerb_height):
         return SlopingGround(surface, kerb_height, streets, bounds, pads)
@@ -233,8 +234,8 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
 def relaxed(z: np.ndarray) -> np.ndarray:
     """Fills the gaps (NaN) in a grid of heights [m] smoothly.
 
-    The height of every gap is the mean of its two to four neighbours, as in a
-    harmonic field. At least one height must be given.
+    The height of every gap is the mean height of its two to four neighbours, as
+    in a harmonic field. At least one height must be given.
     """
     rows, columns = z.shape
     free = np.isnan(z)

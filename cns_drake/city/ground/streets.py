@@ -62,7 +62,7 @@ class Covering(NamedTuple):
     """A kind of ground, such as parking bays, and the area that it covers.
 
     Attributes:
-        name: name of its structure.
+        name: name of the structure of this ground.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         area: the area in W [m].
         rgb: colour.
@@ -83,7 +83,7 @@ class Covering(NamedTuple):
     def surface(
         self, height: HeightMap | float, spacing: float = 0.0
     ) -> Structure:
-        """Returns the surface of the ground as a structure, one part per tile.
+        """Returns the surface as a structure with one part per tile.
 
         `height` is one height or a height map [m]. To follow a height map, give
         the distance between vertices as `spacing` [m]; with 0, the surface has

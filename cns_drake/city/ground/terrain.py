@@ -46,7 +46,7 @@ _WAVELENGTHS = (22.0, 60.0)
 class GroundShape:
     """The height of a city's finished ground, at any x and y in W [m].
 
-    It is the height of `base`, plus the swells on the lawns of districts.
+    The height is that of `base`, plus the swells on the lawns of districts.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Makes earlier, lower versions of a building, without its upper storeys.
+"""Makes earlier versions of a building, which lack its upper storeys.
 
 The part below the new height stays unchanged, to the millimetre, so that the
 street front looks the same. The building gets a new roof.
@@ -97,7 +97,7 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 def top_of(model: Model) -> float:
     """Returns the height of a building's top, without roof equipment [m].
 
-    The height is -inf if the model contains no other part than roof equipment.
+    The height is -inf if the model contains only roof equipment.
     """
     return max(
         (

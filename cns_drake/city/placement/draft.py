@@ -33,7 +33,7 @@ _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 def name_stem(object_name: str) -> str:
     """Returns the everyday word for an object, with which its name begins.
 
-    For example, it is `tree` for `lime_tree`. `object_name` is a key of
+    For example, the word for `lime_tree` is `tree`. `object_name` is a key of
     `cns_drake.city.placement.objects.OBJECTS`.
     """
     if object_name in SPECIES:
@@ -110,9 +110,9 @@ class Draft:
     def open_range(self) -> None:
         """Makes the numbers in new names begin after the next multiple of 50.
 
-        Call it before each task, such as placing a row of trees. If a task
-        places a few structures more or fewer, the names of structures in later
-        tasks, to which `stages.yaml` refers, stay the same.
+        Call this function before each task, such as placing a row of trees. If
+        a task places a few structures more or fewer, the names of structures in
+        later tasks, to which `stages.yaml` refers, stay the same.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE
@@ -132,8 +132,8 @@ class Draft:
 
         Args:
             area: the area.
-            clearance: least distance from occupied ground [m]; it does not
-                apply to lanes.
+            clearance: least distance from occupied ground [m]; this distance
+                does not apply to lanes.
             ignore: an occupied area that may be closer than `clearance`, but
                 must not be overlapped.
         """

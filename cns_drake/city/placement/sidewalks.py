@@ -139,8 +139,8 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
 def plant_medians(draft: Draft) -> None:
     """Places trees on the medians of roads.
 
-    Their kinds and spacing are those of the plan's field `medians` or, without
-    it, of its field `street`.
+    Kinds and spacing of these trees come from the plan's field `medians` or,
+    without `medians`, from the plan's field `street`.
     """
     plan = draft.plan.medians or draft.plan.street
     if not plan.trees:

@@ -220,7 +220,7 @@ class ObjectPlan(_Model):
 
     Attributes:
         object: name of the object to place.
-        at: `[x, y]` of its position [m].
+        at: `[x, y]` of the object's position [m].
         yaw_deg: heading of the object [deg].
         kind: first part of the object's name in the tables; by default the
             object's name or a common word, such as `tree` for `lime_tree`.

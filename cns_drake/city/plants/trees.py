@@ -22,12 +22,12 @@ class Species:
     """A species of tree.
 
     Attributes:
-        variants: number of its shapes, each with meshes of its own.
+        variants: number of shapes, each with meshes of its own.
         height_range: least and greatest height of a tree [m].
         leaf_rgb: colour of the leaves.
         bark_rgb: colour of the wood.
-        street: whether it can stand on a sidewalk: people can walk under its
-            crown, which begins at 2.5 m or higher.
+        street: whether trees of this species can stand on a sidewalk: people
+            can walk under the crown, which begins at 2.5 m or higher.
     """
 
     variants: int
