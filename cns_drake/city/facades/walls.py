@@ -358,7 +358,7 @@ class Facade:
             strip. All other parts of the wall have depth 0.
         layout: function that takes the number and the length [m] of an edge,
             and returns the reliefs of its wall. A later relief covers an
-            earlier one.
+            earlier relief.
         glass: depths of reliefs whose fronts are glass [m]. `facade_mesh`
             leaves these fronts open, and `glass_mesh` returns their panes.
         plain: numbers of the edges whose walls have no relief, such as walls

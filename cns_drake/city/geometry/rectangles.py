@@ -12,10 +12,10 @@ _MOST_LINES = 12
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     """Returns a large axis-aligned rectangle that lies within a footprint.
 
-    The sides of the rectangle pass through corners of the footprint. It is the
-    largest such rectangle, unless the footprint has so many corners that only
-    some are tried. If no such rectangle lies within the footprint, the result
-    is tiny.
+    The sides of the rectangle pass through corners of the footprint. The result
+    is the largest such rectangle, unless the footprint has so many corners that
+    only some corners are tried. If no such rectangle lies within the footprint,
+    the result is tiny.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
     xs, ys = (_evenly_chosen(np.unique(np.round(c, 3))) for c in corners.T)

@@ -28,8 +28,8 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
 
     Args:
         model: the finished building.
-        height: height of the frame [m]. It is reduced to the greatest height
-            of the archetype `unfinished_tower`, or raised to its least.
+        height: height of the frame [m], which is limited to the range of
+            heights of the archetype `unfinished_tower`.
         name: name of the building.
         seed: seed of the random parameters.
 
