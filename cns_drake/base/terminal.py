@@ -60,8 +60,8 @@ def make_program(
 ) -> typer.Typer:
     """Returns an empty command-line program, to which commands are added.
 
-    The program has the options `--version` and those for shell completion. It
-    shows its help when called without arguments.
+    The program has the option `--version` and the options for shell completion.
+    The program shows its help when called without arguments.
 
     Args:
         name: name of the program, as it is typed.
@@ -70,7 +70,7 @@ def make_program(
         renamed: name of a former command -> the command that replaces it, such
             as `simulate`, or `cns-eval pr --scores` if the command belongs to
             another program. Calling a former command is an error whose message
-            names the new one.
+            names the new command.
         groups: heading -> commands that the help lists under it; by default
             there is a single heading for all commands.
     """

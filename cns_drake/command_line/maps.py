@@ -395,8 +395,9 @@ def maps_and_years(
 ) -> tuple[list[str], tuple[int, ...]]:
     """Separates the maps from the years in a command such as `a b --years 5 9`.
 
-    The parser takes only the first year after --years as the option's value. It
-    appends all further years to the arguments, after the names of the maps.
+    The parser takes only the first year after --years as the option's value.
+    The parser appends all further years to the arguments, after the names of
+    the maps.
 
     Args:
         words: the arguments of the command: names of maps, then the further

@@ -49,9 +49,10 @@ class Layout:
             path in the folder -> text. Scans are not included.
         outer_files: function that returns the text files outside this folder:
             path -> text.
-        scan_files: function of the drive, a frame number, its time [ns] and its
-            scan. It returns the files of the scan: path in the drive's folder
-            -> content. None for formats without scans.
+        scan_files: function of the drive, a frame number, and the time [ns] and
+            the scan of this frame. The function returns the files of the scan:
+            path in the drive's folder -> content. None for formats without
+            scans.
         shared_outer_files: whether the outer files belong to all drives
             together, and must therefore be the same for all drives.
         has_labels: whether points have labels.

@@ -257,7 +257,7 @@ class CityObject(NamedTuple):
         kind: type of the object, such as BuildingPart.
         attributes: attributes, as in the file.
         parents: ids of the objects of which this object is a part.
-        geometries: geometries, except those that cannot be read.
+        geometries: geometries, except geometries that cannot be read.
     """
 
     name: str

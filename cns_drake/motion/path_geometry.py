@@ -68,8 +68,8 @@ class SplineDerivatives:
 
         The list contains the values, the first derivatives, the second
         derivatives, and so on. Each entry has the shape (N, D) for a spline of
-        D dimensions. At parameters beyond an end of the spline, the results are
-        those at this end.
+        D dimensions. Parameters beyond an end of the spline give the results at
+        this end.
         """
         parameter = np.clip(parameter, 0.0, self.end)
         return [spline.vector_values(parameter).T for spline in self._splines]

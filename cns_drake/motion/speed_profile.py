@@ -49,7 +49,7 @@ def find_speed_profile(
 ) -> SpeedProfile:
     """Returns the fastest drive along a path that respects all limits.
 
-    The drive starts and ends at rest. Its acceleration is piecewise constant.
+    The drive starts and ends at rest. The acceleration is piecewise constant.
 
     Args:
         path: the path.

@@ -60,8 +60,9 @@ class WheelMotion:
 
     While the body moves on its springs, the wheel stays on the road's surface
     in the world: relative to the body, it moves up by as much as the body moves
-    down at the wheel. This is exact for small angles, and within a millimetre
-    for 3 degrees. Steering and rolling do not depend on the motion on springs.
+    down at the wheel. The error of this relation vanishes for small angles, and
+    is within a millimetre at 3 degrees. Steering and rolling do not depend on
+    the motion on springs.
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
@@ -110,8 +111,8 @@ class WheelMotion:
     def travel(self, moments: Moments) -> JointMotion:
         """Returns the suspension travel of the wheel at N times [m].
 
-        This is the upward motion of the wheel relative to the body. It is zero
-        for a vehicle without springs.
+        This is the upward motion of the wheel relative to the body. The travel
+        is zero for a vehicle without springs.
         """
         ride = moments.ride
         if ride is None:

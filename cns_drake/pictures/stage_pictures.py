@@ -22,8 +22,8 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     """Draws stages side by side as a camera sees them.
 
     Under the picture of each stage is a picture of a scan. The LiDAR stands on
-    the ground below the camera. Its points are drawn as seen from the camera,
-    coloured by distance.
+    the ground below the camera. The points of the scan are drawn as seen from
+    the camera, coloured by distance.
 
     Args:
         stages: title -> SDF file of each stage, from left to right.

@@ -50,10 +50,10 @@ class RecordedMessage(NamedTuple):
 class BagWriter:
     """A context manager that writes one recording as a rosbag2 folder.
 
-    Leaving the context normally completes the recording. Leaving it by an
-    exception closes the file as a shorter but valid MCAP file under its `.part`
-    name. The same calls always produce the same bytes, even if a run was
-    interrupted and another run continued the recording.
+    Leaving the context normally completes the recording. Leaving the context by
+    an exception closes the file as an incomplete but valid MCAP file under its
+    `.part` name. The same calls always produce the same bytes, even if a run
+    was interrupted and another run continued the recording.
 
     Example:
         from cns_drake import BagWriter, recording_topics

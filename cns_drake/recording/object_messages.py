@@ -61,8 +61,8 @@ class RecordedObjects(NamedTuple):
 class BoxMessages:
     """Makes messages that contain the boxes of all objects at one time.
 
-    This is much faster than making each message from its fields, as long as the
-    objects stay the same.
+    While the objects stay the same, this class is much faster than making each
+    message from its fields.
     """
 
     # A message is made only once for each set of objects, with placeholders for
@@ -168,8 +168,8 @@ def marked_detections(
 def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
     """Returns a SceneUpdate message with the boxes of N objects.
 
-    The message deletes all boxes that were sent before. Its time stamps are a
-    placeholder. The boxes are in the map frame W.
+    The message deletes all boxes that were sent before. The time stamps of the
+    message are placeholders. The boxes are in the map frame W.
 
     Args:
         who: instance id and class of each object.

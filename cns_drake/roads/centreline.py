@@ -134,10 +134,11 @@ def blend(
 ) -> np.ndarray:
     """Returns a smooth curve (N, 2) from one directed point to another [m].
 
-    Both points are included. If the line straight ahead of the start meets the
-    line behind the end, the curve consists of these two lines and the widest
-    allowed arc that touches both lines, as a driver turns. Otherwise (parallel
-    lanes that are offset, S-bends) the curve is a cubic Hermite curve.
+    The curve includes both points. If the line straight ahead of the start
+    meets the line behind the end, the curve consists of these two lines and the
+    widest allowed arc that touches both lines, as a driver turns. Otherwise
+    (parallel lanes that are offset, S-bends) the curve is a cubic Hermite
+    curve.
 
     Args:
         p_start, p_end: the points [m]. heading_start, heading_end: directions

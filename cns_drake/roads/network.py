@@ -155,7 +155,7 @@ class RoadNetwork:
         A left turn leads from the innermost lane to the innermost lane, and a
         right turn from the outermost lane to the outermost lane. A path
         straight on leads to the lane with the same number, counted from the
-        middle of the road. Between one-way roads, such as those of a
+        middle of the road. Between one-way roads, such as the roads of a
         roundabout, every path leads to the lane with the same number, counted
         from the kerb on the right.
         """

@@ -47,9 +47,9 @@ def loop_corners(
     """Returns the corners of a line along which a car turns round to the left.
 
     If all corners are rounded with the same radius, the path is smooth. The car
-    first swings out to the right of the line on which it arrives. It then turns
-    left around the centre, by more than 90 degrees. At the end, it comes from
-    the right of the line on which it leaves, and joins that line.
+    first swings out to the right of the line on which it arrives. The car then
+    turns left around the centre, by more than 90 degrees. Finally, the car
+    comes from the right of the line on which it leaves, and joins this line.
 
     Args:
         centre: (2,) centre of the loop [m].

@@ -47,7 +47,7 @@ class Losses(Section):
             its structures to remove, such as `{pole: 0.3}`. The key `seed`
             replaces the seed of the condition, so that the two drives can lack
             different structures.
-        towards: another stage of the map, usually an earlier one. Only
+        towards: another stage of the map, usually an earlier stage. Only
             structures that do not exist in that stage are removed. A structure
             that exists in that stage does not change, even if it has another
             height there.

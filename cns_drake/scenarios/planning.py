@@ -224,9 +224,9 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
     """Returns the other stage that a drive's web page shows for comparison.
 
-    This is the map's last stage or, for a drive in the last stage, the first
-    stage. If the drive leaves out structures (`without`), it is the drive's own
-    stage with these structures.
+    The other stage is the map's last stage or, for a drive in the last stage,
+    the first stage. If the drive leaves out structures (`without`), the other
+    stage is the drive's own stage with these structures.
 
     Returns:
         The scenario in the other stage, and the stage's name for the page; None

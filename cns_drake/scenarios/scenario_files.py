@@ -178,8 +178,8 @@ def find_files(values: dict, path: Path) -> None:
 def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that all files that a scenario names exist.
 
-    These are its map, stage, world, waypoints, IMU file and SUMO trace. With
-    traffic, the map must have roads or lanes.
+    The files are the map, stage, world, waypoints, IMU file and SUMO trace.
+    With traffic, the map must have roads or lanes.
 
     Args:
         scenario: the scenario.

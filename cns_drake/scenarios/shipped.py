@@ -109,9 +109,9 @@ def recordable_drives() -> dict[str, Path]:
 def unpacked(archive: Path) -> Path:
     """Returns a folder with the files of an archive, unpacked only once.
 
-    The folder is in the user's cache. Its name contains a digest of the
-    archive, so that each release has a folder of its own. Several processes may
-    call the function at the same time.
+    The folder is in the user's cache. The folder's name contains a digest of
+    the archive, so that each release has a folder of its own. Several processes
+    may call the function at the same time.
 
     Args:
         archive: a tar file, compressed by any method.

@@ -30,8 +30,8 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Returns the boundary surface of a volume mesh in a VTK file.
 
     Returns:
-        Vertices (N, 3), float64 [m], including inner ones, and triangles (M,
-        3), int32.
+        Vertices (N, 3), float64 [m], including inner vertices, and triangles
+        (M, 3), int32.
 
     Raises:
         RuntimeError: Drake cannot read the file.

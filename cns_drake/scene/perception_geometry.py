@@ -367,11 +367,11 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
 def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
     """Returns an output port whose value is a `GeometryList` of a role.
 
-    The value is a function of the Context. It is computed anew only after
-    geometry has been added, removed, replaced, reshaped, or given another role.
-    A new pose of a frame does not count. Drake's own `geometry_version` cannot
-    replace this port, because some changes of perception geometry do not change
-    `geometry_version`.
+    The value is a function of the Context. The value is computed anew only
+    after geometry has been added, removed, replaced, reshaped, or given another
+    role. A new pose of a frame does not count. Drake's own `geometry_version`
+    cannot replace this port, because some changes of perception geometry do not
+    change `geometry_version`.
 
     The first call with a role adds the port to the SceneGraph, and must come
     before a Diagram is built from this SceneGraph.

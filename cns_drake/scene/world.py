@@ -175,7 +175,7 @@ class World:
     Attributes:
         scene_graph: the SceneGraph with the geometry of the models; add it to a
             DiagramBuilder.
-        plant: the plant with the bodies and frames of the models. It is
+        plant: the plant with the bodies and frames of the models. The plant is
             finalized, and not meant to be part of a Diagram.
         vehicle: model instance of the vehicle; None without one.
         structures: class and instance id of every structure in the world,

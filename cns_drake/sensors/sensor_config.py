@@ -133,8 +133,8 @@ def check_rate(
 ) -> None:
     """Checks that a sensor can have a rate [Hz].
 
-    Time stamps are whole nanoseconds, so the rate must divide a billion. It
-    must also be at least `lowest` and a multiple of `multiple_of`. Error
+    Time stamps are whole nanoseconds, so the rate must divide a billion. The
+    rate must also be at least `lowest` and a multiple of `multiple_of`. Error
     messages call the field `name`.
 
     Raises:

@@ -103,7 +103,7 @@ def make_film(
     start: float | None = None,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> int:
-    """Films a drive, and what its LiDARs measure, in all stages of its city.
+    """Films a drive and its LiDAR points in all stages of the city.
 
     The film shows the same stretch of the drive once in each stage, as seen
     from behind the car, and then once more in each stage, as seen from above.

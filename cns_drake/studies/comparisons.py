@@ -228,10 +228,10 @@ class PairMaker:
             its LiDAR at another viewpoint.
         source: file of the experiment, for errors.
         age: function of a drive, a number of years, the rates of change and a
-            seed. It returns the folder and the stage of the drive's map, aged
-            by these years.
-        redraw: function of a drive and a seed. It returns the folder and the
-            stage of a map with another city along the same streets.
+            seed. The function returns the folder and the stage of the drive's
+            map, aged by these years.
+        redraw: function of a drive and a seed. The function returns the folder
+            and the stage of a map with another city along the same streets.
         on_note: is called with a note on everything that is left out.
     """
 
@@ -953,7 +953,7 @@ def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
 def check_frozen(
     table: str, compared: Mapping[tuple[str, int], Sequence[str]]
 ) -> None:
-    """Checks that the drives of a comparison are those listed in a table.
+    """Checks that the drives of a comparison are listed in a table.
 
     Maps that are not in the table are not checked.
 

@@ -280,9 +280,9 @@ def label_points(
 ) -> np.ndarray:
     """Returns the exact label of each point of a drive's map, (N,) uint8.
 
-    The labels are values of `evaluation.map_update.labels.Label`. They state
-    whether the other drive observes the point and, if so, whether the world of
-    the other drive has a surface there.
+    The labels are values of `evaluation.map_update.labels.Label`. A label
+    states whether the other drive observes the point and, if so, whether the
+    world of the other drive has a surface there.
 
     Args:
         session: the drive whose map of N points is labelled.

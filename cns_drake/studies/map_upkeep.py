@@ -59,7 +59,7 @@ class UpkeptSource:
 def update_maps(
     reporter: Reporter, sources: tuple[DriveSource, ...], maintain: str
 ) -> Updates:
-    """Returns what each drive changes in the map of the drives before it.
+    """Returns the changes that each drive makes to the map of earlier drives.
 
     Args:
         reporter: unused.

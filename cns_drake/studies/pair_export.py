@@ -419,10 +419,11 @@ def evaluation_sets(
         runs: drives; each is a database and a set of queries.
 
     Returns:
-        The list of databases, and the list of queries. Both contain a
-        dictionary for each drive: number of a cloud -> its file, northing and
-        easting. In the second list, the entry of a cloud also contains, for
-        each other drive, the numbers of the clouds that match this cloud.
+        The list of databases, and the list of queries. Both lists contain a
+        dictionary for each drive: number of a cloud -> file, northing and
+        easting of the cloud. In the second list, the entry of a cloud also
+        contains, for each other drive, the numbers of the clouds that match
+        this cloud.
     """
     trees = [cKDTree(run.positions) for run in runs]
 

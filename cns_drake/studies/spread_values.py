@@ -17,8 +17,8 @@ def expand_spread(value: Any, *, whole: bool = False) -> Any:
     """Turns {from, to, count} into a list of evenly spaced numbers.
 
     Other values are returned unchanged. The numbers are rounded to four decimal
-    places. They have the type int if all of them are whole and both ends are
-    written as whole numbers.
+    places. The numbers have the type int if all numbers are whole and both ends
+    are written as whole numbers.
 
     Args:
         value: any value of a field.

@@ -98,8 +98,8 @@ class TrainingScans:
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
         overlaps: (N, N) share of each scan that is visible from the place of
-            each other scan. None if the distance determines which places are
-            right.
+            each other scan. None if distances, and not overlaps, determine
+            which places are right.
     """
 
     images: np.ndarray

@@ -277,7 +277,7 @@ def draw_streets(rng: np.random.Generator) -> dict[str, Any]:
     """Returns the content of a `roads.yaml` with random streets.
 
     Streets run along the lines of a bent grid with random spacings; the whole
-    grid has a random orientation. Some cross streets are missing, others are
+    grid has a random orientation. Some cross streets are missing, and some are
     bent.
     """
     columns, rows = rng.integers(3, 6), rng.integers(3, 5)

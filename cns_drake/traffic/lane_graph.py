@@ -133,8 +133,8 @@ class LaneGraph:
     """The lanes and paths through junctions of a map, and its crossings.
 
     Attributes:
-        pieces: parts of lanes and paths through junctions. Their numbers are
-            indices into this tuple.
+        pieces: parts of lanes and paths through junctions. The numbers of
+            pieces are indices into this tuple.
         crossings: places where pedestrians cross the lanes.
     """
 

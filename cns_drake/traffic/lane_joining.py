@@ -41,8 +41,8 @@ def join_lanes(
 ) -> LaneGraph:
     """Returns the lane graph of a map's lanes, cut into pieces for traffic.
 
-    The graph has no signals and no crossings. It is empty if all lanes lead to
-    dead ends.
+    The graph has no signals and no crossings. The graph is empty if all lanes
+    lead to dead ends.
 
     Args:
         lanes: the lanes, numbered from 0.

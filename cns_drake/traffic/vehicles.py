@@ -506,12 +506,12 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     """Returns where vehicle i must stop, and which vehicle it must follow.
 
     The i-th vehicle stops before any crossing that pedestrians use, whether the
-    crossing lies in a junction or not. It also stops where its path through a
-    junction meets the path of a vehicle that was permitted to enter earlier and
-    has not yet passed this place. If both vehicles come from the same lane, or
-    leave for the same lane, the i-th vehicle follows the earlier vehicle
-    instead. Vehicles wait only for vehicles that were permitted earlier, so no
-    vehicle waits forever.
+    crossing lies in a junction or not. The i-th vehicle also stops where its
+    path through a junction meets the path of a vehicle that was permitted to
+    enter earlier and has not yet passed this place. If both vehicles come from
+    the same lane, or leave for the same lane, the i-th vehicle follows the
+    earlier vehicle instead. Vehicles wait only for vehicles that were permitted
+    earlier, so no vehicle waits forever.
 
     Args:
         traffic: all vehicles and crossings.

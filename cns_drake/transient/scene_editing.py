@@ -58,7 +58,7 @@ class Look(NamedTuple):
 
 
 class SceneEditing:
-    """Removes structures from a loaded world, changes them and adds new ones.
+    """Removes, changes and adds structures in a loaded world.
 
     In all methods, `cause` is the field of the scenario's section `transient`
     that asks for the change, such as `snow`.
@@ -476,7 +476,8 @@ class Surroundings:
     ) -> Obstacles:
         """Returns the areas where new objects must not stand.
 
-        These are the area `kept_free` and the footprints of some structures.
+        The result contains the area `kept_free` and the footprints of some
+        structures.
 
         Args:
             ignored: classes whose structures are no obstacles; structures of

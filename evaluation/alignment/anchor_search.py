@@ -98,14 +98,14 @@ def optimise(
     The method is Gauss-Newton on SE(3) with sparse normal equations, as in
     Grisetti et al., "A tutorial on graph-based SLAM" (2010). Measurements
     (ties) that may be wrong are weighted by Cauchy's kernel, whose width
-    shrinks step by step to its final value (graduated non-convexity), so that a
-    poor start does not decide which measurements count as right.
+    shrinks step by step to its final value (graduated non-convexity), so that
+    poor initial poses do not decide which measurements count as right.
 
     Args:
         V: (N, 4, 4) poses from which the optimisation starts.
         all_ties: the measured relative poses, which together must determine
             every pose.
-        num_held: number of fixed poses; these are the last ones.
+        num_held: number of fixed poses, which are the last poses.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
     V = V.copy()

@@ -65,9 +65,9 @@ class KittiDrive(BinDrive):
     """A drive of KITTI odometry.
 
     The files contain poses X_C0C of camera C, relative to the pose at the first
-    scan. They are converted to poses of the LiDAR S, X_S0S = inverse(X_CS)
-    X_C0C X_CS; `calib.txt` contains X_CS under the name `Tr`. Without
-    `calib.txt`, the poses are taken as those of the LiDAR.
+    scan. These poses are converted to poses of the LiDAR S, X_S0S =
+    inverse(X_CS) X_C0C X_CS; `calib.txt` contains X_CS under the name `Tr`.
+    Without `calib.txt`, the poses are taken as those of the LiDAR.
 
     The world frame W is S0, the LiDAR's frame at the first scan, with z up.
     With a file `first_pose.txt`, which cns-drake exports, W is the world frame

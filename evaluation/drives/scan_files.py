@@ -214,7 +214,8 @@ def list_stamped(
 def first_there(candidates: Iterable[Path], notes: list[str]) -> Path | None:
     """Returns the first of several files or folders that exists, or None.
 
-    If others exist, too, that are not the same, a note is added to `notes`.
+    If other files or folders exist as well and differ from the first, a note is
+    added to `notes`.
     """
     there = [one for one in candidates if one.exists()]
     if not there:

@@ -32,11 +32,11 @@ _VECTORS = {
 def split_header(line: str, separator: str | None) -> list[str]:
     """Returns the words of a header, without units.
 
-    The result is empty unless most of them are known names of columns. White
-    space may separate them even if there is another separator.
+    The result is empty unless most of the words are known names of columns.
+    White space may separate the words even if there is another separator.
 
     Args:
-        line: the header, or a remark that may be one.
+        line: the header, or a remark that may be a header.
         separator: text between columns; None for white space.
     """
     text = _UNIT.sub("", line.lstrip("# "))
@@ -52,9 +52,9 @@ def find_columns(
 ) -> list[int] | None:
     """Returns the places of columns in a table that has a header.
 
-    Known are `time`, `x`, `y`, `z`, `qx` to `qz` and `qw` of a quaternion,
-    `roll`, `pitch`, `yaw`, `wx` to `wz` of an angular velocity, and `ax` to
-    `az` of a specific force, in the spelling of many programs.
+    The known columns are `time`, `x`, `y`, `z`, `qx` to `qz` and `qw` of a
+    quaternion, `roll`, `pitch`, `yaw`, `wx` to `wz` of an angular velocity, and
+    `ax` to `az` of a specific force, in the spelling of many programs.
 
     Args:
         words: words of the header, one for each column of the table.

@@ -46,7 +46,7 @@ def drifting_steps(
     """Returns the motion between poses as a drifting odometry measures it.
 
     The odometry has a relative error of lengths, and a drift of the heading
-    [deg/m]. Both are sampled anew every 100 m of path, from normal
+    [deg/m]. Error and drift are sampled anew every 100 m of path, from normal
     distributions of mean 0 and standard deviation `drift`.
 
     Args:

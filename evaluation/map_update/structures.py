@@ -62,7 +62,7 @@ def verdicts(
         instances: (N,) number of the structure of each point; 0 for none.
         labels: (N,) label of each point, see
             `evaluation.map_update.labels.Label`.
-        side: `A` if the map is the older one, `B` if it is the newer one.
+        side: `A` for the older map, `B` for the newer map.
 
     Returns:
         (S,) numbers of the S structures; (S, 3) how many points each structure

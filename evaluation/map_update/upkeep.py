@@ -92,10 +92,10 @@ class UpkeptMap:
         """Updates the map by the next drive.
 
         Args:
-            session: map of N points, scans and poses of the drive. Its scans
+            session: map of N points, scans and poses of the drive. The scans
                 are moved to the folder of the map.
-            stands: (N,) bool, points that may join the map. The others are on
-                moving objects.
+            stands: (N,) bool, points that may be added to the map. All other
+                points are on moving objects.
             detect: compares the map with the drive; not called for the first
                 drive, which has no map to compare with.
         """

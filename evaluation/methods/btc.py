@@ -107,7 +107,7 @@ class BtcConfig(MethodConfig):
             layers is used [m]; [O] 2.
         max_keypoints: largest number of keypoints per place; [O] 500.
         num_neighbours: number of keypoints from which the triangles of a
-            keypoint are formed: the keypoint itself and those nearest to it;
+            keypoint are formed: the keypoint itself and the nearest keypoints;
             [O] 10.
         side_range: smallest and largest length of a triangle's sides [m]; [O]
             2, 50.

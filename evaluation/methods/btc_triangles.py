@@ -195,7 +195,7 @@ def peaks(
 
     The image is divided into square segments, each of which has at most one
     peak: the cell that has points in the most layers, or the first of several
-    equal ones. A cell is part of a line, and no peak, if in some direction one
+    such cells. A cell is part of a line, and no peak, if in some direction one
     neighbour has nearly as many layers and the opposite neighbour at least half
     as many.
 

@@ -160,9 +160,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     the poses of the top-ranked places by hill climbing on fine maps.
 
     The score is the weighted number of common cells on the fine maps, divided
-    by the geometric mean of the two scans' weighted numbers of filled cells.
-    On these maps, a filled cell of the query is common if the place has a
-    filled cell at the same position or an adjacent one, in the same layer.
+    by the geometric mean of the two scans' weighted numbers of filled cells. On
+    these maps, a filled cell of the query is common if the place has a filled
+    cell at the same or an adjacent position in the same layer.
 
     Of several poses with equal counts, the first one is used. All counts are
     integers, so that scores are the same on every processor.

@@ -68,9 +68,9 @@ _MOST_BYTES = 5_000_000
 def polar_image(points: np.ndarray, sensor_height: float) -> np.ndarray:
     """Returns the polar image of a scan.
 
-    The image shows the scan from above. Its rows are rings around the sensor,
-    and its columns are sectors. A rotation of the sensor by a whole number of
-    sectors only shifts the columns.
+    The image shows the scan from above. The rows of the image are rings around
+    the sensor, and the columns are sectors. A rotation of the sensor by a whole
+    number of sectors only shifts the columns.
 
     Args:
         points: (N, 3) in the frame of the sensor [m].

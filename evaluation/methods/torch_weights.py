@@ -226,7 +226,7 @@ def read_weights(
 
     Args:
         path: file that `torch.save` wrote (PyTorch 1.6 or later), with a state
-            dict or a dict that contains one.
+            dict, or with a dict that contains a state dict.
         shapes: name -> shape of the wanted tensors.
 
     Raises:

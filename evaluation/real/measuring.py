@@ -95,10 +95,10 @@ def measure_real(
             if empty, all shipped methods and estimators. A file of an estimator
             defines a function `localise`.
         settings: `METHOD.NAME=VALUE` each, for methods of place recognition.
-        simulated: folder of simulated recordings. Their scans are added as
-            places, and a classifier tries to distinguish them from the real
-            scans. The folder can also contain sequences of images, for the
-            classifier.
+        simulated: folder of simulated recordings. The scans of these recordings
+            are added as places, and a classifier tries to distinguish these
+            scans from the real scans. The folder can also contain sequences of
+            images, for the classifier.
         on_note: is called with each note for the user.
         queries: number of queries of each sequence of images, see
             `open_sequences`.

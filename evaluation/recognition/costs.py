@@ -117,10 +117,11 @@ def query_ms(
 ) -> float:
     """Returns the median CPU time of several queries, on one core [ms].
 
-    A query is compared with all places, including the method's second stage if
-    it has one. The time does not include geometric verification and the pose of
-    the top-ranked place, because not every method has a pose, and the time for
-    it does not depend on the number of places. The first query does not count.
+    A query is compared with all places, including the second stage of a method
+    with two stages. The time does not include geometric verification and the
+    pose of the top-ranked place, because not every method has a pose, and the
+    time for it does not depend on the number of places. The first query does
+    not count.
 
     Args:
         method: method to measure.

@@ -38,9 +38,9 @@ def fault_words(kind: str) -> str:
 class PairEvidence:
     """Evidence from the scans of a pair of drives, for each of Q queries.
 
-    A query can have several true matches. Here, its right place is the match
-    whose scan shows most of the query's scan. Upright points are points on
-    upright objects, such as walls and trunks.
+    A query can have several true matches. The right place of a query is the
+    match whose scan shows most of the query's scan. Upright points are points
+    on upright objects, such as walls and trunks.
 
     Attributes:
         overlaps: (Q,) share of the query's scan that the right place's scan

@@ -38,9 +38,9 @@ def kept_places(
 ) -> np.ndarray:
     """Returns which places of a database are kept, (D,) bool.
 
-    The plane of the world is divided into square cells, whose corners are at
-    multiples of their side. If the side equals the distance between two places,
-    a cell contains about one place of each drive through the cell.
+    The plane of the world is divided into square cells, with corners at
+    multiples of the cells' side. If the side equals the distance between two
+    places, a cell contains about one place of each drive through the cell.
 
     Args:
         p_WPs: (D, 3) positions of the places in the world [m], in the order in

@@ -310,8 +310,8 @@ def own_samples(
     """Returns AUC, R@1 and strict AUC of B bootstrap samples, each (B,).
 
     Strict AUC is defined at `PrCurve.strict_auc`. The samples consist of whole
-    blocks of the queries' route, see `resampled_weights`. They are cached, so
-    several comparisons use the same samples.
+    blocks of the queries' route, see `resampled_weights`. The samples are
+    cached, so several comparisons use the same samples.
 
     Args:
         outcomes: outcomes of the queries.

@@ -62,8 +62,8 @@ class PlaceOutcome:
         method: name of the method, with its settings if it has any.
         database: name of the drive of the places.
         query: name of the drive of the queries.
-        protocol: protocol with the method's own choices. Its radius and its
-            geometric verification apply to the outcome.
+        protocol: protocol with the method's own choices. The radius and the
+            geometric verification of this protocol apply to the outcome.
         protocol_name: name of the protocol in tables, see
             `RetrievalProtocol.name_with`.
         outcomes: outcomes of Q queries.

@@ -113,8 +113,8 @@ def is_accepted(outcomes: QueryOutcomes) -> np.ndarray:
     """Returns which queries are accepted matches, (Q,) bool.
 
     These are the queries whose top-ranked place is a match, and whose score
-    reaches the threshold with the greatest F1. This F1 counts all queries, also
-    those without a match.
+    reaches the threshold with the greatest F1. This F1 counts all queries,
+    including queries without a match.
     """
     curve = pr_curve(outcomes)
     if not len(curve.thresholds):

@@ -53,7 +53,7 @@ class Search:
     ) -> np.ndarray:
         """Returns the scores of some queries, (R, D) float64.
 
-        The scores are those before geometric verification; NaN for a place that
+        The scores do not include geometric verification; NaN for a place that
         is no candidate.
 
         Args:

@@ -33,7 +33,7 @@ def draw_pr_curves(
     """Draws precision-recall curves of all methods and saves the figure.
 
     Each row of the figure is a pair of drives, each column a mode: all queries,
-    or only those with a match.
+    or only queries with a match.
 
     Args:
         map_name: name of the map, for the titles.

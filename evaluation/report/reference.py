@@ -147,7 +147,7 @@ class Reference:
 
         Args:
             result: the result of the same method on the same pair.
-            mode: which queries count: `all`, or only those with a match
+            mode: which queries count: `all`, or only queries with a match
                 (`filtered`).
 
         Returns:

@@ -54,12 +54,15 @@ def from_least_to_greatest(
 def by_significance(
     best: str, p_values: Mapping[tuple[str, str], float]
 ) -> tuple[list[str], list[str]]:
-    """Returns methods that differ significantly from the best, and others.
+    """Divides methods by whether they differ significantly from the best.
 
     Args:
         best: label of the best method.
         p_values: (one method, another) -> corrected p-value of their
             difference; NaN if it is unknown.
+
+    Returns:
+        The methods that differ significantly, and all other methods.
     """
     found: tuple[list[str], list[str]] = ([], [])
     for pair, p in p_values.items():
@@ -70,7 +73,7 @@ def by_significance(
 
 
 def survival(rows: Sequence[Row]) -> str:
-    """Returns what methods retain under a change, and which of them survive.
+    """Returns the AUC that methods retain, and which methods survive.
 
     A method survives if it retains at least 90 % of its AUC strict, by the
     lower limit of the 95 % t interval of `ranking`, whose units are cities.

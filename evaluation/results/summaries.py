@@ -163,12 +163,12 @@ def excesses(queries: QueryRows) -> list[Summary]:
 
     Let a and b be the shares of the baseline's AUC that are left under each
     cause by itself, and ab the share that is left under both causes together.
-    The excess is the product a * b minus ab. It is 0 if the causes do not
-    interact, because the shares then multiply.
+    The excess is the product a * b minus ab. The excess is 0 if the causes do
+    not interact, because the shares then multiply.
 
-    The result has a summary for each cause whose name joins the names of two
-    causes by "+", if both were also measured by themselves (at their strongest
-    level). AUCs are means over the seeds.
+    The result has a summary for each pair of causes that were measured together
+    (as a cause whose name joins both names by "+"), and each by itself (at its
+    strongest level). AUCs are means over the seeds.
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
@@ -264,10 +264,10 @@ def lifetimes(
     method still has 90 % of the AUC that it has in a new map.
 
     Args:
-        results: table of results. Its rows of the metric `kept` contain the
-            share that is left at each value of the factor; the least value is
-            that of the baseline. A row that was measured with a single seed,
-            such as that of the baseline, counts for all seeds.
+        results: table of results. The rows of the metric `kept` contain the
+            share that is left at each value of the factor; the least value of
+            the factor is that of the baseline. A row that was measured with a
+            single seed, such as that of the baseline, counts for all seeds.
         factor: name of the factor, whose values are numbers.
         shares: the given shares, from 0 to 1.
 
@@ -396,8 +396,8 @@ def correlations(
     no trend.
 
     Args:
-        results: the table of results. Its rows must be either all measured with
-            geometric verification, or all without.
+        results: the table of results. All rows must have been measured with
+            geometric verification, or all rows without.
         x: name of the factor or metric.
         metric: name of a metric of place recognition.
     """
@@ -474,13 +474,13 @@ def ranking(
     """Returns methods ranked by their means over conditions.
 
     Only conditions count that were measured with all methods. The intervals of
-    the means are t intervals. Their independent units are maps if there are
-    several maps, and conditions otherwise. Intervals are limited to the
-    metric's range. With two or three units, intervals are unknown, because they
-    would say next to nothing. The bootstrap samples contain the same units for
-    all methods and for all tables of the same maps; tables of other maps are
-    sampled independently. For a single condition, the intervals are those in
-    the rows.
+    the means are t intervals. The independent units of the intervals are maps
+    if there are several maps, and conditions otherwise. Intervals are limited
+    to the metric's range. With two or three units, intervals are unknown,
+    because they would say next to nothing. The bootstrap samples contain the
+    same units for all methods and for all tables of the same maps; tables of
+    other maps are sampled independently. For a single condition, the intervals
+    come from the rows.
 
     Args:
         rows: rows of one metric.

@@ -206,7 +206,7 @@ def made_by(
     Args:
         protocol: the protocol.
         settings: name -> value of settings outside of the protocol that change
-            a number, without those that have their defaults.
+            a number, except settings that have their defaults.
 
     Returns:
         `protocol`, `protocol_digest` and `version`. With settings, the protocol
@@ -313,9 +313,10 @@ class Results:
 
     @classmethod
     def read(cls, path: str | Path) -> Results:
-        """Returns the table in a file `results.csv`, or in a folder with one.
+        """Returns the table in the file `results.csv`.
 
-        Columns can have any order; unknown columns are factors.
+        `path` is this file or the folder that contains it. Columns can have any
+        order; unknown columns are factors.
 
         Raises:
             InputError: the file cannot be read, is a table of an earlier
@@ -355,8 +356,7 @@ class Results:
 
         Args:
             columns: name of a column -> value, or a tuple, list or set of
-                values of which a row must have one. Use this argument for names
-                that contain dots.
+                possible values. Use this argument for names that contain dots.
             named: further columns, as keyword arguments.
         """
         wanted = {

@@ -191,15 +191,15 @@ def choose_methods(
 
     Args:
         names: names of methods of this package, `standard` for all standard
-            ones, or Python files that register a method each.
+            methods, or Python files that each register a method.
         settings: `METHOD.NAME=VALUE` for parameters that differ from their
             defaults, see `method_settings`.
 
     Raises:
         InputError: `names` contains an unknown name, a method or a file twice,
-            or a file that registers no method, or a method whose name is taken;
-            an optional method is not installed; or a setting is unknown or its
-            value is not valid.
+            a file that registers no method, or a method whose name is taken; an
+            optional method is not installed; or a setting is unknown or has an
+            invalid value.
     """
     chosen: list[MethodChoice] = []
     stems = set()

@@ -95,11 +95,11 @@ def draw_stages(
     Args:
         reporter: reports progress.
         map_name: name of the map.
-        stages: the earlier stage, and the later one.
+        stages: the earlier and the later stage.
         changes: files with the results of the task `change`: of the earlier and
             the later drive, and, if there is one, of their control.
-        drives: the earlier drive and the later one. Each is a file with a
-            `DriveSummary`; both are in one world frame.
+        drives: files with a `DriveSummary` of the earlier and of the later
+            drive, both in one world frame.
         clouds: files with the clouds of the earlier and the later drive.
         stems: paths of the two figures, without ending. The first figure shows
             what changed, the second figure shows the sets of points from which

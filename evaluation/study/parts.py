@@ -219,13 +219,13 @@ class MakePart(Step):
     """A job step that writes the result of a function to a file.
 
     Attributes:
-        function: function whose result is written. Its first parameter is a
-            `Reporter`; the arguments follow. If its code changes, the file is
-            made again.
+        function: function whose result is written. The first parameter of this
+            function is a `Reporter`; the arguments follow. If its code changes,
+            the file is made again.
         arguments: arguments of the function. If one changes, the file is made
-            again. Each is a plain value, a dataclass of plain values, a path
-            (of which only the name counts), an object whose method `identity`
-            returns what counts, or a tuple of such values.
+            again. An argument is a plain value, a dataclass of plain values, a
+            path (of which only the name counts), an object with a method
+            `identity` that returns what counts, or a tuple of such values.
         figures: further files that the function writes.
     """
 

@@ -17,8 +17,8 @@ from evaluation.study.parts import MakePart, Part
 def remove_descriptors(jobs: Iterable[Job]) -> None:
     """Removes the descriptors that jobs keep only until the study is done.
 
-    Their steps have `FeatureExtraction.removes_descriptors`. All jobs must be
-    done.
+    The steps of these jobs have `FeatureExtraction.removes_descriptors`. All
+    jobs must be done.
 
     Raises:
         InputError: a file cannot be written.

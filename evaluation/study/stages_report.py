@@ -214,8 +214,8 @@ class StagesReport:
             pages: name of a recording -> address of its 3-D page, relative to
                 the report. Recordings without a page are left out.
             on_note: is called with a note on each pair without a match, and on
-                each city without a pair to compare. The report contains the
-                latter, too.
+                each city without a pair to compare. The report also contains
+                cities without a pair to compare.
             with_tables: whether to write the wide tables.
 
         Returns:
@@ -533,7 +533,7 @@ def write_report(
             `evaluation.study.chosen_methods.choose_methods`.
         protocol: protocol of place recognition.
         on_note: is called with notes: on how recordings are read or left out,
-            on what methods assume, and on cities without a pair to compare.
+            on assumptions of methods, and on cities without a pair to compare.
         with_costs: whether times and memory of methods are measured.
         reference_for: function that returns published numbers for the maps of a
             report.

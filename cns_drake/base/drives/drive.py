@@ -70,8 +70,8 @@ class ImuSamples(NamedTuple):
 def driven_way(scenario: Mapping | None) -> dict | None:
     """Returns the fields of a scenario that determine the vehicle's path.
 
-    Two drives for which these fields are equal follow the same path. They may
-    differ in their surroundings and their sensors.
+    Two drives for which these fields are equal follow the same path. The drives
+    may differ in their surroundings and their sensors.
 
     Args:
         scenario: the fields of a scenario; None if a drive has no scenario.

@@ -43,7 +43,7 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 
     The digest includes a data file if its name appears in a module of the same
     folder, or if the name of its folder appears in a module next to that
-    folder. It also includes the versions of libraries.
+    folder. The digest also includes the versions of libraries.
 
     Args:
         modules: full names; `<package>.*` stands for all modules in a package.

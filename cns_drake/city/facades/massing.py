@@ -290,9 +290,9 @@ def revolved(
 def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
     """Returns a roof: a line in y and z, extruded along x, with end walls.
 
-    The line consists of (y, z) points with increasing y [m]. It is extruded
-    from x = `x0` to x = `x1` [m]. The end walls reach down to the height of the
-    first point.
+    The line consists of (y, z) points with increasing y [m]. The line is
+    extruded from x = `x0` to x = `x1` [m]. The end walls reach down to the
+    height of the first point.
     """
     base = profile[0][1]
     faces = Faces()

@@ -62,8 +62,8 @@ class Arch(NamedTuple):
     """A recess [m] with a round head: half an ellipse from z_spring to z1.
 
     The recess extends from x0 to x1 along the wall, and begins at the height
-    z0. It must lie where the wall has depth 0, and no later relief may cover
-    it.
+    z0. The recess must lie where the wall has depth 0, and no later relief may
+    cover it.
     """
 
     x0: float

@@ -37,9 +37,9 @@ _HIGHEST_STEP = 0.3
 def furnish(draft: Draft, district: District) -> None:
     """Places the objects, fences, parked cars and plants of a district.
 
-    These are the entries `objects`, `lines`, `parking` and `scatter` of the
-    district in the plan. Objects for which there is no room are left out. Only
-    for an entry of `objects`, lack of room is an error.
+    The plan describes them in the entries `objects`, `lines`, `parking` and
+    `scatter` of the district. Objects for which there is no room are left out.
+    Only for an entry of `objects`, lack of room is an error.
 
     Raises:
         InputError: if there is no room for an entry of `objects`, or its

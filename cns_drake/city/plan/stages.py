@@ -42,7 +42,7 @@ class Stage(_Model):
     Attributes:
         story: text that says which changes a visitor would see until the next
             stage.
-        absent: structures that exist in the next stage but not in this one:
+        absent: structures that exist in the next stage but not in this stage:
             lists of names, each list under a heading of your choice. The last
             stage cannot have this field.
         lower: groups of buildings and plants that are lower than in the next

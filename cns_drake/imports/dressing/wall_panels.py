@@ -106,9 +106,9 @@ def find_panels(
     Args:
         walls: for each building, its vertical triangles (M, 3, 3), which face
             outwards [m].
-        is_wanted: function that selects walls. It takes the least and the
-            greatest x and y of N walls, (N, 2, 2) [m], and returns (N,) bool.
-            None for all walls.
+        is_wanted: function that selects walls. The function takes the least and
+            the greatest x and y of N walls, (N, 2, 2) [m], and returns (N,)
+            bool. None for all walls.
     """
     triangles = joined(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])

@@ -168,7 +168,7 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class WayGraph(ABC):
-    """A graph from whose N pieces the paths of a car can be built.
+    """A graph of N pieces, from which the paths of a car can be built.
 
     A piece is, for example, a lane from one junction to the next. A sequence of
     pieces is called a way. An edge of the graph leads from a piece to each
@@ -209,7 +209,7 @@ class WayGraph(ABC):
         Args:
             pieces: numbers of the pieces of the drives so far.
             joint: piece at which the second drive joins or leaves the first
-                one; this piece is allowed.
+                drive; this piece is allowed.
         """
 
     @abstractmethod
@@ -256,8 +256,8 @@ class WayGraph(ABC):
         """Returns the costs from piece to next piece, a sparse matrix (N, N).
 
         By default, a cost is the length of the way between the pieces' middles
-        [m]. Pieces that are not open, and those in the mask `closed` (N,), have
-        no edges.
+        [m]. Pieces that are not open, and pieces in the mask `closed` (N,),
+        have no edges.
         """
         is_open = self.is_open if closed is None else self.is_open & ~closed
         before, after, costs = self._links

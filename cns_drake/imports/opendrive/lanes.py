@@ -315,7 +315,7 @@ def stations(
 def split_levels(
     bands: Sequence[LaneBand],
 ) -> tuple[list[LaneBand], list[LaneBand]]:
-    """Returns the lanes on the ground, and those on bridges, as two lists.
+    """Returns the lanes on the ground and the lanes on bridges.
 
     A lane that leads onto a bridge is cut at the bridge's end.
     """

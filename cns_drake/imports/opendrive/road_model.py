@@ -72,7 +72,7 @@ class Cubics:
     ) -> np.ndarray:
         """Returns the function's values (N,), or its first derivatives.
 
-        Both are 0 before the first piece.
+        Values and derivatives are 0 before the first piece.
 
         Args:
             s: (N,) distances along the road [m] at which the function is

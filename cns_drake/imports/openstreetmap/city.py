@@ -394,7 +394,7 @@ def standing_buildings(
 ) -> Iterator[OsmArea]:
     """Yields buildings that stand, or that were demolished at a known date.
 
-    All other buildings, such as those below the ground, are left out.
+    All other buildings, such as buildings below the ground, are left out.
 
     Args:
         areas: buildings and building parts.

@@ -401,9 +401,9 @@ def lanes_of_streets(
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.
 
-    The file contains the streets within 300 m of the drives. It also lists
-    objects, such as parked cars, that were added beside the streets and stand
-    in a lane.
+    The file contains the streets within 300 m of the drives. The file also
+    lists objects, such as parked cars, that were added beside the streets and
+    stand in a lane.
 
     Args:
         streets: streets from the imported file.

@@ -60,8 +60,8 @@ class ImuSection(Mount):
     def sample_rate(self, scan_rate: int) -> int:
         """Returns the number of samples per second.
 
-        This is `rate` if given, or else the rate in Kalibr's file, or else the
-        scan rate. `scan_rate` is the number of scans per second.
+        The number is `rate` if given, or else the rate in Kalibr's file, or
+        else the scan rate. `scan_rate` is the number of scans per second.
 
         Raises:
             InputError: Kalibr's file cannot be used.
@@ -99,7 +99,7 @@ class ImuSection(Mount):
 
         Args:
             scan_rate: scans per second, which is the sample rate of the IMU if
-                neither `rate` nor Kalibr's file states one.
+                neither `rate` nor Kalibr's file states a rate.
 
         Returns:
             Field -> value, with the simulated sample rate as `update_rate`;

@@ -258,10 +258,10 @@ class VehicleImu(LeafSystem):
         - samples
 
     `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors of
-    size 3, expressed in the IMU's frame I. At a time between two samples, they
-    are the exact values plus the error of the earlier sample. `samples` is
-    abstract, of type `ImuSamples`: the last 256 samples up to the time of the
-    context. All outputs depend only on time.
+    size 3, expressed in the IMU's frame I. At a time between two samples, both
+    outputs are the exact values plus the error of the earlier sample. `samples`
+    is abstract, of type `ImuSamples`: the last 256 samples up to the time of
+    the context. All outputs depend only on time.
     """
 
     def __init__(

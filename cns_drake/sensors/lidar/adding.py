@@ -342,8 +342,8 @@ def add_lidar_view(
 ) -> geometry.MeshcatPointCloudVisualizer:
     """Adds a live view of a LiDAR's scans in Meshcat to a diagram.
 
-    Points are shown in the world frame. Their path in Meshcat is the LiDAR's
-    name.
+    Points are shown in the world frame. The path of the points in Meshcat is
+    the LiDAR's name.
 
     Args:
         builder: builder of a diagram with the LiDAR.

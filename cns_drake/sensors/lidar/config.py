@@ -177,8 +177,8 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    With calibrated returns, the elevations are those measured for a real unit,
-    if they are known for this preset.
+    With calibrated returns, the elevations are those of a real unit, if they
+    were measured for this preset.
 
     Args:
         config: description of the LiDAR.

@@ -117,11 +117,11 @@ class Lidar(LeafSystem):
 
     If the port `sweep` is connected, the poses of P come from a `Sweep` and not
     from the SceneGraph: one pose for the whole revolution or, with motion
-    distortion, one for each column at its firing time. With motion distortion,
-    a point is expressed in S at the firing time t of its beam, as a real unit
-    reports the point: X_WS(start of the revolution + t) transforms it to the
-    world. During the revolution, all other moving geometry stays where it is at
-    the time of the output.
+    distortion, one pose for each column at the column's firing time. With
+    motion distortion, a point is expressed in S at the firing time t of its
+    beam, as a real unit reports the point: X_WS(start of the revolution + t)
+    transforms it to the world. During the revolution, all other moving geometry
+    stays where it is at the time of the output.
 
     If the LiDAR was made with the argument `moving_bodies`, P and all other
     bodies of a plant move during the revolution, with the velocities that they
@@ -143,8 +143,8 @@ class Lidar(LeafSystem):
     in one array. Many poses are read faster from this array.
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
-    QueryObject and casts rays on a hierarchy of its own. It rebuilds the parts
-    of this hierarchy that have changed. `geometry` (from `geometry_port`) lists
+    QueryObject, casts rays on a hierarchy of its own, and rebuilds the parts of
+    this hierarchy that have changed. `geometry` (from `geometry_port`) lists
     the geometry, and is computed only after a change. Without this port, the
     LiDAR lists all geometry at every scan, which in a world of thousands of
     geometries takes longer than the scan.

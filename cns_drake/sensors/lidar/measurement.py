@@ -55,9 +55,9 @@ class MeasurementModel:
     """The noise, losses and rounding of a LiDAR; by default there are none.
 
     Random numbers depend only on `seed`, `sensor_name` and the number of the
-    frame. They are sampled for every beam, whether the beam hits a surface or
-    not. The noise of a beam therefore does not depend on earlier computations,
-    or on the geometry that other beams hit.
+    frame. Random numbers are sampled for every beam, whether the beam hits a
+    surface or not. The noise of a beam therefore does not depend on earlier
+    computations, or on the geometry that other beams hit.
 
     Attributes:
         resolution: step to whose multiples coordinates are rounded [m];

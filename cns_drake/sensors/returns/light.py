@@ -218,10 +218,10 @@ def texture(
     """Returns light whose energies and distances vary with surface texture.
 
     Each spot of a surface has an albedo and a height above the mean surface.
-    Both are hashes of the spot's position in the surface's own frame, so that
-    all scans of all drives find the same values at a spot. Bright spots are
-    higher than dark spots, so their distances are shorter. The axes of the hash
-    cells are not parallel to walls or floors.
+    Albedo and height are hashes of the spot's position in the surface's own
+    frame, so that all scans of all drives find the same values at a spot.
+    Bright spots are higher than dark spots, so their distances are shorter. The
+    axes of the hash cells are not parallel to walls or floors.
 
     Args:
         light: the light that smooth, uniform surfaces would return.

@@ -206,8 +206,8 @@ def measure_localisation(
         database: the drive of the map, or the file of its points.
         query: the drive whose scans are localised.
         methods: names of registration methods, or Python files with your own.
-        texts: contents of those files, and "" for names. Results are computed
-            again if a text changes.
+        texts: contents of the Python files, and "" for names of shipped
+            methods. Results are computed again if a text changes.
         starts: how the random initial poses of the scans are sampled, one entry
             for each size of their errors.
         spacing: distance between two queries [m].

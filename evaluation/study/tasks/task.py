@@ -383,8 +383,8 @@ class Jobs:
 
         Args:
             part: the file.
-            function: function whose result is written. Its first argument is a
-                `Reporter`.
+            function: function whose result is written. The first argument of
+                this function is a `Reporter`.
             arguments: further arguments of the function.
             needs: names of jobs that must be finished before.
             cost: approximate cost of the job [s].
