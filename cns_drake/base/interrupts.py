@@ -61,9 +61,9 @@ def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
 def uninterrupted() -> Iterator[None]:
     """Delays interrupts until the end of the block, for example an import.
 
-    An extension module that is interrupted while it is initialised fails with
-    another error, or crashes the process later. Blocking the signals would not
-    help, because a library's threads can receive the signals as well.
+    An extension module that is interrupted during its initialisation fails with
+    an unrelated error, or crashes the process later. Blocking the signals would
+    not help, because a library's threads can receive the signals as well.
     """
     waiting: list[int] = []
     try:

@@ -160,7 +160,7 @@ def whole_number(text: str, where: object) -> int:
 
 
 def number_within(text: str, largest: float, where: object) -> float:
-    """Returns the number in a cell, of absolute value `largest` or less.
+    """Returns the number in a cell, from -`largest` to `largest`.
 
     Raises:
         InputError: the text is not a number, or its absolute value exceeds

@@ -105,8 +105,9 @@ def study(
         maps: Maps to use instead of the experiment's maps: names of shipped
             maps, or folders of your own maps.
         output: Folder for the results; created if it does not exist.
-        quick: Measure less and finish sooner. The section `quick` of the
-            experiment says what is measured then.
+        quick: Measure less than the whole experiment, in order to finish
+            sooner. The section `quick` of the experiment says what is measured
+            then.
         task: Task to measure: place, pose, localise, map, change, cost or seen.
             By default the tasks of the experiment. May be repeated.
         method: Method to run, instead of the methods of the experiment: the

@@ -58,8 +58,8 @@ def export_drive(
         on_note: called with notes about how the recording was read and written.
 
     Raises:
-        InputError: if the recording cannot be read; if the folder has other
-            content than exports of this format, or already contains this drive;
+        InputError: if the recording cannot be read; if the folder contains
+            anything but exports of this format, or already contains this drive;
             if the files cannot be written; or if `absent_in` is given and
             labels are not possible.
     """

@@ -112,7 +112,7 @@ def save_meshcat_page(
 
 
 def filter_rows(data: bytes) -> bytes:
-    """Returns bytes rearranged so that they compress better.
+    """Returns bytes rearranged so that they compress well.
 
     The bytes are taken as rows of equal length; the last row is padded with
     zeros. Each byte is replaced by its difference from the byte above. The

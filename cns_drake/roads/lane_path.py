@@ -97,7 +97,7 @@ def sample_lane_path(
     Args:
         points: (N, 3) corners of the polyline [m].
         speed_limits: (N,) limit at each corner [m/s]. On a segment, the lower
-            limit of its two corners holds.
+            of the limits at the two corners holds.
         spacing: distance between the points, rounded so that it divides the
             length of the polyline [m].
         source: text with which error messages begin.

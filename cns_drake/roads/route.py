@@ -90,12 +90,12 @@ def make_lane_path(
     """Returns the path along the lanes of a route, joined at junctions.
 
     Consecutive legs must meet in a junction, and the path through this junction
-    must be legal: a left turn from the innermost lane to the innermost, a right
-    turn from the outermost lane to the outermost, and straight on without a
-    change of lane (`RoadNetwork.is_legal`). Lanes change only along a leg.
-    Within a junction, the lower speed limit of the two roads holds. If the next
-    leg leads back on the same road, the car turns round in a loop to the left:
-    at the leg's `end` or, without an `end`, as near to the junction as there is
+    must be legal: a left turn from innermost lane to innermost lane, a right
+    turn from outermost lane to outermost lane, and straight on without a change
+    of lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
+    junction, the lower speed limit of the two roads holds. If the next leg
+    leads back on the same road, the car turns round in a loop to the left: at
+    the leg's `end` or, without an `end`, as near to the junction as there is
     room.
 
     Args:

@@ -37,8 +37,8 @@ def load_waypoint_path(
 
     The file is CSV with one waypoint per line: x, y, z or x, y of the vehicle
     frame, on the ground in the world [m]. Without z, z is 0. If the first line
-    contains names, the columns can be in another order, and there can be more
-    columns.
+    contains names, the columns can be in another order, and there can be
+    further columns.
 
     The path is the line from waypoint to waypoint, with corners rounded by arcs
     of 8 m radius. Where the waypoints are too close together, the radius is

@@ -92,8 +92,8 @@ def redraw_cities(
 class MakeMap(Step):
     """A job step that makes the folder of a map.
 
-    If the folder contains a map that this step made earlier, from other inputs,
-    the map is replaced.
+    If the folder contains a map that an earlier run of this step made from
+    other inputs, the map is replaced.
     """
 
     folder: Path
@@ -204,8 +204,9 @@ class RedrawCity(MakeMap):
         """Writes further input files, such as `stages.yaml`; by default none.
 
         Override this function for files that contain names of structures,
-        because these names are not known earlier. To find the names, call
-        `cns_drake.city.generation.city_structures.make_city` with `draft`.
+        because these names follow from the other input files. To find the
+        names, call `cns_drake.city.generation.city_structures.make_city` with
+        `draft`.
 
         Args:
             draft: folder of the map, before it gets its final name. The folder

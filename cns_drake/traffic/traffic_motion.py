@@ -423,7 +423,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects a LiDAR to traffic, whose moving bodies it labels as moving.
+    """Makes a LiDAR label the moving bodies of traffic as moving.
 
     Args:
         builder: builder of a diagram with both systems.

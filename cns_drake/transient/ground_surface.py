@@ -94,8 +94,8 @@ class GroundSurface:
 
         Args:
             xy: (N, 2) places in W [m].
-            of_road: True for carriageways only, False for all other ground, and
-                None for the higher of both.
+            of_road: True for the height of carriageways only, False for all
+                other ground, and None for the higher of the two.
         """
         kinds = (False, True) if of_road is None else (of_road,)
         found = np.max([self._sides[k].heights(xy) for k in kinds], axis=0)

@@ -80,7 +80,7 @@ def register_keyframe(
 def loop_errors(
     loops: list[Loop], X_WL: np.ndarray, X_WK: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how far keyframe poses deviate from what loops measure.
+    """Returns the deviations of keyframe poses from the measured loops.
 
     Args:
         loops: the M loops.

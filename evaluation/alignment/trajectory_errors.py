@@ -49,7 +49,7 @@ class TrajectoryErrors:
         offsets: (N,) distances to the ground-truth positions after the
             alignment [m].
         drift: (K,) errors of position over 100 m [m]; empty if the path is
-            shorter.
+            shorter than 100 m.
         drift_deg: (K,) errors of orientation over 100 m [deg].
         length: length of the true path along the poses [m].
         drive_length: length of the path of the whole drive [m].

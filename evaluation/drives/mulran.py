@@ -41,7 +41,7 @@ _LONGEST_GAP_NS = 1_000_000_000
 class MulranDrive(BinDrive):
     """A drive of MulRan.
 
-    W is the UTM grid with a nearer origin (see
+    W is the UTM grid with an origin near the drives (see
     `evaluation.drives.scan_files.to_world`). If the poses are in local
     coordinates, W is the drive's own frame. The pose of a scan is interpolated
     at its stamp. Points without a return, which are stored as (0, 0, 0), are

@@ -163,8 +163,8 @@ def gather(
     Args:
         drive: the drive.
         frame: number of the frame.
-        num_scans: number of consecutive scans that are merged; fewer at the
-            ends of the drive.
+        num_scans: number of consecutive scans that are merged. At the ends of
+            the drive, fewer scans are merged.
         max_range: greatest absolute x, y and z of a point in the sensor's frame
             [m].
         fields: names of further fields of the points, besides x, y and z.

@@ -280,7 +280,7 @@ class Trajectory:
 
         Raises:
             InputError: the table spans none of the times, or a time lies in a
-                longer gap.
+                gap longer than `longest_gap_ns`.
         """
         own = self.stamps_ns
         spanned = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])

@@ -272,9 +272,9 @@ class Estimate:
 
     Attributes:
         X_WS: (4, 4) pose; None if the estimator found none.
-        score: the estimator's own score, higher for a better result. If the
-            score is None, the share of the scan's points that lie on the map is
-            used instead.
+        score: the estimator's own score; a higher score means a better result.
+            If the score is None, the share of the scan's points that lie on the
+            map is used instead.
         iterations: number of steps; 0 if unknown.
     """
 

@@ -43,7 +43,8 @@ def align_robustly(
     """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
 
     Several alignments follow one another. Each alignment begins at the result
-    of the previous alignment, and pairs points over a shorter distance.
+    of the previous alignment, and pairs points over a shorter distance than
+    that alignment.
 
     Args:
         surface: the map.

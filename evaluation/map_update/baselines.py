@@ -213,10 +213,10 @@ def _slopes(p_S: np.ndarray) -> np.ndarray:
 def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `m3c2`.
 
-    A point is gone (older map) or new (newer map) if the M3C2 distance of the
-    two maps there exceeds its level of detection and 0.1 m. Otherwise it is
-    kept, or unobserved if a map lacks points to measure this distance. See
-    `evaluation.map_update.labels.Label`.
+    A point is gone (older map) or new (newer map) if the M3C2 distance between
+    the two maps at this point exceeds the distance's level of detection and 0.1
+    m. Otherwise it is kept, or unobserved if a map lacks points to measure this
+    distance. See `evaluation.map_update.labels.Label`.
 
     Args:
         mine: the map with N points, and its drive.

@@ -71,7 +71,7 @@ def voxel_planes(
     Args:
         points: (N, 3) points [m].
         voxel_size: side of a voxel [m].
-        max_points: only voxels with more points are used.
+        max_points: only voxels with more than this number of points are used.
         flatness: upper limit of the variance along the normal [m^2].
     """
     index, counts, centers, covariances = _moments(points, voxel_size)

@@ -346,7 +346,7 @@ def make_triangles(
     Args:
         keypoints: the K keypoints.
         num_neighbours: number of nearest keypoints that are used, including the
-            keypoint itself; all keypoints if there are fewer.
+            keypoint itself; all keypoints if there are fewer than this number.
         side_range: limits of the sides [m].
     """
     # The public program reads beyond its array if there are fewer keypoints.

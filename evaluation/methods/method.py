@@ -302,7 +302,7 @@ def check_number(
         number: how many values the function must return.
 
     Raises:
-        InputError: the function has returned more or fewer values, or no
+        InputError: the function has returned another number of values, or no
             sequence.
     """
     count = len(found) if isinstance(found, Sequence | np.ndarray) else None

@@ -72,9 +72,9 @@ class PlaceOutcome:
             numbers.
         place_frames: (D,) frame of each place in its drive.
         best_places: (Q, K) int32, the top-ranked places of each query, best
-            first; -1 where there are fewer candidates.
-        best_scores: (Q, K) scores of these places; NaN where there are fewer
-            candidates.
+            first; -1 where a query has fewer than K candidates.
+        best_scores: (Q, K) scores of these places; NaN where there is no
+            candidate.
         matches: (M, 2) int32, each pair of a query and a place that is a true
             match.
         nearest: (Q,) distance of each query to the nearest place that is

@@ -44,7 +44,7 @@ class RetrievalProtocol:
         query_spacing: distance driven between two queries [m].
         place_spacing: distance driven between two places of the database [m].
         max_range: greatest absolute x, y and z of a point in the sensor's frame
-            [m]; farther points are left out.
+            [m]; points beyond this limit are left out.
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; by default, each method uses its own number.
         place: which of the merged scans determines the pose of the place:
@@ -53,7 +53,7 @@ class RetrievalProtocol:
             becomes None.
         exclude_recent: for a drive that is compared with itself: a query is
             compared only with places that the drive passed at least this time
-            earlier [s]. None if two drives are compared.
+            before the query [s]. None if two drives are compared.
         overlap: share of a query's scan, up to 1, that the scan of a place at
             any distance must show to be a match (see
             `evaluation.recognition.overlap_truth`). None if places within

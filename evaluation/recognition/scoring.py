@@ -19,8 +19,8 @@ SOFTNESS = 0.05
 def ranked_places(scores: np.ndarray) -> np.ndarray:
     """Returns places from the best to the worst.
 
-    If places have equal scores, the first one in the database is better. Places
-    that are no candidates (NaN) come last, even after a score of minus
+    Of places with equal scores, the first in the database is ranked higher.
+    Places that are no candidates (NaN) come last, even after a score of minus
     infinity.
 
     Args:

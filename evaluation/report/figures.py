@@ -104,7 +104,8 @@ class Picture:
 
     Attributes:
         image: (height, width, 3) uint8 pixels.
-        origin: (2,) lower left corner of the image, along right and up [m].
+        origin: (2,) position of the image's lower left corner, to the right and
+            upwards [m].
         view: the camera.
     """
 

@@ -70,7 +70,7 @@ def name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
 
     Args:
         figure: the figure that the panel is in.
-        axes: the panel, whose limits do not change any more.
+        axes: the panel. The limits of its axes must be final.
         gap: least distance between two names, as a part of the panel's height.
         size: size of the letters [pt].
     """

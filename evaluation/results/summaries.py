@@ -359,9 +359,9 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
 
     Rows of the same experiment, map and method, all with or all without
     geometric verification, form a curve of the metric. For each two
-    neighbouring points of a curve, there is a summary whose value is an
-    exponent: 1 if the metric grows in proportion to `over` between these
-    points, 2 if the metric grows with the square of `over`.
+    neighbouring points of a curve, the value of a summary is an exponent: 1 if
+    the metric grows in proportion to `over` between these points, 2 if the
+    metric grows with the square of `over`.
 
     Args:
         results: the table of results.
@@ -592,10 +592,10 @@ def summarised(
 
     A scatter plot is summed up by the function `correlations` of this module. A
     chart of the kind `lines` is summed up by `lifetimes` if its metric is
-    `kept`, and by `growths` if its metric is a CPU time. A chart over what
-    updates a map is summed up by `worths`. Other charts give no numbers. For an
-    experiment with the factor `cause`, the result also contains the numbers of
-    `excesses`.
+    `kept`, and by `growths` if its metric is a CPU time. A chart over the ways
+    of updating a map is summed up by `worths`. Other charts give no numbers.
+    For an experiment with the factor `cause`, the result also contains the
+    numbers of `excesses`.
 
     Args:
         results: all results of the experiment.

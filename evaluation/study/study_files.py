@@ -11,8 +11,8 @@ from evaluation.study.parts import Part
 class FeatureFiles:
     """The files (`Part`) with all that a study needs of a recording.
 
-    These are the drive's poses and map, its scans at places and queries, and,
-    in one file for each method, the descriptors of these scans.
+    The files contain the drive's poses and map, the scans at places and
+    queries, and, in one file for each method, the descriptors of these scans.
 
     Attributes:
         folder: folder of the files.
@@ -45,9 +45,9 @@ class FeatureFiles:
         The file contains a `DriveNames` and a `DriveDescriptors`.
 
         Args:
-            key: `MethodChoice.key` of the method. For descriptors by a second
-                protocol, what `described_key` of
-                `evaluation.study.feature_extraction` returns.
+            key: `MethodChoice.key` of the method; for descriptors by a second
+                protocol, the result of `described_key` of
+                `evaluation.study.feature_extraction`.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 

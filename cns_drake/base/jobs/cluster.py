@@ -64,8 +64,9 @@ class Cluster:
     def slots(self) -> int | None:
         """Number of jobs that run at once; None for the workers of a scheduler.
 
-        A scheduler gets all jobs at once: other users may be using its workers,
-        and it may start more workers for the jobs.
+        A scheduler gets all jobs at once: other users may be using the
+        scheduler's workers, and the scheduler may start more workers for the
+        jobs.
         """
         return self.num_workers if self.scheduler is None else None
 

@@ -34,8 +34,8 @@ def wall_top_for(
 ) -> float:
     """Returns the height of the top of the walls of a house [m].
 
-    The walls are as high as the storeys need, but lower if the roof would
-    otherwise be too low.
+    The walls are as high as the storeys need, unless the roof would then be too
+    low; in this case, the walls are lower than the storeys need.
 
     Args:
         height: height of the ridge [m].

@@ -325,7 +325,7 @@ def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
 
 
 def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
-    """Returns a layout with one more bay, in the middle of each wall.
+    """Returns a layout with an additional bay in the middle of each wall.
 
     The bay is `width` wide [m] and replaces the reliefs that it touches. Walls
     shorter than the bay stay unchanged.

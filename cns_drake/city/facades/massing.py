@@ -461,7 +461,7 @@ def stadium(
 ) -> np.ndarray:
     """Returns the outline (N, 2) of a rectangle with half circles as ends [m].
 
-    The rectangle is longer along x.
+    The longer sides of the rectangle are along x.
 
     Args:
         x0: left end [m].

@@ -179,7 +179,8 @@ def free_stretches(
         wing: the wing.
         edge: number of the wall.
         others: the wings of the house.
-        z: height at which the wall is examined; lower wings hide nothing [m].
+        z: height at which the wall is examined [m]; wings lower than this
+            height hide nothing.
     """
     wall = wing.wall(edge)
     cuts = {0.0, wall.length}

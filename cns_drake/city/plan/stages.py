@@ -73,9 +73,9 @@ class Stages(_Model):
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in
             quotes, such as `"01"`.
-        lots: how lots are used before their buildings exist. Each use
-            (`car_park`, `market`, `garden`, `yard` or `empty`) has a list of
-            the buildings whose lots are used so. By default the use of a lot
+        lots: how lots are used before their buildings exist. For each use
+            (`car_park`, `market`, `garden`, `yard` or `empty`), list the
+            buildings whose lots have this use. By default the use of a lot
             depends on the lot's size.
     """
 

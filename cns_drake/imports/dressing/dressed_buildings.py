@@ -171,7 +171,7 @@ def dress_buildings(
     Args:
         structures: the structures of the city, of which the buildings get
             details.
-        drives: the drives; there is more detail near drives.
+        drives: the drives; there is more detail near drives than elsewhere.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.

@@ -71,7 +71,7 @@ def dress_city(
     Args:
         staged: the structures of each stage.
         city: the city as in the file.
-        drives: the drives, near which there is more detail.
+        drives: the drives; there is more detail near drives than elsewhere.
         ground: the ground.
         seed: seed of all random draws.
 

@@ -126,7 +126,7 @@ class BandGraph(search.WayGraph):
 def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointRoute]:
     """Returns two drives along lanes that share a part of their paths.
 
-    The list contains only one drive, or none, if no more drives are found.
+    The list contains only one drive, or no drive, if the search finds no more.
     `bands` contains the lanes of the whole network, including bridges.
     """
     return search.find_drives(BandGraph(bands))

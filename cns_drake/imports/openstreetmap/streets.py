@@ -429,9 +429,9 @@ def ground_areas(
 ) -> Iterator[Imported]:
     """Yields areas on the ground, such as lawns and water.
 
-    If `dressed`, there are more kinds, such as sports grounds, and areas have
-    the colours of their materials. A path that is a closed way is a line, such
-    as the path around a square, unless it has `area=yes`.
+    If `dressed`, there are additional kinds of areas, such as sports grounds,
+    and areas have the colours of their materials. A path that is a closed way
+    is a line, such as the path around a square, unless it has `area=yes`.
     """
     for name, tags, polygons in features.areas:
         is_path = name.startswith("w") and path_width(tags) is not None

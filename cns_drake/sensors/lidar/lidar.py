@@ -951,8 +951,7 @@ def assemble_points(
         met: (N,) int32 index of the hit geometry in `label` and `instance`;
             negative for returns from rain, snow or fog.
         label, instance: uint16 class and instance id of each geometry.
-        step: step to whose multiples coordinates are rounded [m]; 0 for exact
-            coordinates.
+        step: step of the rounded coordinates [m]; 0 for exact coordinates.
     """
     # As names of their own, fields are fast.
     beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity

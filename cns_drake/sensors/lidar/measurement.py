@@ -60,10 +60,9 @@ class MeasurementModel:
     computations, or on the geometry that other beams hit.
 
     Attributes:
-        resolution: step to whose multiples coordinates are rounded [m];
-            intensities are rounded to 12 bits. With 0, neither is rounded.
-            Coordinates that are multiples of a power of two are exact in
-            float32 and compress well.
+        resolution: step of the rounded coordinates [m]; intensities are rounded
+            to 12 bits. With 0, neither is rounded. With a step that is a power
+            of two, coordinates are exact in float32 and compress well.
         range_noise: standard deviation of the Gaussian error of a range,
             along the beam and before rounding [m].
         dropout: probability that a return is lost.

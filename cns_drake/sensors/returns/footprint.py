@@ -39,7 +39,8 @@ class Sides(NamedTuple):
         neighbour: (P,) index of the neighbouring beam beyond the edge.
         share: (P,) fraction of the beam's light that the ray represents.
         d_Wset: (P, 3) unit directions in the world.
-        reach: (P,) float32 length to cast, just beyond the nearer surface [m].
+        reach: (P,) float32 length to cast, just beyond the nearer of the two
+            surfaces [m].
     """
 
     row: np.ndarray

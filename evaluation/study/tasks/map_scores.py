@@ -38,8 +38,7 @@ class MapScores(NamedTuple):
     Attributes:
         scores: name of a score -> its value, see
             `evaluation.map_update.scores.score`.
-        gone, new: numbers of points whose exact label is gone, and whose exact
-        label is new.
+        gone, new: numbers of points with the exact labels gone and new.
         labels: the detector's labels of both maps.
     """
 
