@@ -3,15 +3,17 @@
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes, read_mesh
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
 from cns_drake.city.geometry.occupancy import Occupancy
-from cns_drake.city.geometry.polygons import (
+from cns_drake.city.geometry.polygon_meshes import (
     HeightMap,
+    surface_mesh,
+    wall_mesh,
+)
+from cns_drake.city.geometry.polygons import (
     hull_of,
     placed,
     polygons_of,
     snap,
-    surface_mesh,
     tiles,
-    wall_mesh,
 )
 from cns_drake.city.geometry.structures import (
     BoxShape,
