@@ -39,7 +39,12 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scene import map_folder
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.map_folder import MapFolder, stage_name
-from cns_drake.scene.materials import OF_CLASSES, as_cell, as_word, from_cell
+from cns_drake.scene.material_cells import (
+    material_word,
+    read_materials,
+    write_materials,
+)
+from cns_drake.scene.materials import USUAL_MATERIALS
 from cns_drake.scene.semantics import CLASS_IDS
 
 HISTORY_NAME = "history.csv"
@@ -288,7 +293,7 @@ class _Writing:
                     "label": CLASS_IDS[one.semantic_class],
                     **{"x": x, "y": y, "z": z, "yaw": f"{one.yaw:.5f}"},
                     "tags": " ".join(one.tags),
-                    "material": as_cell(
+                    "material": write_materials(
                         one.semantic_class,
                         self._materials[one.name] | one.materials,
                     ),
@@ -304,11 +309,11 @@ class _Writing:
     def _cell_of_old(self, row: Mapping[str, str]) -> str:
         """Returns the materials of a structure of today, with its new parts."""
         cell = row.get("material", "")
-        known = from_cell(cell)
-        usual = known.get("", OF_CLASSES[row["class"]])
+        known = read_materials(cell)
+        usual = known.get("", USUAL_MATERIALS[row["class"]])
         new = self._materials.get(row["name"], {})
         words = [
-            as_word(part, material)
+            material_word(part, material)
             for part, material in new.items()
             if part not in known and material != usual
         ]

@@ -8,11 +8,8 @@ and plates follow from the minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at
 30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
 """
 
-from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
-from urllib.parse import quote, unquote
 
 from pydantic import BaseModel
 
@@ -44,55 +41,4 @@ MATERIALS = {
     for name, fields in _TABLE["materials"].items()
 }
 # Semantic class -> name of the material of parts that have no other one.
-OF_CLASSES: dict[str, str] = _TABLE["of_classes"]
-
-
-def as_cell(semantic_class: str, parts: Mapping[str, str]) -> str:
-    """Returns the cell `material` of a structure's row in the structure table.
-
-    The cell is a list of words. The first word is the material of most parts,
-    and is left out if this is the usual material of the class. For each part
-    with another material, a word `part=material` follows. `from_cell` reads the
-    cell.
-
-    Args:
-        semantic_class: class of the structure.
-        parts: name of a part -> name of its material.
-    """
-    usual = OF_CLASSES[semantic_class]
-    (most, _), *_ = Counter(parts.values()).most_common(1) or [(usual, 0)]
-    words = [most] if most != usual else []
-    words += [as_word(p, m) for p, m in parts.items() if m != most]
-    return " ".join(words)
-
-
-def as_word(part: str, material: str) -> str:
-    """Returns the word `part=material` for a cell `material`.
-
-    Spaces and other special characters of the part's name are percent-encoded.
-    """
-    return f"{quote(part)}={material}"
-
-
-def from_cell(text: str) -> dict[str, str]:
-    """Reads the cell `material` of a row in the structure table.
-
-    Returns:
-        Name of a part -> name of its material. An empty name stands for all
-        parts that are not named.
-
-    Raises:
-        ValueError: a word names no known material, or a part has two materials.
-    """
-    found: dict[str, str] = {}
-    for word in text.split():
-        name, _, material = word.rpartition("=")
-        part = unquote(name)
-        if material not in MATERIALS:
-            raise ValueError(
-                f"{material!r} is none of {', '.join(sorted(MATERIALS))}"
-            )
-        if part in found:
-            raise ValueError(f"{word!r}: a second material")
-        found[part] = material
-    return found
+USUAL_MATERIALS: dict[str, str] = _TABLE["of_classes"]

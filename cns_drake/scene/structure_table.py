@@ -13,12 +13,8 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.number_text import to_number, whole_number
 from cns_drake.scene.labels import MAX_INSTANCE, Labels
-from cns_drake.scene.materials import (
-    MATERIALS,
-    OF_CLASSES,
-    Material,
-    from_cell,
-)
+from cns_drake.scene.material_cells import read_materials
+from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS, Material
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
 
 
@@ -72,7 +68,7 @@ class StructureEntry:
 
     def material(self, part: str) -> Material:
         """Returns the material of one of the structure's parts."""
-        usual = self.materials.get("", OF_CLASSES[self.semantic_class])
+        usual = self.materials.get("", USUAL_MATERIALS[self.semantic_class])
         return MATERIALS[self.materials.get(part, usual)]
 
 
@@ -163,7 +159,7 @@ def load_structure_table(path: Path) -> StructureTable:
             raise InputError(f"{where}: name: '{name}' is not a new name")
         instances.add(instance)
         try:
-            materials = from_cell(row.get("material", ""))
+            materials = read_materials(row.get("material", ""))
         except ValueError as error:
             raise InputError(f"{where}: material: {error}") from None
         entries[name] = StructureEntry(

@@ -35,7 +35,7 @@ from cns_drake.scene.map_folder import (
     STRUCTURES_NAME,
     stage_name,
 )
-from cns_drake.scene.materials import as_cell
+from cns_drake.scene.material_cells import write_materials
 from cns_drake.scene.semantics import CLASS_IDS, CLASS_RGB
 
 # A structure that has moved farther than this counts as a new one [m].
@@ -387,8 +387,8 @@ def structure_table(
 
     The columns are instance id (from 1), name, class, label (number of the
     class), position in W [m], yaw [rad], tags, and the materials of the parts
-    (see `cns_drake.scene.materials`). If the name of a structure does not state
-    its kind, the table has a last column `kind`.
+    (see `cns_drake.scene.material_cells`). If the name of a structure does not
+    state its kind, the table has a last column `kind`.
 
     Args:
         structures: the structures.
@@ -415,7 +415,9 @@ def structure_table(
             *(f"{value:.3f}" for value in one.xyz),
             f"{one.yaw:.5f}",
             " ".join(one.tags),
-            as_cell(one.semantic_class, materials[one.name] | one.materials),
+            write_materials(
+                one.semantic_class, materials[one.name] | one.materials
+            ),
             *([one.kind_cell] if with_kinds else []),
         ]
         for instance, one in enumerate(structures, start=1)

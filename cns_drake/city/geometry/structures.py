@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.mesh import Mesh, box_mesh
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
-from cns_drake.scene.materials import MATERIALS, OF_CLASSES
+from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS
 from cns_drake.scene.structure_table import kind_in_name
 
 
@@ -171,7 +171,7 @@ class Structure:
     @property
     def materials(self) -> dict[str, str]:
         """Name of each part -> name of its material."""
-        usual = OF_CLASSES[self.semantic_class]
+        usual = USUAL_MATERIALS[self.semantic_class]
         return {part.name: part.material or usual for part in self.model.parts}
 
     @property

@@ -11,12 +11,7 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.scene.materials import (
-    MATERIALS,
-    OF_CLASSES,
-    as_cell,
-    from_cell,
-)
+from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureEntry
 
@@ -28,8 +23,8 @@ def built(name, seed=0):
 
 
 def test_every_class_has_a_material_and_every_material_a_range():
-    assert OF_CLASSES.keys() == CLASS_IDS.keys()
-    assert set(OF_CLASSES.values()) <= MATERIALS.keys()
+    assert USUAL_MATERIALS.keys() == CLASS_IDS.keys()
+    assert set(USUAL_MATERIALS.values()) <= MATERIALS.keys()
     for one in MATERIALS.values():
         dark, bright = one.reflectivity
         assert 0.0 < dark <= bright
@@ -38,50 +33,8 @@ def test_every_class_has_a_material_and_every_material_a_range():
         assert (one.leaf_area_density > 0.0) == (one.kind == "leaves")
 
 
-@pytest.mark.parametrize(
-    ("semantic_class", "parts", "cell"),
-    [
-        ("building", {"wall": "plaster", "roof": "plaster"}, ""),
-        ("building", {"wall": "brick", "roof": "brick"}, "brick"),
-        (
-            "building",
-            {"wall": "brick", "roof": "brick", "pane": "glass"},
-            "brick pane=glass",
-        ),
-        (
-            "building",
-            {"pane_1": "glass", "pane_2": "glass", "wall": "plaster"},
-            "glass wall=plaster",
-        ),
-        ("vegetation", {"crown": "leaves", "wood": "bark"}, "wood=bark"),
-        ("terrain", {}, ""),
-        ("pole", {"a b=c/1": "sheet", "d": "metal"}, "sheet d=metal"),
-        ("pole", {"d": "metal", "a b": "sheet"}, "a%20b=sheet"),
-    ],
-)
-def test_a_cell_has_the_materials_of_all_parts(semantic_class, parts, cell):
-    assert as_cell(semantic_class, parts) == cell
-    entry = StructureEntry(1, "one", semantic_class, materials=from_cell(cell))
-    for part, material in parts.items():
-        assert entry.material(part) is MATERIALS[material]
-
-
-@pytest.mark.parametrize(
-    ("cell", "fault"),
-    [
-        ("gold", "'gold' is none of asphalt,"),
-        ("wall=", "'' is none of"),
-        ("wall=brick wall=glass", "'wall=glass': a second material"),
-        ("brick plaster", "'plaster': a second material"),
-    ],
-)
-def test_wrong_cells_are_refused(cell, fault):
-    with pytest.raises(ValueError, match=fault):
-        from_cell(cell)
-
-
 def test_a_structure_without_materials_has_those_of_its_class():
-    for name, usual in OF_CLASSES.items():
+    for name, usual in USUAL_MATERIALS.items():
         entry = StructureEntry(1, "a_glass", name)
         assert entry.material("glass") is MATERIALS[usual]
 
