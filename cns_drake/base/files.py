@@ -212,7 +212,7 @@ def file_name(text: str) -> str:
     """Turns a text into a file name that cannot lead to another folder.
 
     Use this function for the names of the drive, map and stage in a recording
-    before these names become parts of paths. Usual names stay as they are. In
+    before these names become parts of paths. Usual names stay unchanged. In
     unusual names, unsafe characters are replaced such that different names stay
     different.
     """
@@ -315,7 +315,7 @@ def write_text(path: Path, text: str) -> None:
 def check_writable(path: Path) -> None:
     """Checks before a long run that a file can be written after the run.
 
-    Creates the folder if need be and leaves nothing else behind.
+    Creates the folder of the file if necessary, and leaves nothing else behind.
 
     Raises:
         InputError: if the file could not be written.

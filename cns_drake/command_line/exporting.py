@@ -170,8 +170,8 @@ def export(
             default, the stretch begins where the road ahead is straightest.
         traffic: Number of moving vehicles in the film. The same number of
             pedestrians is added. By default the traffic of the scenario; if the
-            scenario has none, up to 60 vehicles, as many as the streets have
-            room for.
+            scenario has no traffic, up to 60 vehicles, as many as the streets
+            have room for.
     """
     values: dict[str, Any] = {
         "lidar": lidar,

@@ -48,7 +48,7 @@ def export_drive(
         format_name: name of the format: `cns`, `kitti`, `mulran` or `tum`.
         output: the folder of drives: a new or empty folder, or a folder to
             which this function has already written drives of the same format.
-        lidar: name of the LiDAR to export, if the recording has several.
+        lidar: name of the LiDAR to export, if the recording has several LiDARs.
         absent_in: another stage of the recording's map. Points on structures
             that are absent in this other stage get SemanticKITTI's labels of
             moving objects (see `cns_drake.export.marked_drive.MarkedDrive`).

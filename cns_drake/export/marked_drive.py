@@ -21,10 +21,10 @@ class MarkedDrive(McapDrive):
     """A recording that marks points on structures absent in another stage.
 
     A structure is absent if the world of the other stage contains no part of
-    it. A building that is only lower in the other stage is not absent. Points
-    on absent structures get SemanticKITTI's labels of moving objects, and all
-    other labels are as recorded. In the structure table, absent structures get
-    `"absent_in": <stage>`.
+    the structure. A building that is only lower in the other stage is not
+    absent. Points on absent structures get SemanticKITTI's labels of moving
+    objects, and all other labels are as recorded. In the structure table,
+    absent structures get `"absent_in": <stage>`.
     """
 
     def __init__(self, path: Path, lidar: str | None, stage: str):

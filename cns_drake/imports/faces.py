@@ -285,9 +285,9 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields blocks of points (N, 3) that cover triangles (M, 3, 3) [m].
 
-    Every place on a triangle, up to its edges, is at most `spacing` [m] from
-    one of the points. `window` contains the least and the greatest x and y,
-    (2,) each; points outside of these limits are left out.
+    Every place on a triangle, including its edges, is at most `spacing` [m]
+    from one of the points. `window` contains the least and the greatest x and
+    y, (2,) each; points outside of these limits are left out.
     """
     while len(triangles):
         if window is not None:

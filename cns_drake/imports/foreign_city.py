@@ -127,8 +127,7 @@ class Street:
 
     Attributes:
         line: (N, 2) middle of the street, from start to end [m].
-        nodes: a node for each point of `line`; streets with a common node meet
-            there.
+        nodes: a node for each point of `line`; streets meet at common nodes.
         forward: whether cars drive in the direction of `line`.
         backward: whether cars drive against this direction.
         aside: lateral offset of the outermost lane from the middle [m].

@@ -59,7 +59,7 @@ class BackgroundWriter:
 
         Args:
             message: arguments for the function `write` that was given to the
-                constructor, such as those of `BagWriter.write`.
+                constructor, such as the arguments of `BagWriter.write`.
 
         Raises:
             Exception: the error that occurred while an earlier message was

@@ -50,7 +50,7 @@ class Losses(Section):
         towards: another stage of the map, usually an earlier stage. Only
             structures that do not exist in that stage are removed. A structure
             that exists in that stage does not change, even if it has another
-            height there.
+            height in that stage.
     """
 
     missing: _Part = 0.0

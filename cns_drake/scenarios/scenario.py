@@ -277,8 +277,8 @@ class TransientConfig(Section):
             objects are the same in every drive.
         height_limit: greatest height of buildings and plants above their lowest
             point [m]. Buildings that exceed this height by at least 2.5 m (a
-            storey) are cut off there, and get a flat roof; plants that exceed
-            it are scaled down. By default no limit.
+            storey) are cut off at this height, and get a flat roof; plants that
+            exceed this height are scaled down. By default no limit.
     """
 
     seed: int = Field(default=1, ge=0)

@@ -150,7 +150,7 @@ def _find_base(
 def find_files(values: dict, path: Path) -> None:
     """Makes the paths in a scenario's fields absolute, in place.
 
-    Names of shipped maps stay as they are.
+    Names of shipped maps stay unchanged.
 
     Args:
         values: the fields, which are changed.

@@ -49,8 +49,8 @@ class ForeignMeshes:
             no triangles if the file is not a mesh.
 
         Raises:
-            ValueError: if Open3D crashes on the file, reads only a part of it,
-                or cannot be loaded.
+            ValueError: if Open3D crashes on the file, reads only a part of the
+                file, or cannot be loaded.
         """
         if self._process is None:
             self._process = subprocess.Popen(

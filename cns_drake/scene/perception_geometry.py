@@ -55,7 +55,7 @@ class PerceptionGeometry:
         frame_id: the frame F to which the geometry is fixed.
         X_FG: pose of the geometry G in F.
         surface: shape of the geometry, in G.
-        rgb: diffuse colour; None if the model has none.
+        rgb: diffuse colour; None if the model has no colour.
         reflectivity: the property ("lidar", "reflectivity"), from 0 to 1; None
             if the geometry does not have it.
     """
@@ -175,7 +175,7 @@ class GeometryRecord(NamedTuple):
         X_FG: pose of the geometry G in F.
         shape: the shape.
         is_deformable: whether the geometry is deformable.
-        rgb: diffuse colour; None if the geometry has none.
+        rgb: diffuse colour; None if the geometry has no colour.
         reflectivity: the property ("lidar", "reflectivity"); None if the
             geometry does not have it.
     """

@@ -18,7 +18,7 @@ def sensor_pose(mount: Mount) -> RigidTransform:
 def body_and_pose(
     place: RigidBody | Frame, X_PS: RigidTransform
 ) -> tuple[RigidBody, RigidTransform]:
-    """Returns the body that carries a sensor, and the sensor's pose on it.
+    """Returns the body that carries a sensor, and the pose on this body.
 
     Args:
         place: the carrier P: a body of a finalized plant, or a frame that is
@@ -62,8 +62,8 @@ def connect_motion(
         motion: system with the kinematic output ports of a MultibodyPlant, such
             as `body_poses`; None for the plant itself.
         body: any body of the plant; not used if `motion` is given.
-        inputs: name of an output port of `motion` -> the input port that is
-            connected to it.
+        inputs: name of an output port of `motion` -> the input port to connect
+            to this output port.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -8,8 +8,8 @@ Rays that are cast in the worlds of both drives determine the labels.
     behind the surface along the line of sight. At grazing angles, the point
     must lie farther behind the surface, so that a wall that has moved a little
     does not occlude its old position.
-- A surface is **there** if it passes within `NEAR` of the point, measured
-  perpendicular to the surface. Moving objects do not count.
+- A surface is **there** if the surface passes within `NEAR` of the point,
+  measured perpendicular to the surface. Moving objects do not count.
 
 A point of the older map A is `kept` if B's drive observes it and a surface of
 B's world is there, `gone` if B's drive observes it and no surface is there, and

@@ -138,7 +138,8 @@ def export_pairs(
 
     Raises:
         InputError: there is no drive to learn from, two drives have the same
-            name, or drives cannot be simulated; the error names all of these.
+            name, or drives cannot be simulated; the error names all drives that
+            cannot be simulated.
     """
     if not scenarios:
         raise InputError("export: no drive to learn from")

@@ -53,7 +53,7 @@ def record_all(
 
     Raises:
         InputError: scenarios could not be recorded (the error names all of
-            them), or the folder cannot be made.
+            these scenarios), or the folder cannot be made.
     """
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)

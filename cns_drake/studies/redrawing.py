@@ -74,7 +74,7 @@ def redraw_cities(
     Raises:
         InputError: the map cannot be used, another file or folder has the name
             of a city, or cities could not be generated; the error names all of
-            them.
+            these cities.
     """
     map_folder, output = map_folder.resolve(), output.resolve()
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
@@ -159,7 +159,7 @@ def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
 
     Raises:
         InputError: another file or folder has the name of a map, or maps could
-            not be made; the error names all of them.
+            not be made; the error names all of these maps.
     """
     # Quick checks come before all slow work.
     for step in steps:

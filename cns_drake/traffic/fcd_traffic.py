@@ -67,7 +67,7 @@ class TracedObject:
 
     Attributes:
         name: id of the object.
-        type_name: type of the object; "" if the trace has none.
+        type_name: type of the object; "" if the trace has no types.
         steps: (M,) numbers of the time steps at which the object exists,
             ascending.
         xy: (M, 2) position of a vehicle's front, or of a person's middle [m].

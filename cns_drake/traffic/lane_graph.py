@@ -23,7 +23,8 @@ class Piece:
         points: (N, 3) points along the middle of the piece, in driving
             direction, evenly spaced [m].
         limit: speed limit [m/s].
-        is_way: whether the piece is a way; otherwise it is part of a lane.
+        is_way: whether the piece is a way; otherwise the piece is part of a
+            lane.
         after: numbers of the pieces that can follow this piece.
         left, right: numbers of the neighbouring lanes with the same direction;
             -1 for none.

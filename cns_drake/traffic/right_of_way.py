@@ -4,8 +4,9 @@ A vehicle may enter its path ("way") through a junction under three conditions.
 Vehicles on conflicting ways will have passed when the vehicle gets there. The
 lane after the junction has room for the vehicle. The signal is green or,
 without a signal, the vehicle has stopped at the line. If a vehicle with the
-right of way is slower than expected, later vehicles wait for it on their ways.
-Earlier vehicles never wait for later vehicles, so no vehicle waits forever.
+right of way is slower than expected, later vehicles wait on their ways for this
+vehicle. Earlier vehicles never wait for later vehicles, so no vehicle waits
+forever.
 """
 
 from typing import Any

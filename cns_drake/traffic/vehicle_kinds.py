@@ -18,7 +18,7 @@ class VehicleKind:
     microscopic simulations", Phys. Rev. E 62 (2000).
 
     Attributes:
-        name: name of the kind; the names of its meshes begin with it.
+        name: name of the kind, with which the names of the kind's meshes begin.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         share: weight in the random choice of kinds.
         size: length, width and height of the vehicle's box, mirrors and rider

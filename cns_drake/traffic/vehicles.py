@@ -397,8 +397,7 @@ def find_ahead(
     piece, the gap is infinite and the speed 0.
 
     Args:
-        traffic: the vehicles, listed by the pieces of the lane graph on which
-            they are.
+        traffic: the vehicles, listed by pieces of the lane graph.
         piece: number of the piece of the lane graph.
         s: distance of the front bumper along the piece [m].
         who: number of the vehicle for which the gap is computed.

@@ -336,7 +336,7 @@ _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
 def put_up_works(around: Surroundings, share: float) -> None:
     """Puts up roadworks along a share of the kerbs near a drive.
 
-    Kerbs without free space next to them get no roadworks.
+    Kerbs without free space get no roadworks.
 
     Args:
         around: surroundings of the drive, which are changed.

@@ -231,8 +231,8 @@ class SceneEditing:
     ) -> None:
         """Changes a structure by the difference between two models.
 
-        Parts that both models contain stay as they are. A changed part keeps
-        its colour and its material.
+        Parts that both models contain stay unchanged. A changed part keeps its
+        colour and its material.
 
         Args:
             thing: the structure.

@@ -160,7 +160,7 @@ def in_one_world(
     hold_first: bool = False,
     across_maps: bool = False,
 ) -> Alignment | None:
-    """Aligns two drives, so that both are in one world, if `when` asks for it.
+    """Aligns two drives, so that both are in one world, if `when` allows it.
 
     Args:
         first, second: the drives.

@@ -143,8 +143,8 @@ def trajectory_errors(
 
     Raises:
         InputError: if the estimate is of the vehicle but the drive has no poses
-            of it, or if fewer than three of the estimate's times lie within the
-            drive.
+            of the vehicle, or if fewer than three of the estimate's times lie
+            within the drive.
     """
     truth = _true_poses(drive, frame)
     if not abs(time_offset) <= 1e9:

@@ -1,8 +1,8 @@
 """The structural change between two drives, with its context.
 
 TCR_sym is reported with two more values. The control is the TCR_sym that the
-different routes alone cause. The coverage-masked value counts only the parts of
-the city that both routes saw.
+different routes cause without any change. The coverage-masked value counts only
+the parts of the city that both routes saw.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def maps_in_one_world(
             world.
         when: whether all other drives are aligned with the first one: `auto`
             (if their world frames differ), `always` or `never`.
-        lidar: name of the LiDAR, for recordings with several.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
 
@@ -283,8 +283,8 @@ def same_stage_partner(
     This is the drive whose route the control does not follow.
 
     Raises:
-        InputError: one of them is no drive, they are not in one world, or the
-            control follows neither route.
+        InputError: one of the three is not a drive, the drives are not in one
+            world, or the control follows neither route.
     """
     if (
         source.drive is None

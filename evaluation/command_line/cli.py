@@ -90,7 +90,7 @@ def tcr(
 
     A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
     odometry, CNS) or maps (.pcd .ply .npy .bin). The main result, TCR_sym, is 0
-    if nothing changed and 1 if everything did. The command also prints two
+    if nothing changed and 1 if everything changed. The command also prints two
     directed ratios: the share of A that is missing in B, and the share of B
     that is missing in A. Drives in different world frames are aligned first.
 
@@ -438,11 +438,11 @@ def compare(
     means over the conditions that all tables share.
 
     From four maps on, each mean has a 95 % t interval over maps. With one map,
-    the interval is over conditions, if there are at least four of them. If each
-    table has a queries.csv next to it, the command also prints the difference
-    in AUC between any two methods, with a p-value that is corrected for the
-    number of differences by Holm's method. With --rankings, the command prints
-    Kendall's tau between the rankings of any two tables.
+    the interval is over conditions, if there are at least four conditions. If
+    each table has a queries.csv next to it, the command also prints the
+    difference in AUC between any two methods, with a p-value that is corrected
+    for the number of differences by Holm's method. With --rankings, the command
+    prints Kendall's tau between the rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.

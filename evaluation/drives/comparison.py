@@ -72,7 +72,7 @@ class DriveComparison:
     Attributes:
         first, second: how A and B were driven.
         num_stops: number of stations of A.
-        num_met: number of these stations that B meets.
+        num_met: number of stations that B meets.
         reverse: share of the met stations that B meets only in the opposite
             direction.
         offset_50, offset_75, offset_90, offset_95, offset_99: quantiles of the

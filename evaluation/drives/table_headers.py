@@ -1,7 +1,8 @@
 """The columns of a table of poses, from the names in its header.
 
 Programs write quaternions with w first or last, and Euler angles in several
-orders. Numbers alone do not show which, so a header is not only skipped.
+orders. Numbers do not show the order of the columns, so a header is read and
+not skipped.
 """
 
 from collections.abc import Sequence

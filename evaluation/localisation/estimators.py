@@ -91,7 +91,7 @@ class Settings:
     def with_values(
         self, values: Iterable[tuple[str, Any]], method: str
     ) -> "Settings":
-        """Returns the settings with other values of some of them.
+        """Returns the settings with new values for some settings.
 
         Args:
             values: pairs of a name and its value, a number or text.
@@ -239,7 +239,7 @@ def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
 
 
 def map_frames(drive: Drive) -> np.ndarray:
-    """Returns the frames (K,) of a drive of which a map is made.
+    """Returns the frames (K,) of a drive that are used for its map.
 
     If the drive consists of several drives, frames that these drives do not
     keep in the map are left out.

@@ -7,11 +7,11 @@ McClure); k falls with the search width, the greatest distance of a pair.
 
 Width and kernel follow KISS-ICP (Vizzo et al., RA-L 2023): the search width is
 3 s and k is s / 3, where s is how far the last alignment moved the scan from
-its initial pose. A rotation counts as the distance by which it moves a point at
-the greatest range. KISS-ICP takes s from the previous scans, but here a scan is
-localised by itself. The scan is therefore aligned repeatedly, each time from
-the previous result and with at most half of the previous width, until the least
-width is reached.
+its initial pose. A rotation counts as the distance by which the rotation moves
+a point at the greatest range. KISS-ICP takes s from the previous scans, but
+here a scan is localised by itself. The scan is therefore aligned repeatedly,
+each time from the previous result and with at most half of the previous width,
+until the least width is reached.
 """
 
 import math

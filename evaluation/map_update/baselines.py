@@ -8,13 +8,14 @@ otherwise it is gone or new. No point is unobserved.
   otherwise kept. It is unobserved if a map lacks the points to measure.
 - `free-space`: cells of 0.2 m are compared with each scan of the other drive.
   The three returns nearest to the direction of a cell define a surface. A scan
-  sees past the cell if this surface lies behind it, or if there is no return
-  although the LiDAR looks there. A scan shows the cell if the surface passes
-  through it. The first rule that applies gives the label: kept if the other map
-  has a point near the cell; gone or new if a scan sees past it; kept if enough
-  scans show it; otherwise unobserved. Where more than a fifth of the labelled
-  points in a cube of 1 m are gone or new, the kept points there are relabelled
-  as well, except points with a point of the other map within 0.12 m.
+  sees past the cell if this surface lies behind the cell, or if there is no
+  return although the LiDAR looks in this direction. A scan shows the cell if
+  the surface passes through it. The first rule that applies gives the label:
+  kept if the other map has a point near the cell; gone or new if a scan sees
+  past it; kept if enough scans show it; otherwise unobserved. Where more than a
+  fifth of the labelled points in a cube of 1 m are gone or new, the kept points
+  there are relabelled as well, except points with a point of the other map
+  within 0.12 m.
 """
 
 from collections.abc import Callable

@@ -10,9 +10,10 @@ class Label(IntEnum):
     """What happened to a point of a map: kept, gone, new or not observed.
 
     Points of the older map A are kept (1), gone (2) or unobserved (0: the drive
-    of B did not look there). Points of the newer map B are kept (1), new (3) or
-    newly seen (4: the drive of A did not look there). IGNORED (255) occurs only
-    in ground-truth labels of your own; scores leave out such points.
+    of B did not look at the point). Points of the newer map B are kept (1), new
+    (3) or newly seen (4: the drive of A did not look at the point). IGNORED
+    (255) occurs only in ground-truth labels of your own; scores leave out such
+    points.
     """
 
     UNOBSERVED = 0

@@ -24,7 +24,8 @@ class StructureChange:
         semantic_class: name of the structure's class; empty if unknown.
         label: number of the structure's class.
         points: number of the structure's points in the map.
-        observed: number of these points that the other drive observed.
+        observed: number of the structure's points that the other drive
+            observed.
         changed: number of the observed points that are gone (A) or new (B).
         verdict: gone (A) or new (B) if most of the observed points are gone or
             new, else kept. Without an observed point: unobserved (A) or

@@ -5,10 +5,10 @@ change detector labels the points of A and of the map of B (see
 `evaluation.map_update.baselines`). Points that are gone are removed from A, and
 the points of B are added.
 
-The scan of a place of an older drive becomes what the updated map shows from
-there: the scan without the points that are gone, and with all new points that
-are not occluded. The maps for localisation and the places for recognition
-therefore come from one map.
+The scan at a place of an older drive is replaced by a scan of the updated map
+from the same place: the old scan without the points that are gone, and with all
+new points that are not occluded. The maps for localisation and the places for
+recognition therefore come from one map.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ class Updates:
     """Changes that later drives made to the maps of several drives.
 
     Attributes:
-        corner: (3,) number of the cube of the map's corner along x, y and z.
+        corner: (3,) numbers along x, y and z of the cube at the map's corner.
         gone: (G,) int64 numbers of the cubes whose points are gone, ascending.
-        added: for each drive, the points (N, 3) in W that it added to the map
-            and that are still there [m].
+        added: for each drive, the points (N, 3) in W that the drive added to
+            the map, without those that were removed later [m].
     """
 
     corner: np.ndarray

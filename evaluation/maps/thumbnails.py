@@ -29,7 +29,7 @@ def thumbnail(
         the ground in steps of 0.1 m, at most 25.5 m. Cell numbers along x and y
         begin at 0; cell 128 begins at the sensor, so that greater numbers lie
         in front of the sensor (x) or to its left (y). The order is random, so
-        that the first points alone show the whole scan, downsampled.
+        that the first points of the array are a downsampled scan.
     """
     x, y = np.floor(points[:, :2].T / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height

@@ -232,7 +232,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     def score_best(
         self, query: Descriptor, database: Database, number: int
     ) -> np.ndarray:
-        """Returns the scores of a part of a database, as `score` does.
+        """Returns the scores of a part of a database, like `score`.
 
         Args:
             query: see `score`.

@@ -311,9 +311,9 @@ def climb(
     """Returns the pose at which a query overlaps a place most.
 
     A filled cell of the query overlaps the place if the place has a filled cell
-    there, or next to it, in the same layer. The search is hill climbing: it
-    moves to the best of the 26 neighbours of a pose until no neighbour is
-    better than the pose, then continues with smaller steps.
+    at the same or an adjacent position in the same layer. The search is hill
+    climbing: it moves to the best of the 26 neighbours of a pose until no
+    neighbour is better than the pose, then continues with smaller steps.
 
     Args:
         cells: (M,) uint16 of the query, see `layer_cells`.

@@ -53,6 +53,6 @@ def coarser(cells: np.ndarray, step: int) -> np.ndarray:
         cells: (N, 3) int64 cells of the finer grid, each given by its lower
             corner.
         step: side of a coarser cell; the corners of these cells are multiples
-            of it.
+            of `step`.
     """
     return np.unique(cells // step * step, axis=0)

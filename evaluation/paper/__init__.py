@@ -1,8 +1,8 @@
 """The paper "The City that Never Settles", as reference for the cities.
 
 This package contains the paper's values, pairs of drives and claims, and
-compares the shipped cities with them. Commands pass their maps to
-`reference_for`; the rest of the evaluation does not need this package.
+compares the shipped cities with these values. Commands pass their maps to
+`reference_for`; no other part of the evaluation needs this package.
 """
 
 from evaluation.paper.paper_reference import reference_for

@@ -34,7 +34,7 @@ _APART = 1000.0
 
 
 class DataSet(NamedTuple):
-    """A public data set, or one LiDAR of it.
+    """A public data set, or one LiDAR of a public data set.
 
     Attributes:
         folder: name of the data set's folder.
@@ -42,7 +42,7 @@ class DataSet(NamedTuple):
         world: name of the place, which several data sets can share.
         unit: name of the LiDAR's unit.
         height: height of the LiDAR above the ground [m].
-        origin: repository of the data set, and the path in it.
+        origin: repository of the data set, and path in this repository.
         licence: terms of use.
         digest: SHA-256 of all scans, concatenated in the order of their names.
         poses: where the poses are: `drive` for a folder that

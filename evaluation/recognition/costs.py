@@ -119,9 +119,9 @@ def query_ms(
 
     A query is compared with all places, including the second stage of a method
     with two stages. The time does not include geometric verification and the
-    pose of the top-ranked place, because not every method has a pose, and the
-    time for it does not depend on the number of places. The first query does
-    not count.
+    pose of the top-ranked place, because not every method estimates a pose, and
+    the time to do so does not depend on the number of places. The first query
+    does not count.
 
     Args:
         method: method to measure.

@@ -10,8 +10,8 @@ of each query counts:
 
 A rejected query without a match is neither TP, FP nor FN. A query without a
 candidate is never accepted. In mode `all` every query counts; in mode
-`filtered` only queries that have a match (there, the greatest F1 follows from
-R@1).
+`filtered` only queries that have a match (in this mode, the greatest F1 follows
+from R@1).
 
 A query with a match and a wrong top-ranked place is FN while it is rejected,
 and FP once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for
@@ -484,7 +484,7 @@ class PlaceRecognitionMetrics:
 
     Attributes:
         mode: which queries the precision-recall curve counts: `all`, or only
-            those with a match (`filtered`).
+            queries with a match (`filtered`).
         curve: exact precision-recall curve.
         auc: area under the curve.
         auc_strict: area under the curve with recall = TP / N at each of its
@@ -556,7 +556,7 @@ def evaluate(
     Args:
         outcomes: outcome of each query.
         mode: which queries the precision-recall curve counts: `all`, or only
-            those with a match (`filtered`).
+            queries with a match (`filtered`).
         seed: seed of the bootstrap.
 
     Example:

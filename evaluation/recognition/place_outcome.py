@@ -52,7 +52,7 @@ _HALF = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PlaceOutcome:
-    """The answers of a method to the queries of a drive, and which are right.
+    """A method's answers to the queries of a drive, and whether they are right.
 
     All numbers, tables and pages of place recognition are made from objects of
     this class. An object holds the top-ranked places of each query instead of
@@ -236,7 +236,7 @@ class PlaceOutcome:
         """Returns all numbers as a dictionary for JSON; NaN becomes None.
 
         Args:
-            mode: which queries count: `all`, or only those with a match
+            mode: which queries count: `all`, or only queries with a match
                 (`filtered`).
         """
         metrics = self.by_mode[mode]

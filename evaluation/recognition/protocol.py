@@ -62,8 +62,8 @@ class RetrievalProtocol:
             beyond the radius according to the method's own pose estimate.
         turn_queries: whether each query is rotated by a random yaw. Places stay
             as recorded.
-        tilt_queries: largest random roll and pitch by which each query is
-            tilted, from 0 to 90 [deg].
+        tilt_queries: largest random roll and pitch of the tilt of each query,
+            from 0 to 90 [deg].
         hide_sector: angle of a random sector that is occluded in each query,
             from 0 to below 360 [deg].
         seed: seed of the random yaws, tilts and occluded sectors.

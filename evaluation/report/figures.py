@@ -146,8 +146,8 @@ def judge_points(
 
     Returns:
         (N,) bool, whether a point lacks a counterpart in the other map; and
-        (N,) bool, whether it is in the other map's convex hull and therefore
-        counts.
+        (N,) bool, whether a point is in the other map's convex hull and
+        therefore counts.
     """
     # A distance beyond the bound only counts as far away, so the search stops
     # there.
@@ -213,8 +213,8 @@ def draw_change(
     The first figure shows both maps. Points without a counterpart in the other
     map are red; they are pale red outside the other map's convex hull, where
     the change ratio (TCR) does not count them, because the other drive may not
-    have passed there. The second figure shows the sets of points from which TCR
-    is computed: points in the other map's hull, and unchanged points.
+    have passed these points. The second figure shows the sets of points from
+    which TCR is computed: points in the other map's hull, and unchanged points.
 
     Args:
         result: the change between the stages.

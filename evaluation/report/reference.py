@@ -151,7 +151,7 @@ class Reference:
                 (`filtered`).
 
         Returns:
-            The numbers; None if the source has none in this mode, or used
+            The numbers; None if the source has no numbers in this mode, or used
             another protocol than `result`.
         """
         if not self._ran(result):

@@ -97,7 +97,7 @@ def change_table(
         results: change of each pair.
         reference: published results to put next to them.
         evidence: (database, query) -> evidence from scans, for the column with
-            the change that is visible from the query's route.
+            the visible change.
     """
 
     def visible(one: ChangeResult) -> tuple[float | None, ...]:

@@ -102,7 +102,7 @@ class Compared(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """How similarly two tables rank the methods that both of them name.
+    """How similarly two tables rank the methods that are in both tables.
 
     Attributes:
         first, second: names of the two tables.
@@ -199,9 +199,8 @@ def compare(
     """Compares tables of results with one another and the shipped tables.
 
     Args:
-        paths: tables of results, or folders with a `results.csv`. If a
-            `queries.csv` lies next to a table, its answers to queries are used,
-            too.
+        paths: tables of results, or folders with a `results.csv`. The answers
+            to queries in a `queries.csv` next to a table are used as well.
         metric: the metric to compare. If several tasks have it, the results of
             `place` are compared.
         protocol: name of the protocol whose rows count. By default, rows of the

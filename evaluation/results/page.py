@@ -67,7 +67,7 @@ def write_page(
 ) -> Path:
     """Writes an experiment's page, `index.html`, which needs no other file.
 
-    Next to it, the function writes the charts for print and, if there are
+    Next to the page, the function writes the charts for print and, if there are
     numbers behind the charts (see `evaluation.results.summaries.summarised`),
     `summaries.csv`.
 

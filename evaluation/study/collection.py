@@ -142,7 +142,7 @@ class MapDrives:
         """Returns the pairs (database, query) for place recognition.
 
         Each earlier stage is paired with the last stage as the query. If the
-        map has only two stages, each of them is the query once.
+        map has only two stages, each of the two stages is the query once.
 
         Args:
             with_itself: whether to add a pair of each stage with itself, for
@@ -206,7 +206,7 @@ def find_recordings(
         folder: the folder.
         on_note: is called with each note on how recordings are read or left
             out.
-        lidar: name of the LiDAR, for recordings with several.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
 

@@ -118,7 +118,7 @@ class DriveSummary:
 
 @dataclass(frozen=True)
 class KeptScans:
-    """A drive of which only the scans of places and queries are kept.
+    """A drive with only the scans of its places and queries.
 
     Attributes:
         name: name of the drive.
@@ -333,8 +333,8 @@ class FeatureExtraction(Step):
         with_map: whether to make a map; otherwise only the scans of places and
             queries are read.
         further: methods with descriptors by a second protocol, if any.
-        removes_descriptors: whether descriptors are removed once results were
-            made from them. Descriptors that new results need are computed
+        removes_descriptors: whether descriptors are removed when results have
+            been made from them. Descriptors that new results need are computed
             again.
     """
 

@@ -77,7 +77,7 @@ def shown_overlaps(
     Args:
         reporter: unused.
         scans: files with the scans of database and query: a `KeptScans`, or a
-            list of them.
+            list of scans.
         described: files with a method's descriptors of both, for the poses.
         choice: the method.
         protocol: protocol by which the queries are shown.
@@ -228,8 +228,8 @@ def measure_places(
         query: the drive of the queries, in the same world, like `database`.
         distractors: for each drive through another city, and for each method,
             the file with the method's descriptors of its places.
-        num_distractors: number of places of these drives that are added to the
-            database.
+        num_distractors: number of places of the drives in `distractors` that
+            are added to the database.
         methods: the methods.
         protocol: the protocol of the comparison; its field `radius` does not
             matter.
@@ -407,8 +407,8 @@ def with_distractors(
     appended, or all places if there are fewer.
 
     Args:
-        database: a drive, with a method's descriptors of its places, or the
-            file with it.
+        database: a drive with a method's descriptors of its places, or the file
+            that contains this drive.
         distractors: for each drive through another city, the file with the
             same method's descriptors of its places.
         num_others: number of places to append.

@@ -3,8 +3,8 @@
 A part is the file of one intermediate result. It begins with a line that names
 its format and a line of JSON with its inputs. The result follows (see
 `evaluation.study.value_encoding`), compressed by zstd at its fastest level.
-Compression halves maps. Spectra hardly shrink; compressing 50 MB of them takes
-a tenth of a second.
+Compression halves maps. Spectra hardly shrink; compressing 50 MB of spectra
+takes a tenth of a second.
 """
 
 from collections.abc import Callable, Iterator, Mapping

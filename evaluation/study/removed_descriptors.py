@@ -1,7 +1,7 @@
 """Removes descriptors that no result needs any more, and makes them again.
 
 Descriptors take three quarters of the space of a study, and are needed only
-until results were made from them.
+until results have been made from them.
 """
 
 from collections.abc import Collection, Iterable

@@ -537,7 +537,7 @@ def write_report(
         with_costs: whether times and memory of methods are measured.
         reference_for: function that returns published numbers for the maps of a
             report.
-        lidar: name of the LiDAR, for recordings with several.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
         with_tables: whether to write the wide tables, too.

@@ -208,7 +208,7 @@ class McapFile:
     stay in memory uncompressed, since messages are mostly read in order.
 
     If a topic has several channels, for example because several nodes publish
-    on it, their messages are read as one stream.
+    on the topic, the messages of all channels are read as one stream.
     """
 
     def __init__(self, path: Path):

@@ -174,7 +174,7 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     """Yields the readable records of an MCAP file, in the file's order.
 
     These records are the header, schemas, channels, messages, attachments and
-    metadata. The records inside chunks are yielded too, and indexes are left
+    metadata. The records inside chunks are yielded as well; indexes are left
     out. For each part that cannot be read, and for a missing end of the file, a
     Fault is yielded. The caller may seek in the stream between two records.
     """

@@ -306,7 +306,7 @@ class Assembly(Dice):
         count: int,
         finish: Finish | None = None,
     ) -> None:
-        """Adds a mesh, and places several copies of it above one another.
+        """Adds a mesh, and places several copies above one another.
 
         Args:
             part: beginning of the copies' names; the copies are named

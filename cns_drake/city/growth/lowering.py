@@ -183,7 +183,8 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     Courtyards are holes in the area. `edges` (N, 2, 2) contains start and end
     of the edges along which `cut_at` cuts the walls [m]; the area is on their
     left. Niches in the walls, and gaps between walls and objects in front of
-    them, count as enclosed. Coordinates of the area are whole millimetres.
+    these walls, count as enclosed. Coordinates of the area are whole
+    millimetres.
     """
     edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
     lines = shapely.linestrings(edges)

@@ -163,7 +163,7 @@ class Draft:
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places an object on the finished ground, if there is room for it.
+        """Places an object on the finished ground, if there is room.
 
         Returns the new structure, or None if there is no room or the ground is
         too steep. A number is used for the name even if the result is None, so

@@ -149,7 +149,7 @@ def place_car(
     rng: Generator,
     tags: tuple[str, ...],
 ) -> None:
-    """Places a parked car of a random kind, if there is room for it.
+    """Places a parked car of a random kind, if there is room.
 
     Args:
         draft: the city so far, to which the car is added.

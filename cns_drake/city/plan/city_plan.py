@@ -107,7 +107,7 @@ class RowPlan(_Model):
         fill: share of the lots that have a building.
         kind: first part of the buildings' names in the tables; by default the
             archetype.
-        within: corners of an area [m]. The row has buildings only there.
+        within: corners of an area [m]. The row has buildings only in this area.
     """
 
     setback: float = Field(default=2.0, ge=0)
@@ -171,7 +171,7 @@ class ScatterPlan(_Model):
         objects: names of objects, each with its weight in the random choice.
         spacing: smallest distance between two objects [m].
         fill: share of the possible places that get an object.
-        within: corners of an area [m]. The objects stand only there.
+        within: corners of an area [m]. The objects stand only in this area.
         clearance: smallest distance of the objects from buildings and streets
             [m].
         ground: kinds of ground on which the objects can stand.

@@ -139,7 +139,7 @@ class FacadePlan:
 
         The result contains (N + 1, 3) points in W, for N openings [m]; the last
         point belongs to the top. An opening, or the top, is occluded if the
-        point in front of it cannot be seen.
+        corresponding point cannot be seen.
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]

@@ -51,9 +51,9 @@ def beside_street(
 ) -> tuple[np.ndarray, float]:
     """Returns a place beside the nearest street, and a heading to the street.
 
-    A place on the carriageway, or close to it, is moved to 0.6 m from the edge
-    of the carriageway. Any other place stays. The heading is from the place to
-    the middle of the street [rad].
+    A place on or close to the carriageway is moved to 0.6 m from the edge of
+    the carriageway. Any other place stays. The heading is from the place to the
+    middle of the street [rad].
 
     Args:
         xy: (2,) the place in W [m].
@@ -82,7 +82,7 @@ def beside_street(
 def place_along(
     line: LineString, s: float, side: float, offset: float
 ) -> tuple[tuple[float, float], float]:
-    """Returns a place beside a line, and the heading of the line there [rad].
+    """Returns a place beside a line, and the heading of the line [rad].
 
     Args:
         line: the line in W [m].
@@ -183,7 +183,7 @@ class StreetThings:
 
 
 class StreetRoom:
-    """Places small objects in a city where there is room for them.
+    """Places small objects in a city where there is room.
 
     The objects are added to `found` (a `StreetThings`). `lamps` lists the
     positions (x, y) of the street lamps among these objects [m].
@@ -481,8 +481,8 @@ def dress_streets(
     """Places small objects along the streets of a city, and returns them.
 
     Objects from the imported file are placed first, and then random objects.
-    Objects are placed near the paths of the drives, but not on them. Without
-    drives nothing is placed.
+    Objects are placed near the paths of the drives, but not on the paths.
+    Without drives nothing is placed.
 
     Args:
         structures: structures that already exist.

@@ -48,7 +48,7 @@ class Panel:
         height: height along z [m].
         outline: polygon in x and z; None if the wall is a rectangle.
         triangles: (M, 3, 3) triangles of the wall in the file [m].
-        is_plane: whether the wall is plane; otherwise it bends.
+        is_plane: whether the wall is plane; otherwise the wall bends.
     """
 
     building: int

@@ -204,7 +204,7 @@ class WayGraph(ABC):
 
         An arm is the part of the second drive before it joins the first drive,
         or the part after it has left the first drive. Pieces to avoid are the
-        pieces of the drives so far, and pieces close to them.
+        pieces of the drives so far, and pieces close to those pieces.
 
         Args:
             pieces: numbers of the pieces of the drives so far.

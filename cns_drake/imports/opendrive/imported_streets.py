@@ -1,8 +1,8 @@
 """The areas of imported streets, along which a city is built.
 
 In an OpenDRIVE junction, lanes often lack the shoulders of the roads that lead
-to the junction, so that the kerb has a step there. Real kerbs have tapers
-instead, and this module adds such tapers.
+to the junction, so that the kerb has a step where the road meets the junction.
+Real kerbs have tapers instead, and this module adds such tapers.
 """
 
 from collections import defaultdict

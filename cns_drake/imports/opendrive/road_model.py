@@ -213,7 +213,8 @@ class Thing(NamedTuple):
 
     Attributes:
         name: name of the thing, unique in the network.
-        is_signal: whether the thing is a signal; otherwise it is an object.
+        is_signal: whether the thing is a signal; otherwise the thing is an
+            object.
         kind: type of the thing, in lower case.
         s, t: coordinates along and across the road [m].
         z: height above the road [m].

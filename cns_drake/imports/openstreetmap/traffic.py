@@ -126,7 +126,7 @@ class StreetTraffic(NamedTuple):
 
     Attributes:
         lanes: lanes of streets, followed by lanes through junctions.
-        links: pairs of lanes, of which the second follows the first.
+        links: pairs of lanes; the second lane of a pair follows the first lane.
         beside: lane -> the neighbouring lane on the outer side, with the same
             direction.
         junctions: nodes at which three or more ends of streets meet.

@@ -116,7 +116,7 @@ class CameraScene(LeafSystem):
 
     Attributes:
         scene_graphs: the copies, as kind -> SceneGraph. The kind `colours` is
-            for colour images; the kind `classes` is there if depth or label
+            for colour images; the kind `classes` exists if depth or label
             images are recorded.
         frames: id of a moving frame in the original -> id of its copy, which is
             the same in all `scene_graphs`.

@@ -205,8 +205,8 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
     Returns:
         A mapping with the keys `preset`, `unit_seed`, and `elevations_deg`: the
         nominal elevations of the lasers [deg], empty for a preset without
-        rings. The true angles differ from them by the errors of the individual
-        unit.
+        rings. The true angles differ from the nominal elevations by the errors
+        of the individual unit.
     """
     nominal = getattr(make_pattern(config), "elevations_rad", ())
     return {

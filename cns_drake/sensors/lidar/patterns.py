@@ -532,7 +532,7 @@ class BeamCoverage:
     elevation and in azimuth and lie inside the field of view.
 
     The field of view consists of cells of 0.25 deg: the cells of the beams; the
-    neighbours of these cells, because rounding can move a point into a
+    neighbours of the beams' cells, because rounding can move a point into a
     neighbour; and all cells between beams that are up to 24 deg apart (a
     morphological closing).
     """

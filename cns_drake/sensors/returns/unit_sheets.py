@@ -74,9 +74,9 @@ class Head:
     """Positions of the lasers of a unit, and how the unit reports azimuths.
 
     Attributes:
-        blocks: for each block of lasers, from the top: its lowest elevation
-            [deg], its height above the origin [m], and a factor by which its
-            range errors are multiplied.
+        blocks: for each block of lasers, from the top: lowest elevation [deg],
+            height above the origin [m], and a factor by which the range errors
+            are multiplied.
         alternate: range offset [m]. Every second laser, starting with the
             first, measures ranges that are too long by this offset; all other
             lasers measure ranges that are too short by this offset. The offset
