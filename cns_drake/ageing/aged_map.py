@@ -20,12 +20,12 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import draft_folder, is_there, user_errors
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.city.generation.generate import (
+from cns_drake.city.generation.stage_sizes import (
     count_triangles,
-    stage_sdf,
     stage_size,
     triangles_in,
 )
+from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry import Mesh, MeshShape, Structure
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.motion.trajectory import Trajectory
@@ -210,7 +210,7 @@ class _Writing:
             if one is None
             for line in world.visuals[name]
         ]
-        text = stage_sdf(
+        text = world_sdf(
             f"{world.folder.name}_year_{year}",
             new,
             comment=f"{world.folder.name} in year {year}, aged by cns-drake "

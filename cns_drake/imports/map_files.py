@@ -13,12 +13,9 @@ from matplotlib.patches import Patch
 import numpy as np
 import yaml
 
-from cns_drake.city.generation.generate import (
-    stage_sdf,
-    stage_size,
-    structure_table,
-    triangles_in,
-)
+from cns_drake.city.generation.generate import structure_table
+from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
+from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
@@ -93,7 +90,7 @@ def write_world(
     sizes = {}
     for stage, some in city.standing.items():
         standing = [*bottom, *(one.structure for one in some)]
-        text = stage_sdf(
+        text = world_sdf(
             f"{draft.name}_{stage}",
             standing,
             comment=f"Imported by cns-drake from {source.name}.",

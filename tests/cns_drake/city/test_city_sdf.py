@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city.generation.generate import stage_sdf
+from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.mesh import box_mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
@@ -38,7 +38,7 @@ def inspector(tmp_path_factory):
         "tower_017", "building", model, (10.0, -20.0, 0.5), yaw=0.7
     )
     sdf = folder / "stage_01.sdf"
-    sdf.write_text(stage_sdf("w", [structure], comment="a -- b"))
+    sdf.write_text(world_sdf("w", [structure], comment="a -- b"))
     return parse_strictly(sdf).model_inspector()
 
 
