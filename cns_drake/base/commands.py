@@ -18,7 +18,7 @@ Jobs = Annotated[
     typer.Option(
         metavar="N",
         help="Number of jobs that run at once on this machine; by default one "
-        "per core. Give fewer if memory runs out.",
+        "per core. Give a smaller number if memory runs out.",
     ),
 ]
 Scheduler = Annotated[

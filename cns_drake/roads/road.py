@@ -39,8 +39,9 @@ class RoadStyle(_Model):
     have these fields as well, and overrides the defaults.
 
     Attributes:
-        lanes: numbers of lanes along the road's centreline and against it, each
-            from 0 to 4. A zero makes the road one-way.
+        lanes: numbers of lanes in the direction of the road's centreline and
+            against this direction, each from 0 to 4. A zero makes the road
+            one-way.
         lane_width: width of a lane [m].
         median: width of the kerbed strip between the two directions [m]; 0 for
             none.
@@ -96,8 +97,8 @@ class JunctionEntry(_Model):
             level.
         kerb_radius: radius of the kerb round each corner [m]; at a dead end,
             the radius of the disc in which the road ends.
-        dead_end: whether the junction is a dead end, which has only one road,
-            and where traffic cannot go on.
+        dead_end: whether the junction is a dead end: the end of its only road,
+            where traffic cannot go on.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)

@@ -138,8 +138,8 @@ class MadeMap(Section):
             between the first stage and today: in the first stage they are
             missing, or lower than today.
         plain: whether to leave out the windows, roofs and kerbs that the file
-            does not contain. By default they are sampled at random, as by
-            `cns-drake import`.
+            does not contain. By default these parts are sampled at random, as
+            by `cns-drake import`.
         seed: seed of all random numbers.
     """
 
@@ -209,8 +209,8 @@ class Experiment(Section):
             sets the levels of a case, the weakest first. Each case is measured
             by itself and compared with the case `none`, which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
-            default all. A case with fewer levels is measured at its last level
-            instead.
+            default all. A case that lacks a level in this list is measured at
+            its own last level instead.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.

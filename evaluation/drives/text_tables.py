@@ -67,10 +67,10 @@ def read_numbers(
 ) -> np.ndarray:
     """Reads a table of text.
 
-    Lines that begin with `#` are remarks. A first line that does not begin
-    with a number is a header, and so is a remark above the first row that names
-    its columns. If a header names the wanted columns, they are read wherever
-    they are.
+    Lines that begin with `#` are remarks. A header is a first line that does
+    not begin with a number, or a remark above the first row that names the
+    columns. If a header names the wanted columns, these columns can be in any
+    order.
 
     Args:
         path: the file.

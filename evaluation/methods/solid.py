@@ -43,10 +43,10 @@ class SolidConfig(MethodConfig):
         elevations: number of equal cells of elevation over the field of view;
             [P], [C] the number of beams of the LiDAR. By default the number of
             beams of the drive's LiDAR, or 32 if its model is unknown [S].
-        lowest_deg: lower limit of the field of view [deg]. By default that of
-            the drive's LiDAR, or -22.5 if its model is unknown [S].
-        highest_deg: upper limit of the field of view [deg]. By default that of
-            the drive's LiDAR, or 22.5 if its model is unknown [S].
+        lowest_deg: lower limit of the field of view [deg]. By default the limit
+            of the drive's LiDAR, or -22.5 if its model is unknown [S].
+        highest_deg: upper limit of the field of view [deg]. By default the
+            limit of the drive's LiDAR, or 22.5 if its model is unknown [S].
     """
 
     voxel_size: PositiveFloat = 1.0

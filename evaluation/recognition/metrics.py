@@ -266,7 +266,7 @@ def weights_by_drive(
 
     Yields:
         For each set, the number of different blocks in all sets of its drive,
-        and the counts (B, Q), as of `resampled_weights`.
+        and the counts (B, Q), like those of `resampled_weights`.
     """
     known: dict[int, np.ndarray] = {}
     for drive, some in zip(drives, blocks, strict=True):
@@ -428,8 +428,8 @@ def compared_by_auc(
     The variance of the sum over the sets of one drive comes from a bootstrap,
     whose samples contain the same blocks of the route for both methods and for
     all sets of the drive. With n blocks, this variance is multiplied by n / (n
-    - 1). Different drives are independent: their variances add up, and so do
-    their degrees of freedom, n - 1 for each drive.
+    - 1). Different drives are independent: their variances add up, and their
+      degrees of freedom (n - 1 for each drive) add up.
 
     Args:
         answers: method -> its outcomes on each set of queries. The queries must

@@ -295,7 +295,7 @@ def add_described_lidar(
         weather: weather of calibrated returns.
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
-        unseen: see `add_lidar`, as for all further arguments.
+        unseen: see `add_lidar`. This also holds for all further arguments.
         motion_distortion: whether the bodies of the LiDAR's plant keep moving
             during a revolution. A recorded drive connects a `Sweep` instead.
         structures: table of the structures.
