@@ -8,8 +8,8 @@ half on each lane. If one of these lanes is not carriageway, the kerb stones
 would hide half of the line, so the import moves the line onto the carriageway.
 """
 
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from collections import Counter
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,14 +17,13 @@ import numpy as np
 import shapely
 from shapely import GEOSException
 from shapely.geometry import MultiLineString
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
-from cns_drake.city.geometry import Finish, Structure, polygons_of, triangulate
+from cns_drake.city.geometry import Structure, polygons_of
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
@@ -33,8 +32,7 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports import map_files
 from cns_drake.imports.drives import search
 from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.faces import parts_of
-from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
+from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.opendrive import imported_streets, lane_drives
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import (
@@ -45,292 +43,12 @@ from cns_drake.imports.opendrive.lanes import (
     lane_bands,
     split_levels,
 )
-from cns_drake.imports.opendrive.road_model import MarkLine, RoadMap, RoadMark
+from cns_drake.imports.opendrive.road_marks import road_marks
+from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
-
-# The edges of carriageways and of lanes differ by less than this, which is also
-# the distance of lines from a kerb [m].
-_SLACK = 0.02
-# The end of a border is tested this far inwards [m].
-_INWARDS = 0.05
-# Lines are cut with one such square of the carriageway at a time [m].
-_SQUARE = 64.0
-_MM = 0.001
-# Default length of a dash [m].
-_DASH = 3.0
-# Default length of the gap between two dashes [m].
-_GAP = 6.0
-# Distance of the lines of a double line from its middle [m].
-_ASIDE = 0.12
-# Height of marks above the road [m].
-_ABOVE = 0.015
-_SHORTEST = 0.05
-_COLOURS: dict[str, Rgb] = {
-    "standard": (0.86, 0.86, 0.84),
-    "white": (0.86, 0.86, 0.84),
-    "yellow": (0.86, 0.70, 0.22),
-    "red": (0.70, 0.20, 0.18),
-    "blue": (0.20, 0.32, 0.62),
-    "green": (0.22, 0.48, 0.28),
-    "orange": (0.85, 0.50, 0.15),
-}
-_STYLES = ("solid", "broken")
-
-
-def moved_off_kerbs(
-    border: np.ndarray,
-    left: np.ndarray,
-    reach: tuple[float, float],
-    carriageway: BaseGeometry,
-) -> np.ndarray:
-    """Returns how far a painted line must move to leave a kerb, (N,) [m].
-
-    The line is on the border of a lane. Where only one side of the border is
-    carriageway, the line would partly lie on the kerb, and is moved towards the
-    carriageway. Places next to a moved place are moved as well.
-
-    Args:
-        border: (N, 3) places on the border of the lane [m].
-        left: (N, 2) unit vectors to the left of the border.
-        reach: how far the line extends to the left and to the right of the
-            border [m].
-        carriageway: area of the carriageway in W, a prepared geometry
-            (Shapely).
-
-    Returns:
-        Distances, positive to the left.
-    """
-    xy = border[:, :2].copy()
-    # A kerb may cross the border right at its end.
-    for end, beside in ((0, 1), (-1, -2)):
-        step = xy[beside] - xy[end]
-        xy[end] += step * min(0.5, _INWARDS / max(np.hypot(*step), _INWARDS))
-    on_left, on_right = (
-        shapely.contains_xy(carriageway, *(xy + out * left).T)
-        for out in (reach[0] - _SLACK, _SLACK - reach[1])
-    )
-    moved = np.zeros(len(border))
-    moved[on_left & ~on_right] = reach[1] + _SLACK
-    moved[on_right & ~on_left] = -reach[0] - _SLACK
-    # Lines return to their border only behind the end of a kerb.
-    near = np.append(0.0, moved[:-1]) + np.append(moved[1:], 0.0)
-    return np.where(moved == 0.0, near, moved)
-
-
-def as_triangles(quads: np.ndarray) -> np.ndarray:
-    """Splits quadrilaterals (K, 4, 3) into triangles (2 K, 3, 3)."""
-    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
-
-
-def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
-    """Returns the parts of quadrilaterals that lie on a carriageway [m].
-
-    Args:
-        quads: (K, 4, 3) the quadrilaterals.
-        carriageway: area of the carriageway in W, a prepared geometry
-            (Shapely).
-
-    Returns:
-        Triangles (M, 3, 3), cut as seen from above.
-    """
-    outlines = np.asarray(shapely.polygons(quads[..., :2]))
-    inside = shapely.contains_properly(carriageway, outlines)
-    found = [as_triangles(quads[inside])]
-    rest = quads[~inside]
-    outlines = outlines[~inside]
-    squares = np.floor(rest[:, 0, :2] / _SQUARE).astype(int)
-    for square in np.unique(squares, axis=0):
-        chosen = np.flatnonzero((squares == square).all(axis=1))
-        near = shapely.box(*shapely.total_bounds(outlines[chosen]))
-        ground = shapely.intersection(carriageway, near)
-        pieces = shapely.intersection(outlines[chosen], ground, grid_size=_MM)
-        for quad, piece in zip(rest[chosen], pieces, strict=True):
-            found += [
-                _at_quad_heights(np.array(triangulate(part)), quad)
-                for part in parts_of(piece)
-            ]
-    return np.concatenate(found)
-
-
-def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3): flat ones at the heights of a quad [m].
-
-    `flat` is (M, 3, 2), and `quad` (4, 3).
-    """
-    middle = quad.mean(axis=0)
-    slope = np.linalg.lstsq(
-        (quad - middle)[:, :2], quad[:, 2] - middle[2], rcond=None
-    )[0]
-    z = middle[2] + (flat - middle[:2]) @ slope
-    return np.concatenate([flat, z[..., None]], axis=2)
-
-
-def road_marks(
-    prefix: str,
-    bands: Sequence[LaneBand],
-    heights: Callable[[np.ndarray], np.ndarray] | None = None,
-    carriageway: BaseGeometry | None = None,
-) -> Iterator[Structure]:
-    """Yields the painted road marks of each road as a structure.
-
-    Args:
-        prefix: beginning of the structures' names.
-        bands: the lanes of the roads.
-        heights: function that returns the heights of the ground at places (N,
-            2) [m]. By default, marks have the heights of the lanes' borders.
-        carriageway: area to which marks are limited, because kerbs surround it;
-            None for no limit.
-    """
-    if carriageway is not None:
-        shapely.prepare(carriageway)
-    painted: dict[str, dict[str, list[np.ndarray]]] = defaultdict(
-        lambda: defaultdict(list)
-    )
-    for band in bands:
-        section = band.road.sections[band.section]
-        lines = [(band.outer, band.lane.marks, float(band.lane.number))]
-        if band.lane.number == (-1 if -1 in section.lanes else 1):
-            # In the middle, the second line is on the right.
-            lines.append((band.inner, section.middle_marks, -1.0))
-        for border, marks, side in lines:
-            for colour, quads in _painted(
-                border,
-                band.s,
-                band.heading,
-                marks,
-                side,
-                section.end,
-                carriageway,
-            ):
-                painted[band.road.name][colour].append(quads)
-    for road, colours in painted.items():
-        surfaces = {}
-        for colour, pieces in colours.items():
-            quads = np.concatenate(pieces)
-            if carriageway is None:
-                corners = as_triangles(quads)
-            else:
-                corners = on_carriageway(quads, carriageway)
-            z = corners[..., 2]
-            if heights is not None:
-                ground = heights(corners[..., :2].reshape(-1, 2))
-                z = np.maximum(z, ground.reshape(z.shape))
-            corners[..., 2] = z + _ABOVE
-            if len(corners):
-                surfaces[colour] = corners
-        if not surfaces:
-            continue
-        yield make_imported(
-            f"{prefix}_{road}",
-            "road",
-            "Road mark",
-            surfaces,
-            {
-                colour: Finish(_COLOURS[colour], "markings")
-                for colour in surfaces
-            },
-        ).structure
-
-
-def _painted(
-    border: np.ndarray,
-    s: np.ndarray,
-    heading: np.ndarray,
-    marks: Sequence[RoadMark],
-    side: float,
-    end: float,
-    carriageway: BaseGeometry | None,
-) -> Iterator[tuple[str, np.ndarray]]:
-    """Yields the colour of marks on a border, and their quads (K, 4, 3) [m].
-
-    Args:
-        border: (N, 3) places on the border [m].
-        s, heading: (N,) distance along the road, and heading there [m, rad].
-        marks: marks on the border, one after the other.
-        side: positive if the left of the border is outwards.
-        end: where the last mark ends [m].
-        carriageway: area that marks do not leave; None for none.
-    """
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
-    for mark, last in zip(marks, ends, strict=True):
-        lines = _lines(mark, float(np.sign(side)))
-        moved = np.zeros(len(s))
-        if lines and carriageway is not None:
-            reach = (
-                max(line.width / 2.0 + line.aside for line in lines),
-                max(line.width / 2.0 - line.aside for line in lines),
-            )
-            moved = moved_off_kerbs(border, left, reach, carriageway)
-        for line in lines:
-            aside = left * (line.aside + moved)[:, None]
-            for a, b in _stretches(line, mark.start, last):
-                quads = _stripe(border, s, left, aside, (a, b), line.width)
-                if len(quads):
-                    known = mark.colour in _COLOURS
-                    yield mark.colour if known else "standard", quads
-
-
-def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
-    """Returns the lines of a mark, from the file or else the usual ones.
-
-    `side` is positive if the left of the border is outwards.
-    """
-    styles = [word for word in mark.kind.split() if word in _STYLES]
-    if mark.lines and (styles or mark.kind == "custom"):
-        return mark.lines
-    apart = _ASIDE * side if len(styles) > 1 else 0.0
-    return [
-        MarkLine(
-            aside=(2 * k - 1) * apart,
-            start=0.0,
-            dash=_DASH,
-            gap=0.0 if style == "solid" else _GAP,
-            width=mark.width,
-        )
-        for k, style in enumerate(styles)
-    ]
-
-
-def _stretches(
-    line: MarkLine, start: float, end: float
-) -> Iterator[tuple[float, float]]:
-    """Yields start and end of the painted stretches of a line [m]."""
-    if line.gap == 0.0:
-        yield start + line.start, end
-        return
-    for s in np.arange(start + line.start, end, line.dash + line.gap).tolist():
-        yield max(s, start), min(s + line.dash, end)
-
-
-def _stripe(
-    border: np.ndarray,
-    s: np.ndarray,
-    left: np.ndarray,
-    aside: np.ndarray,
-    limits: tuple[float, float],
-    width: float,
-) -> np.ndarray:
-    """Returns a stretch of a line as quads (K, 4, 3), seen from above [m]."""
-    a, b = max(limits[0], s[0]), min(limits[1], s[-1])
-    if b - a < _SHORTEST:
-        return np.zeros((0, 4, 3))
-    inside = s[(s > a + _SHORTEST) & (s < b - _SHORTEST)]
-    at = np.concatenate([[a], np.unique(inside), [b]])
-    values = np.column_stack([border, left, aside])
-    rows = np.stack([np.interp(at, s, some) for some in values.T], axis=1)
-    middle = rows[:, :3].copy()
-    middle[:, :2] += rows[:, 5:7]
-    half = np.zeros_like(middle)
-    half[:, :2] = rows[:, 3:5] * width / 2.0
-    right_edge, left_edge = middle - half, middle + half
-    return np.stack(
-        [right_edge[:-1], right_edge[1:], left_edge[1:], left_edge[:-1]], axis=1
-    )
-
 
 # Default height of sidewalks [m].
 _KERB = 0.1

@@ -5,8 +5,9 @@ import pytest
 import shapely
 
 from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_reader import read_roads
-from cns_drake.imports.opendrive.town import build_town, road_marks
+from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.options import ImportFaults, ImportOptions
 
 RADIUS = 50.0

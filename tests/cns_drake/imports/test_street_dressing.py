@@ -20,7 +20,8 @@ from cns_drake.imports.dressing.paving import missing_sidewalks, with_kerb
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of, ground_structures
-from cns_drake.imports.openstreetmap.city import import_openstreetmap, object_of
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+from cns_drake.imports.openstreetmap.things import object_of
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.staged_city import stage_city
 

@@ -17,7 +17,8 @@ from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
-from cns_drake.transient.changing import change_world, make_bays
+from cns_drake.transient.changing import change_world
+from cns_drake.transient.parked_cars import make_bays
 from cns_drake.transient.scene_editing import Surroundings
 from cns_drake.transient.world_structures import read_structures
 
