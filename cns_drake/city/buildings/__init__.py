@@ -29,6 +29,7 @@ from cns_drake.city.buildings import (
     slabs,
     street_blocks,
     towers,
+    unfinished_tower,
 )
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.assembly import Archetype, Building, Site
@@ -76,7 +77,7 @@ BUILDERS: dict[str, type[Building]] = {
     "sports_hall": halls.SportsHall,
     "supermarket": markets.Supermarket,
     "terrace": row_houses.Terrace,
-    "unfinished_tower": office_towers.UnfinishedTower,
+    "unfinished_tower": unfinished_tower.UnfinishedTower,
     "walk_up": flats.WalkUp,
     "waterfront_hall": halls.WaterfrontHall,
     **dict.fromkeys(LANDMARKS, Landmark),

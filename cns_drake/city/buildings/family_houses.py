@@ -51,7 +51,9 @@ def _window_rows(p: _FamilyHouse, wing: Wing, storeys: int) -> Openings:
     openings = Openings(p, wing, p.boxes)
     width = p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
-        openings.add_rows(edges, p.floor, STOREY_M, storeys, step, width)
+        openings.add_window_storeys(
+            edges, p.floor, STOREY_M, storeys, step, width
+        )
     return openings
 
 
@@ -85,7 +87,7 @@ def _add_garage(p: _FamilyHouse, garage: Wing) -> None:
     openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
     openings.add_garage_door(0, length / 2, min(length - 0.7, 4.9))
-    openings.row((1, 3), 1.0, 3.4, [wing_walls.sash(0.9, 0.0, 1.1, 2.0)])
+    openings.add_bays((1, 3), 1.0, 3.4, [wing_walls.sash(0.9, 0.0, 1.1, 2.0)])
     openings.enclose((wing_walls.GLASS_M,))
 
 
@@ -370,7 +372,7 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
         pane = wing_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
-        openings.put(0, x, p.picture + 0.7, pane)
+        openings.replace_by_bay(0, x, p.picture + 0.7, pane)
     openings.add_door(0, door, p.floor, lights=0.3)
     _close_box(p, main, openings)
     reach = min(1.6, main.y0 - p.site.bounds[1] - 0.4)
@@ -449,7 +451,9 @@ class SemiDetached(_FamilyHouse):
         _close_box(self, main, openings)
         for wing in bays:
             rows = Openings(self, wing, self.boxes)
-            rows.add_rows((0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2)
+            rows.add_window_storeys(
+                (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+            )
             _close_box(self, wing, rows)
         for garage in garages:
             _add_garage(self, garage)

@@ -414,16 +414,22 @@ def _add_house(
     storey = (wing.wall_top - 0.15 - _FLOOR) / storeys
     head = min(2.2, storey - 0.4)
     for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
-        openings.add_rows(edges, _FLOOR, storey, storeys, pitch, p.window_width,
+        openings.add_window_storeys(
+            edges,
+            _FLOOR,
+            storey,
+            storeys,
+            pitch,
+            p.window_width,
             head=head,
-        )  # fmt: skip
+        )
     wall = wing.wall(0)
     middle = wall.length / 2
     glass = wing_walls.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
-        openings.put(0, middle, 2.6, stair)
+        openings.replace_by_bay(0, middle, 2.6, stair)
     openings.add_door(0, middle, _FLOOR, width=1.2, lights=0.4)
     area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
     p.add_to("trim", wall.box(*area, _FLOOR + 2.3, _FLOOR + 2.5))

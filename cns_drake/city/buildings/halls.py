@@ -87,7 +87,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
     openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     window = bays.window(0.9, 1.1, head, _RECESS)
-    openings.row(range(4), 1.0, 3.2, [window], 0.8)
+    openings.add_bays(range(4), 1.0, 3.2, [window], 0.8)
     if wing is boxes[0]:
         for edge in (0,) if wing.roof.along_y else (3, 0):
             _add_doors(p, wing, openings, edge)
@@ -127,7 +127,7 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
     if p.deck > 0 and edge == 0:
         gap = walls.Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
-        openings.put(edge, x, width + 0.4, lambda a, b: [gap])
+        openings.replace_by_bay(edge, x, width + 0.4, lambda a, b: [gap])
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05
     else:
@@ -272,9 +272,11 @@ def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     )
     ends = hall.gables
     sides = [k for k in range(4) if k not in ends]
-    openings.row(sides, high - 1.0, p.bay, [band], 0.5)
-    openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
-    openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
+    openings.add_bays(sides, high - 1.0, p.bay, [band], 0.5)
+    openings.add_bays(
+        ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9
+    )
+    openings.replace_by_bay(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
     openings.enclose((_DEEP,), (walls.Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
@@ -292,7 +294,7 @@ def _add_frames(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
                 post = massing.frustum(foot, head, 0.0, hall.wall_top)
                 root = wall.standing(left, right, -0.02, reach, 0.0)
                 p.add_to("frames", root, wall.place(post))
-    line = [(u, z + 0.15) for u, z in hall.line]
+    line = [(u, z + 0.15) for u, z in hall.roof_line]
     start, end = hall.ridge
     for u, _ in bays.stretches(end - start, p.bay, 0.5)[1:]:
         ends = (start + u - 0.18, start + u + 0.18)
@@ -309,11 +311,11 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     annex = Wing.flat(area, h, 0.4)
     openings = Openings(p, annex, halls)
     small = bays.window(1.6, 1.5, 2.5, _DEEP)
-    openings.row((0, 1, 3), 1.0, 3.6, [small], 0.8)
+    openings.add_bays((0, 1, 3), 1.0, 3.6, [small], 0.8)
     middle = annex.width / 2
     wide = min(7.0, 0.35 * annex.width)
     glazing = bays.window(wide - 0.6, 0.05, h - 0.8, _DEEP, mullions=3)
-    openings.put(0, middle, wide, glazing)
+    openings.replace_by_bay(0, middle, wide, glazing)
     openings.enclose((_DEEP,), (walls.Band(0.0, 0.3, -0.05),))
     z = h - 0.65
     half = wide / 2 + 1.0

@@ -86,7 +86,7 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
     storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
     width = p.uniform(1.1, 2.2, 2)
-    openings.add_rows(
+    openings.add_window_storeys(
         (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
@@ -94,7 +94,7 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
     back = [bays.gate(2.0, 2.2, 0.2), wing_walls.sash(1.0, 0.0, 1.6, 2.3)]
-    openings.row((2,), 0.5, 3.6, back, 0.7)
+    openings.add_bays((2,), 0.5, 3.6, back, 0.7)
     glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
     openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
@@ -198,7 +198,7 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
     a, b = 0.3, wall.length - 0.3
     head = min(2.15, wing.wall_top - 0.25)
     if p.chance(0.75):
-        openings.add(0, [Patch(a, b, _COUNTER, head, 0.7)])
+        openings.add_reliefs(0, [Patch(a, b, _COUNTER, head, 0.7)])
         shelf = wall.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
         p.add_to("timber", shelf)
         if p.arcade == 0.0:
@@ -206,9 +206,9 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
             p.add_to("awning", wall.place(shade))
     else:
         shutter = bays.gate(b - a, head, 0.12)
-        openings.add(0, shutter(a - 0.3, b + 0.3))
+        openings.add_reliefs(0, shutter(a - 0.3, b + 0.3))
     door = bays.window(0.9, 0.05, 2.0, 0.12)
-    openings.row((2,), 0.2, wall.length, [door], 0.3)
+    openings.add_bays((2,), 0.2, wall.length, [door], 0.3)
     sign = details.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
     p.add_to("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
@@ -288,16 +288,16 @@ class Supermarket(Building):
         glazing = bays.window(
             self.pitch - 0.9, 0.4, 3.3, _RECESS, mullions=2, transom=2.4
         )
-        openings.row((0,), 0.5, self.pitch, [glazing], 0.6)
+        openings.add_bays((0,), 0.5, self.pitch, [glazing], 0.6)
         band = bays.window(
             self.pitch - 1.4, self.eaves - 2.3, self.eaves - 1.3, _RECESS
         )
-        openings.row((1, 3), 1.0, 1.6 * self.pitch, [band], 1.2)
+        openings.add_bays((1, 3), 1.0, 1.6 * self.pitch, [band], 1.2)
         service = [
             bays.gate(2.6, 2.8, 0.25),
             bays.window(1.1, 0.0, 2.2, _RECESS),
         ]
-        openings.row((2,), 0.5, 8.0, service, 1.5)
+        openings.add_bays((2,), 0.5, 8.0, service, 1.5)
         bands = (
             Band(0.0, 0.4, -0.06),
             Band(self.eaves - 0.7, self.eaves - 0.2, -0.08),
@@ -347,10 +347,10 @@ def _add_entrance(p: Supermarket, hall: Wing) -> None:
     porch = Wing.at(area, wall_top, top, roof)
     openings = Openings(p, porch, (hall,))
     doors = bays.window(w - 2.4, 0.05, 2.6, _RECESS, mullions=3)
-    openings.put(0, w / 2, w - 1.6, doors)
+    openings.replace_by_bay(0, w / 2, w - 1.6, doors)
     if wall_top > 5.0:
         light = bays.window(w - 2.4, 2.95, wall_top - 1.5, _RECESS, mullions=3)
-        openings.add(0, light(0.8, w - 0.8))
+        openings.add_reliefs(0, light(0.8, w - 0.8))
     openings.enclose((_RECESS,), material="brand")
     sign = (0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15)
     p.add_to("steel", porch.wall(0).box(*sign))

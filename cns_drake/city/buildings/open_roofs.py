@@ -127,10 +127,12 @@ def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     shop = Wing.flat((start, ys[0], start + wide, ys[1]), p.shop_height, 0.5)
     openings = Openings(p, shop)
     glazing = bays.shop_front(2.7, _RECESS, door=False)
-    openings.row((0,), 1.0, 3.4, [glazing], 0.4)
+    openings.add_bays((0,), 1.0, 3.4, [glazing], 0.4)
     doors = bays.window(2.0, 0.0, 2.5, _RECESS, mullions=1)
-    openings.put(0, 0.55 * wide, 2.6, doors)
-    openings.row((1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)])
+    openings.replace_by_bay(0, 0.55 * wide, 2.6, doors)
+    openings.add_bays(
+        (1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)]
+    )
     openings.enclose((_RECESS,), (Band(0.0, 0.25, -0.05),))
     sign = (0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
     p.add_to("brand", shop.wall(0).box(*sign))
@@ -145,8 +147,10 @@ def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     box = Wing.flat((xs[0], ys[0], xs[1], ys[1]), p.shop_height - 0.2, 0.3)
     openings = Openings(p, box)
     for edge in (0, 2):
-        openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))
-    openings.row((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
+        openings.replace_by_bay(
+            edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5)
+        )
+    openings.add_bays((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
     openings.enclose((_RECESS,))
 
 

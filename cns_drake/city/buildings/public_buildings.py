@@ -120,9 +120,9 @@ def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     glazing = bays.window(
         2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
     )
-    openings.put(0, half, 2 * half - 0.4, glazing)
+    openings.replace_by_bay(0, half, 2 * half - 0.4, glazing)
     doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
-    openings.add(0, doors(0.2, 2 * half - 0.2))
+    openings.add_reliefs(0, doors(0.2, 2 * half - 0.2))
     openings.enclose((_RECESS,), material="accent")
     front = hall.wall(0)
     a, b = -0.8, 2 * half + 0.8
@@ -145,7 +145,7 @@ def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
     for k in range(2 if high > 6.0 else 1):
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
-        openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
+        openings.add_bays((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
     openings.enclose((_RECESS,), material="gym")
 
 
@@ -171,8 +171,8 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
     boxes = (gym, link)
     openings = Openings(p, gym, boxes)
     high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
-    openings.row((1, 2, 3), 3.5, 3.6, [high], 0.9)
-    openings.put(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
+    openings.add_bays((1, 2, 3), 3.5, 3.6, [high], 0.9)
+    openings.replace_by_bay(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
     for edge in (1, 3):
         side = gym.wall(edge)
         for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
@@ -180,7 +180,9 @@ def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
             p.add_to("accent", pier)
     openings.enclose((_RECESS,), material="gym")
     passage = Openings(p, link, boxes)
-    passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
+    passage.add_bays(
+        (0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3
+    )
     passage.enclose((_RECESS,), material="trim")
 
 
@@ -245,7 +247,7 @@ def _add_all(p: Chapel, width: float, length: float) -> None:
     if p.porch and p.belfry != "front" and nave.y0 > 2.2:
         porch = _porch(nave)
         boxes.append(porch)
-    annex = _annex(nave, width) if p.annex else None
+    annex = _vestry(nave, width) if p.annex else None
     if annex is not None:
         boxes.append(annex)
     _add_nave(p, nave, boxes)
@@ -257,7 +259,8 @@ def _add_all(p: Chapel, width: float, length: float) -> None:
         _add_cote(p, nave)
     for wing in boxes:
         if wing is not nave and wing is not tower:
-            _add_small(p, wing, boxes, is_porch=wing is porch)
+            add = _add_porch if wing is porch else _add_vestry
+            add(p, wing, boxes)
 
 
 def _nave(p: Chapel, width: float, length: float) -> Wing:
@@ -295,14 +298,16 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
     lancet = bays.arched(1.0, 1.2, spring, _CHAPEL_RECESS, rise=0.7)
-    openings.row((1, 3), 1.5, p.bay, [lancet], 1.0)
+    openings.add_bays((1, 3), 1.5, p.bay, [lancet], 1.0)
     middle = nave.width / 2
     if p.belfry != "front":
         door = bays.arched(1.6, 0.0, 2.0, 0.5, rise=0.8)
         if high > 3.1 and not any(w.roof.thickness == 0.15 for w in boxes[1:]):
-            openings.put(0, middle, 2.2, door)
+            openings.replace_by_bay(0, middle, 2.2, door)
         elif not any(w.y0 < nave.y0 for w in boxes[1:]):
-            openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
+            openings.replace_by_bay(
+                0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4)
+            )
     low = high + 0.2 * (nave.top - high)
     rose = wing_roofs.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
     openings.enclose((_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
@@ -330,13 +335,13 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
     louvre = bays.arched(width, top - 2.6, top - 1.3, _CHAPEL_RECESS)
     slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _CHAPEL_RECESS)
     for edge in range(4):
-        openings.put(edge, side / 2, width + 0.7, louvre)
+        openings.replace_by_bay(edge, side / 2, width + 0.7, louvre)
         if p.belfry != "side" or edge != 3 - 2 * p.mirrored:
-            openings.put(edge, side / 2, 1.0, slit)
+            openings.replace_by_bay(edge, side / 2, 1.0, slit)
     if p.belfry == "front":
         width = round(min(1.7, side - 1.1), 2)
         door = bays.arched(width, 0.0, 2.1, 0.45)
-        openings.put(0, side / 2, width + 0.6, door)
+        openings.replace_by_bay(0, side / 2, width + 0.6, door)
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
     openings.add_walls((_CHAPEL_RECESS,), bands)
@@ -399,19 +404,21 @@ def _add_cote(p: Chapel, nave: Wing) -> None:
     p.add_to("roof", massing.tent(eaves, (x, y), z, p.height - 0.8))
 
 
-def _add_small(
-    p: Chapel, wing: Wing, boxes: list[Wing], *, is_porch: bool
-) -> None:
-    """Adds the porch or the vestry."""
+def _add_porch(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
+    """Adds the porch, which is open to the front."""
     openings = Openings(p, wing, boxes)
-    if is_porch:
-        arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
-        openings.put(0, wing.width / 2, 2.2, arch)
-    else:
-        head = round(min(2.0, wing.wall_top - 0.3), 2)
-        openings.row(
-            range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
-        )
+    arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
+    openings.replace_by_bay(0, wing.width / 2, 2.2, arch)
+    openings.enclose((_CHAPEL_RECESS,))
+
+
+def _add_vestry(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
+    """Adds the vestry, with windows on all sides."""
+    openings = Openings(p, wing, boxes)
+    head = round(min(2.0, wing.wall_top - 0.3), 2)
+    openings.add_bays(
+        range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
+    )
     openings.enclose((_CHAPEL_RECESS,))
 
 
@@ -424,7 +431,7 @@ def _porch(nave: Wing) -> Wing:
     return Wing.at(area, min(2.6, nave.wall_top - 0.2), top, roof)
 
 
-def _annex(nave: Wing, width: float) -> Wing | None:
+def _vestry(nave: Wing, width: float) -> Wing | None:
     """Returns a vestry beside the choir, or None if there is no room for it."""
     room = width - _CHAPEL_MARGIN - nave.x1, nave.x0 - _CHAPEL_MARGIN
     side = int(room[1] > room[0])

@@ -99,9 +99,15 @@ def _add_unit(
     step = (wing.wall_top - 0.25 - p.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
     for edges, pitch in (((0, 2), p.window_pitch), (sides, 4.2)):
-        openings.add_rows(edges, p.floor, step, storeys, pitch, p.window_width,
+        openings.add_window_storeys(
+            edges,
+            p.floor,
+            step,
+            storeys,
+            pitch,
+            p.window_width,
             head=min(2.2, step - 0.45),
-        )  # fmt: skip
+        )
     door = _add_entrance(p, wing, openings, door_material)
     _add_bay(p, wing, openings, storeys, step, door)
     openings.add_casings((0,), p.casing)
@@ -211,7 +217,7 @@ def _add_roof(p: _HouseInARow, wing: Wing) -> None:
             p.add_to("walls", *_stepped_gable(wing, wing.wall(edge)))
         _add_gable_windows(p, wing)
     elif p.roof in ("gable", "gambrel"):
-        line = [(u, z + _FIREWALL_M) for u, z in wing.line]
+        line = [(u, z + _FIREWALL_M) for u, z in wing.roof_line]
         for x in (wing.x0, wing.x1 - 0.3):
             firewall = roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
             p.add_to("walls", firewall)
@@ -253,13 +259,13 @@ def _add_stack(p: _HouseInARow, wing: Wing, name: str) -> None:
     yaw = math.pi / 2
     if p.roof in ("front", "stepped"):
         x = wing.x0 + 0.3 * wing.width
-        z = roofs.line_height(wing.line, x)
+        z = roofs.line_height(wing.roof_line, x)
         spot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
         add_chimney(p, name, spot, p.brick, yaw=yaw)
         return
     x = wing.x0 + 0.45 if p.door_left else wing.x1 - 0.45
     y = wing.y0 + 0.55 * wing.depth
-    spot = (x, y, roofs.line_height(wing.line, y) - 0.8)
+    spot = (x, y, roofs.line_height(wing.roof_line, y) - 0.8)
     row = "chimney_row"
     scale = (0.8, 0.85, 1.0)
     add_chimney(p, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
@@ -320,7 +326,9 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     area = (x0, main.y1 - 0.06, x0 + width, back)
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
     openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
-    openings.row((1, 2, 3), 0.9, 2.6, [wing_walls.sash(1.1, 0.1, 0.9, 2.1)])
+    openings.add_bays(
+        (1, 2, 3), 0.9, 2.6, [wing_walls.sash(1.1, 0.1, 0.9, 2.1)]
+    )
     openings.enclose((wing_walls.GLASS_M,))
 
 
@@ -441,7 +449,7 @@ class ShopHouse(_HouseInARow):
         head = min(2.25, step - 0.4)
         width = self.window_width
         for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
-            openings.add_rows(
+            openings.add_window_storeys(
                 edges, ground, step, upper, pitch, width, head=head
             )
         _add_ground(self, wing, openings)
@@ -474,7 +482,7 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
         x = 0.9 if left else length - 0.9
         openings.add_door(0, x, 0.0, height=2.3)
     back = [wing_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
-    openings.row((2,), 0.5, 4.5, back, 0.8)
+    openings.add_bays((2,), 0.5, 4.5, back, 0.8)
 
 
 def _add_oriels(

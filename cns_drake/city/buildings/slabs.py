@@ -437,6 +437,16 @@ def _add_ground(p: GalleryFlats, slab: np.ndarray) -> float:
 def _gallery_flats_storey(
     p: GalleryFlats, storey: float, open_edge: int
 ) -> Facade:
+    """Returns the facade of a storey, from its floor to the next one.
+
+    Doors and windows of the flats are on the side of the gallery, loggias on
+    the opposite side. The ends have windows in the middle.
+
+    Args:
+        p: the building.
+        storey: height of the storey [m].
+        open_edge: the side of the gallery: 0 for the front, 2 for the back.
+    """
     head = round(storey - 0.45, 2)
 
     def flat(a: float, b: float) -> list[Relief]:

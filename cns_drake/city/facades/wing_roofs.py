@@ -38,7 +38,7 @@ def add_roof(
             `attic_window` makes; None for no windows.
         material: material of the gables.
     """
-    roof, outline, line = wing.roof, wing.outline, wing.line
+    roof, outline, line = wing.roof, wing.outline, wing.roof_line
     is_free = [k not in wing.blind for k in range(4)]
     if roof.kind == "flat":
         floor = round(wing.top - roof.parapet, 3)
@@ -235,7 +235,7 @@ def add_dormers(
         roof: roof of the dormers: `gable`, `shed` or `flat`.
         pitch: greatest distance from the middle of one dormer to the next [m].
     """
-    (u0, z0), (u1, z1) = wing.line[:2]
+    (u0, z0), (u1, z1) = wing.roof_line[:2]
     slope = (z1 - z0) / (u1 - u0)
     room = z1 - z0
     if count == 0 or slope < 0.35:

@@ -37,7 +37,7 @@ class Openings:
         self._others = others
         self._reliefs: dict[int, list[walls.Relief]] = {k: [] for k in range(4)}
 
-    def row(
+    def add_bays(
         self,
         edges: Iterable[int],
         z: float,
@@ -65,7 +65,9 @@ class Openings:
                     for r in layout(edge, b - a)
                 ]
 
-    def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
+    def replace_by_bay(
+        self, edge: int, x: float, width: float, bay: bays.Bay
+    ) -> None:
         """Adds a bay to a wall, in place of the openings that it touches.
 
         Args:
@@ -86,7 +88,7 @@ class Openings:
             if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
         ] + new
 
-    def add(self, edge: int, reliefs: Iterable[walls.Relief]) -> None:
+    def add_reliefs(self, edge: int, reliefs: Iterable[walls.Relief]) -> None:
         """Adds reliefs, given in wall coordinates, to the wall `edge`."""
         self._reliefs[edge] += reliefs
 
@@ -168,7 +170,7 @@ class Openings:
         self.add_walls(glass, bands, material)
         add_roof(self._out, self._wing, attic, material)
 
-    def add_rows(
+    def add_window_storeys(
         self,
         edges: Iterable[int],
         floor: float,
@@ -197,7 +199,7 @@ class Openings:
             z = floor + k * storey
             wide = round(width * (1.25 if k == 0 else 1.0), 2)
             choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
-            self.row(edges, z + 0.7, pitch, choices, margin)
+            self.add_bays(edges, z + 0.7, pitch, choices, margin)
 
     def add_door(
         self,
@@ -234,7 +236,7 @@ class Openings:
                     )
             return relief
 
-        self.put(edge, x, width + 2 * lights + 0.5, bay)
+        self.replace_by_bay(edge, x, width + 2 * lights + 0.5, bay)
         leaf = _leaf(x - half, x + half, floor, top)
         self._out.add_to(
             material, *(self._wing.wall(edge).place(part) for part in leaf)
@@ -253,7 +255,7 @@ class Openings:
         """
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
         hole: list[walls.Relief] = [walls.Patch(a, b, 0.0, height, DOOR_M)]
-        self.put(edge, x, width + 0.3, lambda x0, x1: hole)
+        self.replace_by_bay(edge, x, width + 0.3, lambda x0, x1: hole)
         count = 4
         step = height / count
         for k in range(count):
@@ -311,7 +313,7 @@ class Openings:
             shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
             if self._out.chance(0.5):
                 shop = _mirrored_bay(shop)
-            self.put(edge, (x0 + x1) / 2, x1 - x0, shop)
+            self.replace_by_bay(edge, (x0 + x1) / 2, x1 - x0, shop)
             z = head + 0.08
             tall = self._out.uniform(0.55, 0.8, 2)
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)

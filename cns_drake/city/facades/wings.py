@@ -137,7 +137,7 @@ class Wing:
         return details.WallFrame(self.outline, edge)
 
     @property
-    def line(self) -> list[tuple[float, float]]:
+    def roof_line(self) -> list[tuple[float, float]]:
         """The roof line as (across, z) points [m], without eaves.
 
         `across` is the coordinate perpendicular to the ridge: y, or x if the
@@ -155,6 +155,7 @@ class Wing:
         if roof.kind == "shed":
             heights = (self.top, z) if roof.falling else (z, self.top)
             return [(a, heights[0]), (b, heights[1])]
+        # A flat roof. A hipped roof, which has no gables, counts as flat.
         return [(a, self.top), (b, self.top)]
 
     @property

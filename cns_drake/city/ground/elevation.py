@@ -43,9 +43,11 @@ class Pad(NamedTuple):
 
 @dataclass(frozen=True)
 class LevelGround:
-    """The ground of a city whose streets all have the same height [m].
+    """The ground of a city whose streets are all at z = 0.
 
-    `pads` is empty, because level ground needs no level areas of its own.
+    Attributes:
+        height: height of the ground in W, which is that of the sidewalks [m].
+        pads: empty, because level ground needs no level areas of its own.
     """
 
     height: float
@@ -207,9 +209,11 @@ def make_ground(
         pads: level areas outside the streets. Where two pads meet, the first
             pad takes precedence.
     """
-    if callable(kerb_height):
-        return SlopingGround(surface, kerb_height, streets, bounds, pads)
-    if surface.is_level and all(pad.height == kerb_height for pad in pads):
+    if (
+        not callable(kerb_height)
+        and surface.is_level
+        and all(pad.height == kerb_height for pad in pads)
+    ):
         return LevelGround(kerb_height)
     return SlopingGround(surface, kerb_height, streets, bounds, pads)
 

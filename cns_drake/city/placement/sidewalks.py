@@ -33,7 +33,10 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
     """Places traffic lights and signs where three or more roads meet."""
     for junction in network.junctions.values():
+        # Other junctions, too, begin a new range of numbers for names.
         rng = draft.task("junction", junction.name)
+        if len(junction.arms) < 3:
+            continue
         for arm in junction.arms:
             _furnish_arm(draft, network.roads[arm.road], junction, arm, rng)
 
@@ -45,8 +48,6 @@ def _furnish_arm(
     starts = arm.end == "start"
     incoming: Direction = "backward" if starts else "forward"
     outgoing: Direction = "forward" if starts else "backward"
-    if len(junction.arms) < 3:
-        return
 
     def place(name: str, distance: float, side: int, turn: float) -> None:
         """Places an object beside the arm, `distance` from the junction [m].

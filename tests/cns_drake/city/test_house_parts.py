@@ -45,11 +45,13 @@ def test_blind_walls_have_no_free_part():
 
 def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
     openings = Openings(assembly("h"), HALL, (HALL, PORCH))
-    openings.row((0,), 1.0, 2.0, [bays.window(1.0, 1.0, 2.0, 0.1)])
+    openings.add_bays((0,), 1.0, 2.0, [bays.window(1.0, 1.0, 2.0, 0.1)])
     row = openings.layout(0, 20.0)
     assert len(row) == 6
     assert all(r.x1 < 8.0 or r.x0 > 12.0 for r in row)
-    openings.put(0, 3.0, 1.6, lambda a, b: [Patch(a, b, 0.0, 2.2, 0.3)])
+    openings.replace_by_bay(
+        0, 3.0, 1.6, lambda a, b: [Patch(a, b, 0.0, 2.2, 0.3)]
+    )
     left = [r for r in openings.layout(0, 20.0) if r.x1 < 8.0]
     door = left.pop()
     assert door == Patch(2.2, 3.8, 0.0, 2.2, 0.3)
@@ -61,7 +63,7 @@ def test_a_row_keeps_off_hidden_walls_and_a_door_replaces_windows():
 def test_flat_wall_comes_below_an_arch():
     openings = Openings(assembly("h"), HALL)
     arch = Arch(2.0, 3.0, 0.0, 2.0, 2.5, 0.3)
-    openings.add(0, [arch])
+    openings.add_reliefs(0, [arch])
     assert openings.layout(0, 20.0) == [Patch(2.0, 3.0, 0.0, 2.5, 0.0), arch]
 
 

@@ -1,0 +1,257 @@
+"""The tower under construction."""
+
+import itertools
+
+import numpy as np
+
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    bays,
+    details,
+    facade_mesh,
+    glass_mesh,
+    massing,
+)
+from cns_drake.city.geometry import Finish, Mesh, merge_meshes
+
+_STEEL = Finish((0.52, 0.53, 0.55))
+_TIMBER = Finish((0.72, 0.58, 0.38))
+# Thickness of the slabs [m].
+_SLAB_M = 0.28
+# Room for scaffolds around the frame [m].
+_SCAFFOLD_M = 1.7
+# Cladding stands this far in front of the slabs [m].
+_CLADDING_M = 0.35
+# Height of a storey of a scaffold, a lift [m].
+_SCAFFOLD_LIFT_M = 2.0
+
+
+class UnfinishedTower(Building):
+    """The tower under construction: core, frame, scaffolds, cladding."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        rise = self.height - self.uniform(3.5, 5.5)
+        wanted = max(3, round(rise / self.uniform(3.4, 4.0)))
+        # Storeys that are placed as one.
+        self.group = -(-wanted // 8)
+        # Slabs above the ground.
+        self.storeys = self.group * max(2, round(wanted / self.group))
+        self.storey = round(rise / self.storeys, 3)
+        self.pitch = self.uniform(6.0, 8.0)
+        # Extent of the core, as parts of the plan.
+        self.core = (self.uniform(0.28, 0.4), self.uniform(0.28, 0.4))
+        # Storeys whose walls are finished.
+        self.clad = self.group * self.whole(
+            0, max(1, self.storeys // self.group // 2)
+        )
+        # Edges with a scaffold.
+        self.scaffolds = self.pick(((0,), (0, 1), (0, 3), (1, 3)))
+        # Storeys it covers.
+        self.scaffold_top = min(self.whole(self.storeys // 2, self.storeys), 8)
+        # Part of the scaffold's bays behind a net.
+        self.nets = self.uniform(0.2, 0.7)
+        # Whether the top slab is still propped.
+        self.props = self.chance(0.7)
+        # Whether a hoist climbs the back.
+        self.hoist = self.chance(0.6)
+
+    def build(self) -> None:
+        """Adds all parts of the tower under construction.
+
+        The building's site must be a rectangle.
+        """
+        site = massing.rectangle(*self.site.bounds)
+        plan = np.round(massing.inset(site, _SCAFFOLD_M + 0.2), 2)
+        _add_frame(self, plan)
+        _add_core(self, plan)
+        if self.clad:
+            _add_cladding(self, plan)
+        if self.props:
+            _add_props(self, plan)
+        _add_scaffolds(self, plan)
+        if self.hoist:
+            _add_hoist(self, plan)
+
+
+def _column_places(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
+    """Returns the places of the columns."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    places = []
+    for a, b in ((x0, x1), (y0, y1)):
+        count = min(6, max(2, round((b - a) / p.pitch) + 1))
+        places.append(np.round(np.linspace(a + 0.5, b - 0.5, count), 2))
+    xs, ys = (place.tolist() for place in places)
+    return [(x, y) for x in xs for y in ys]
+
+
+def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds the columns and the slab of every storey."""
+    columns = _column_places(p, plan)
+    low = p.storey - _SLAB_M
+    top = p.storeys * p.storey
+    pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
+    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
+    # The stubs of the next storey's columns, and their reinforcing bars.
+    stubs = [massing.prism(plan, -massing.FOUNDATION_M, 0.05)]
+    for x, y in columns:
+        foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
+        bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(massing.box(*foot, top - 0.05, top + 0.5))
+        stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
+    for edge in range(4):
+        wall = details.WallFrame(plan, edge)
+        for z in (p.storey + 0.5, p.storey + 1.0):
+            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
+            pieces.append(wall.box(*rail, z, z + 0.06))
+        for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
+            post = (u - 0.03, u + 0.03, -0.09, -0.03)
+            stubs.append(wall.box(*post, top, top + 1.1))
+    group = _repeated_meshes(pieces, p.group, p.storey)
+    step = p.group * p.storey
+    p.stack("frame", group, 0.0, step, p.storeys // p.group)
+    p.add("stubs", *stubs)
+
+
+def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds the core with its doorways, and the climbing formwork on it."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
+    core = np.round(massing.rectangle(x - a, y - b, x + a, y + b), 2)
+    door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
+    layout = bays.by_edge({0: door, 2: door}, bays.plain)
+    facade = Facade(p.storey, (), layout).stacked(p.storeys)
+    top = round(p.storeys * p.storey, 3)
+    high = p.height
+    p.add(
+        "core",
+        facade_mesh(core, facade),
+        massing.skirt(core, core, top, high - 0.4),
+        massing.roof_pan(core, high - 2.0, high - 0.4, 0.3),
+    )
+    form = massing.inset(core, -0.3)
+    p.add(
+        "form",
+        massing.skirt(form, form, high - 2.6, high),
+        massing.flat(form, high - 2.6, up=False),
+        massing.roof_pan(form, high - 0.6, high, 0.3),
+        finish=_TIMBER,
+    )
+
+
+def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds the finished walls of the lower storeys."""
+    outer = massing.inset(plan, -_CLADDING_M)
+    head = round(p.storey - 0.5, 2)
+    pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
+    rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
+    facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
+    # The backs of the panels, which are seen from within, and their top edges.
+    backs = massing.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
+    rim = massing.skirt(outer, plan, p.storey, p.storey)
+    walls = [facade_mesh(outer, facade), backs, rim]
+    panes = [glass_mesh(outer, facade)]
+    groups, step = p.clad // p.group, p.group * p.storey
+    for part, pieces, finish in (
+        ("cladding", walls, p.colours["clad"]),
+        ("cladding_glass", panes, p.glass),
+    ):
+        mesh = _repeated_meshes(pieces, p.group, p.storey)
+        p.stack(part, mesh, 0.0, step, groups, finish)
+    p.add("foot", massing.foundation(outer), finish=p.colours["clad"])
+
+
+def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds props below the top slab, along the front and the back."""
+    x0, y0, x1, y1 = massing.extent(plan)
+    low = (p.storeys - 1) * p.storey
+    high = p.storeys * p.storey - _SLAB_M + 0.02
+    props = []
+    for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
+        for y in (y0 + 1.2, y1 - 1.2):
+            shaft = massing.regular_polygon(0.06, 4, (x, y))
+            props.append(massing.skirt(shaft, shaft, low - 0.02, high))
+    p.add("props", *props, finish=_STEEL)
+
+
+def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds scaffolds: uprights of full height, with platforms between them."""
+    lifts = max(2, int(p.scaffold_top * p.storey / _SCAFFOLD_LIFT_M))
+    per_group = -(-lifts // 6)
+    groups = -(-lifts // per_group)
+    lifts = per_group * groups
+    levels, standards, nets = [], [], []
+    for edge in p.scaffolds:
+        wall = details.WallFrame(plan, edge)
+        count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
+        xs = np.round(
+            np.linspace(0.2, wall.length - 0.2, count + 1), 2
+        ).tolist()
+        levels.append(wall.place(_scaffold_level(xs)))
+        for x in xs:
+            for y in (0.6, 1.45):
+                pole = massing.square(x, y, 0.04)
+                mesh = massing.prism(
+                    pole, -massing.FOUNDATION_M, lifts * _SCAFFOLD_LIFT_M + 0.9
+                )
+                standards.append(wall.place(mesh))
+        for a, b in itertools.pairwise(xs):
+            if p.chance(p.nets):
+                first = p.whole(0, lifts - 1)
+                last = p.whole(first + 1, lifts + 1)
+                low = first * _SCAFFOLD_LIFT_M + 0.2
+                high = last * _SCAFFOLD_LIFT_M - 0.2
+                spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
+                nets.append(wall.box(*spot, low, high))
+    stack = _repeated_meshes(levels, per_group, _SCAFFOLD_LIFT_M)
+    p.stack(
+        "scaffold",
+        stack,
+        0.0,
+        per_group * _SCAFFOLD_LIFT_M,
+        groups,
+        finish=_STEEL,
+    )
+    p.add("standards", *standards, finish=_STEEL)
+    p.add("nets", *nets, finish=p.colours["net"])
+
+
+def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
+    """Adds a hoist's mast and cage at the back."""
+    wall = details.WallFrame(plan, 2)
+    x = 0.5 * wall.length
+    top = p.storeys * p.storey - 1.0
+    pieces = [
+        wall.standing(u - 0.05, u + 0.05, v - 0.05, v + 0.05, top)
+        for u in (x - 0.3, x + 0.3)
+        for v in (0.3, 0.9)
+    ]
+    for z in np.arange(1.0, top, 4.5).tolist():
+        pieces.append(wall.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
+    z = round(0.55 * top, 1)
+    cage = wall.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
+    p.add("hoist", *pieces, cage, finish=Finish((0.80, 0.62, 0.16)))
+
+
+def _repeated_meshes(pieces: list[Mesh], count: int, step: float) -> Mesh:
+    """Returns meshes repeated `count` times, one above another."""
+    storey = merge_meshes(*pieces)
+    copies = (storey.moved((0.0, 0.0, k * step)) for k in range(count))
+    return merge_meshes(*copies)
+
+
+def _scaffold_level(xs: list[float]) -> Mesh:
+    """Returns one platform of a scaffold: boards, a guard rail and braces."""
+    a = xs[0]
+    b = xs[-1]
+    top = _SCAFFOLD_LIFT_M
+    pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
+    for z in (0.5, 1.0):
+        pieces.append(massing.box(a, b, 1.5, 1.54, z, z + 0.06))
+    for x0, x1 in itertools.pairwise(xs[::3]):
+        start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
+        pieces.append(details.beam(start, stop, 0.07))
+    return merge_meshes(*pieces)
