@@ -348,7 +348,7 @@ def _has_years(one: Imported) -> bool:
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with an additional first stage, and what differs there.
+    """Returns a city with an additional first stage, and its differences.
 
     In the first stage, buildings that no longer exist today stand in place of
     the structures that replaced them. Some of the other buildings, sampled at

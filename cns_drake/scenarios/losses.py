@@ -3,8 +3,8 @@
 A share of the buildings and plants is missing. The missing structures are those
 nearest to a random place, so a drive with a greater share lacks everything that
 a drive with a smaller share lacks. The removed structures can also be limited
-to those that an earlier stage lacks; the city is then between the two stages.
-In addition, structures of chosen classes can be missing at random.
+to structures that an earlier stage lacks; the city is then between the two
+stages. In addition, structures of chosen classes can be missing at random.
 """
 
 from collections.abc import Mapping, Sequence, Set

@@ -1,6 +1,6 @@
 """Reads meshes in formats that Drake cannot read, using Open3D.
 
-Some of Open3D's parsers crash on damaged files and print messages. They
+Some of Open3D's parsers crash on damaged files and print messages. The parsers
 therefore run in a separate process, which is started only for worlds with such
 meshes.
 """

@@ -1,7 +1,7 @@
 """Finds contents of mesh files that Open3D and Drake ignore.
 
-Open3D reads glTF, COLLADA, STL and PLY, and Drake reads OBJ. Both read some
-files only in part, without a warning. This module refuses such a file if
+Open3D reads glTF, COLLADA, STL and PLY, and Drake reads OBJ. Both programs read
+some files only in part, without a warning. This module refuses such a file if
 surfaces would be missing. Specification of glTF:
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """

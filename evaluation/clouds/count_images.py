@@ -2,13 +2,13 @@
 
 An image is (151, 151) uint8 and shows the points within 25.2 m of the LiDAR: up
 is ahead, left is left. A pixel is a column of voxels with sides of 0.4 m. The
-value of a pixel is the number of voxels with points, minus one because the
-first of these voxels is mostly ground, and at most 10. Values are scaled so
-that the largest value in the image is 255.
+value of a pixel is the number of voxels with points in its column, minus one
+(because the first of these voxels is mostly ground), and at most 10. Values are
+scaled so that the largest value in the image is 255.
 
 The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
-their images of KITTI makes other images than these. The rules above were found
-from the images themselves, on five scans of KITTI 00; there, the correlation of
+their images of KITTI makes different images. The rules above were found from
+the images themselves, on five scans of KITTI 00, where the correlation of
 pixels is 0.86. One of these rules is that indices are rounded towards zero, so
 that the middle row and the middle column are twice as wide as the others.
 """

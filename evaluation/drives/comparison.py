@@ -1,6 +1,6 @@
 """How the paths of two drives differ: offsets, lanes, headings, speeds.
 
-Two drives along one route differ because of their drivers. These quantities
+Two drives along one route differ because of their drivers. The differences
 serve to compare real drives with simulated drives.
 """
 

@@ -1,7 +1,7 @@
 """Baselines that label the points of two maps without knowing the ground truth.
 
 - `distance`: a point is kept if the other map has a point within 0.5 m;
-otherwise it is gone or new. No point is unobserved.
+  otherwise the point is gone or new. No point is unobserved.
 - `m3c2` (the extra `map-update`; Lague et al., ISPRS J. 82, 2013, in py4dgeo):
   the distance between the two maps along the normal of the surface. A point is
   gone or new if this distance exceeds both the level of detection and 0.1 m,

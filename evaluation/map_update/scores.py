@@ -1,10 +1,10 @@
 """Scores of labels of two maps against the ground truth.
 
-All scores count points, not voxels. The IoU of a class compares the points that
-have this class in the ground truth with those that have it by prediction, over
-both maps together. The class `unobserved` includes points that B is the first
-to see. A class that does not occur in the ground truth is left out of the mean,
-`miou`.
+All scores count points, not voxels. The IoU of a class compares the points of
+this class in the ground truth with the points of this class in the prediction,
+over both maps together. The class `unobserved` includes points that B is the
+first to see. A class that does not occur in the ground truth is left out of the
+mean, `miou`.
 
 Precision and recall of gone (in A) and new (in B) exist in three forms. By
 points, a predicted point is right if this point has changed in the ground
@@ -14,11 +14,11 @@ and ground truth are exchanged. By structure, verdicts on whole structures are
 compared, see `evaluation.map_update.structures.verdicts`.
 
 The predictions also give an updated map: A without the points that are
-predicted gone, plus the points of B that are predicted new or newly seen. Its
-completeness is the share of B's map within 0.2 m of the updated map. Its
-accuracy is the share of the updated map within 0.2 m of B's map, over points
-that B's drive observed in the ground truth. Its Chamfer distance is the mean of
-the mean distances in both directions.
+predicted gone, plus the points of B that are predicted new or newly seen. The
+completeness of the updated map is the share of B's map within 0.2 m of the
+updated map. The accuracy is the share of the updated map within 0.2 m of B's
+map, over points that B's drive observed in the ground truth. The Chamfer
+distance is the mean of the mean distances in both directions.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ A scan becomes a bird's-eye image that counts voxels, see
 reduced to five scales. A small network describes each of these 25 images at
 each point of a grid. A second network then combines the 25 descriptors of a
 point into one descriptor, which depends little on the heading. A NetVLAD layer
-(Arandjelovic et al.: CVPR 2016) sums all points up in one descriptor of the
-image, of 8192 numbers. The score of two scans is the negative distance of their
-descriptors. The method estimates no pose.
+(Arandjelovic et al.: CVPR 2016) sums up all points in one descriptor of the
+image, with 8192 numbers. The score of two scans is the negative distance of
+their descriptors. The method estimates no pose.
 
 The architecture is reimplemented from the paper and the authors' program (MIT
 licence); no weights are shipped. With the same weights, the descriptors of

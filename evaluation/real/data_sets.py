@@ -1,8 +1,8 @@
 """Public data sets of few scans: where each file is from, and how it is read.
 
 The data sets are not shipped. Each is a folder with a given name in a common
-folder, see `docs/real.md`. The digest of its scans shows whether they are the
-same as in earlier measurements.
+folder, see `docs/real.md`. The digest of a data set's scans shows whether the
+scans are the same as in earlier measurements.
 """
 
 from collections.abc import Callable, Sequence

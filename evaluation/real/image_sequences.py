@@ -1,4 +1,4 @@
-"""Sequences of bird's-eye images with poses, as BEVPlace's data of 2023.
+"""Sequences of bird's-eye images with poses, like BEVPlace's data of 2023.
 
 A sequence is a folder with images `imgs/*.png` and a table `pose.txt`, or with
 two such folders, `places` and `queries`. Each image becomes a cloud (see

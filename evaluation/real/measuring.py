@@ -1,12 +1,12 @@
 """The study `real`: the tasks of a study, on public data sets of few scans.
 
-Each scan of a data set with poses is a query. The places among which it is
-searched are all other scans of the same model of LiDAR: from its data set, from
-other data sets and from simulated recordings. A place is a single scan; queries
-get a random yaw and tilt, as in the protocol `fair`. Each scan is also
-localised, from a random initial guess, in a map of the scans around it. In
-addition, a classifier is trained to distinguish each data set from simulated
-scans of the same model of LiDAR (see `evaluation.real.judge`).
+Each scan of a data set with poses is a query. The query is searched among all
+other scans of the same model of LiDAR: scans of its data set, of other data
+sets and of simulated recordings. A place is a single scan; queries get a random
+yaw and tilt, as in the protocol `fair`. Each scan is also localised, from a
+random initial guess, in a map of the scans around it. In addition, a classifier
+is trained to distinguish each data set from simulated scans of the same model
+of LiDAR (see `evaluation.real.judge`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -8,15 +8,15 @@
   of a factor. With `strips`, each cell is divided by the values of a second
   factor. A retained share is bold if its 95 % interval lies below 1.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
-  smooth curve and its 95 % band where there are points enough.
+  smooth curve and its 95 % band where there are enough points.
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
 show. By default, the task is `place`, or else the only task with the metric,
 and `gate` is 0 (without geometric verification). Each method has the same
-colour in all charts. The title says in words what the chart shows. Where the
-answers to all queries are known, it also says which methods differ by the test
-of `evaluation.recognition.metrics`.
+colour in all charts. The title says in words what the chart shows. If the
+answers to all queries are known, the title also says which methods differ by
+the test of `evaluation.recognition.metrics`.
 """
 
 from collections import Counter

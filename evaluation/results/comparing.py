@@ -91,8 +91,8 @@ class Compared(NamedTuple):
     Attributes:
         first, second: names of the two methods.
         difference: the difference.
-        p_value: its p-value, corrected by Holm's method for the number of
-            differences in the comparison.
+        p_value: p-value of the difference, corrected by Holm's method for the
+            number of differences in the comparison.
     """
 
     first: str

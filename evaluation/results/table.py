@@ -2,9 +2,9 @@
 
 `results.csv` and `queries.csv` begin with the same columns: where, under which
 condition and how something was measured. All further columns are factors of an
-experiment. They are named by the path of the field in the experiment's file,
-such as `query.transient.snow`. Their values are numbers, text or truth values;
-a cell is empty where a factor does not apply.
+experiment. A factor is named by the path of its field in the experiment's file,
+such as `query.transient.snow`. The values of factors are numbers, text or truth
+values; a cell is empty where a factor does not apply.
 """
 
 from __future__ import annotations

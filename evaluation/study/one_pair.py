@@ -1,4 +1,4 @@
-"""A single pair of drives, which the engine measures at once, in this process.
+"""A single pair of drives, which the engine measures in this process.
 
 The commands `pr`, `tcr`, `localise` and `map-update` are studies of one pair.
 Their results stay in memory, and may be written as the two tables of a study.

@@ -1,7 +1,7 @@
 """Files of intermediate results that name their inputs.
 
-A part is the file of one intermediate result. It begins with a line that names
-its format and a line of JSON with its inputs. The result follows (see
+A part is the file of one intermediate result. The file begins with a line that
+names its format and a line of JSON with its inputs. The result follows (see
 `evaluation.study.value_encoding`), compressed by zstd at its fastest level.
 Compression halves maps. Spectra hardly shrink; compressing 50 MB of spectra
 takes a tenth of a second.

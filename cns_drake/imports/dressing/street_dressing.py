@@ -390,7 +390,7 @@ class Row(NamedTuple):
 def park_along(
     placing: StreetRoom, row: Row, lines: BaseGeometry, rng: np.random.Generator
 ) -> None:
-    """Parks cars at random on those sides of a street where they may park.
+    """Parks cars at random on the sides of a street that allow parking.
 
     Args:
         placing: places the cars.

@@ -498,7 +498,7 @@ def sea(
     limits: np.ndarray,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
-    """Yields the sea, to the right of the coastlines; nothing without them.
+    """Yields the sea, to the right of the coastlines, if there are any.
 
     Args:
         coasts: the coastlines.
