@@ -121,21 +121,36 @@ def structure_files(drive: McapDrive) -> dict[str, str]:
     return {"structures.json": json.dumps(table, indent=1) + "\n"}
 
 
-def unit_quaternions(drive: McapDrive) -> np.ndarray:
-    """Returns the orientations of a drive's M odometry messages, (M, 4).
+def odometry_columns(drive: McapDrive) -> list[np.ndarray]:
+    """Returns positions (M, 3) and orientations (M, 4) of a drive's odometry.
 
-    The result contains unit quaternions x, y, z, w of R_WB. Quaternions in the
+    The orientations are unit quaternions x, y, z, w of R_WB. Quaternions in the
     recording may have any length.
 
     Raises:
-        InputError: if a quaternion has no direction, or a position is not
-            finite.
+        InputError: see `check_odometry`.
+    """
+    check_odometry(drive)
+    quat_xyzw = drive.odometry["quat_xyzw"]
+    length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+    # A length that is one up to rounding is not changed.
+    is_wrong = np.abs(length - 1.0) > _ROUNDING
+    unit = np.where(is_wrong, quat_xyzw / length, quat_xyzw)
+    return [drive.odometry["position"], unit]
+
+
+def check_odometry(drive: McapDrive) -> None:
+    """Checks the M odometry messages of a drive.
+
+    Raises:
+        InputError: a quaternion has no direction, or a coordinate of a position
+            is not finite, or not below `poses.FARTHEST`.
     """
     quat_xyzw = drive.odometry["quat_xyzw"]
     with np.errstate(over="ignore", invalid="ignore"):
-        length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+        length = np.linalg.norm(quat_xyzw, axis=1)
     position = drive.odometry["position"]
-    bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
+    bad = ~(np.isfinite(length) & (length > 0.0))
     bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is False here.
     if bad.any():
         row = int(bad.argmax())
@@ -144,9 +159,6 @@ def unit_quaternions(drive: McapDrive) -> np.ndarray:
             f" {drive.odometry['stamp_ns'][row]} ns has the position"
             f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
-    # A length that is one up to rounding is not changed.
-    is_wrong = np.abs(length - 1.0) > _ROUNDING
-    return np.where(is_wrong, quat_xyzw / length, quat_xyzw)
 
 
 def seconds(stamp_ns: int) -> str:
@@ -193,7 +205,7 @@ def _cns_outer_files(drive: McapDrive) -> dict[str, str]:
 
 def _cns_inner_files(drive: McapDrive) -> dict[str, str]:
     odometry, imu = drive.odometry, drive.imu
-    columns = [odometry["position"], unit_quaternions(drive)]
+    columns = odometry_columns(drive)
     files = {"gt.csv": stamped_rows(odometry["stamp_ns"], columns, ",")}
     if imu is not None:
         names = ("quat_xyzw", "angular_velocity", "specific_force")
@@ -326,7 +338,7 @@ def _tum_inner_files(drive: McapDrive) -> dict[str, str]:
     return {
         "base_link.tum": stamped_rows(
             map(seconds, X_WB["stamp_ns"].tolist()),
-            [X_WB["position"], unit_quaternions(drive)],
+            odometry_columns(drive),
             " ",
         ),
         "lidar.tum": stamped_rows(

@@ -334,6 +334,8 @@ class SceneEditing:
             cause: field of the scenario's section `transient` that asks for the
                 change.
         """
+        # Vertices have seven significant digits, which are too few far from
+        # the origin of the mesh.
         middle = np.round(p_WVs.mean(axis=0))
         self._register(
             f"{name}/surface",

@@ -26,20 +26,19 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, check_same_map
 from cns_drake.base.errors import InputError
-from evaluation.alignment.anchor_search import (
-    agreeing,
-    find_candidates,
-    find_guesses,
-    fit_anchor,
-    fit_bent,
-    straighten,
-)
+from evaluation.alignment.anchor_search import find_candidates, find_guesses
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
     even_indices,
     find_self_loops,
     loop_errors,
+)
+from evaluation.alignment.pose_graph import (
+    agreeing,
+    fit_anchor,
+    fit_bent,
+    fitted_to_loops,
 )
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.drive_views import MovedDrive
@@ -414,7 +413,7 @@ def make_consistent(drive: Drive) -> tuple[Submaps, float]:
         if disagreement < _DRIFT:
             break
         worst = max(worst, disagreement)
-        X_WS = submaps.bend(straighten(loops, submaps))
+        X_WS = submaps.bend(fitted_to_loops(loops, submaps))
         submaps = Submaps(
             MovedDrive(drive, X_WS, drive.world_frame, drive.datum)
         )

@@ -102,7 +102,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         ahead = np.array([np.cos(heading[k - 1]), np.sin(heading[k - 1])])
         aside = float(lengths[k] * np.sin(turns[k]))
         straight = before[: _straight_on(before, -ahead) + 1]
-        chain = _kerb(behind, ahead)
+        chain = _kerb_line(behind, ahead)
         reach = np.hypot(*np.diff(straight, axis=0).T).sum()
         if reach < _KERB_BEFORE or len(chain) < 2:
             continue
@@ -131,11 +131,15 @@ def _straight_on(xy: np.ndarray, ahead: np.ndarray) -> int:
     return int(np.argmin(np.append(goes_on, False)))
 
 
-def _kerb(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+def _kerb_line(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     """Returns the first corners (M, 2) of a kerb, as far as it runs straight.
 
-    The kerb is a ring of corners (N, 2) with the carriageway on its left [m].
-    If it soon steps back, the corner behind that step is the last one.
+    If the kerb soon steps back, the corner behind that step is the last one.
+
+    Args:
+        xy: (N, 2) corners of the kerb, a ring with the carriageway on its left
+            [m].
+        ahead: (2,) direction in which the kerb begins, of length 1.
     """
     last = _straight_on(xy, ahead)
     if 0 < last < len(xy) - 2 and _straight_on(xy[last + 1 :], ahead):

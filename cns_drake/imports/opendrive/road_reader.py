@@ -134,7 +134,7 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
             known = junctions if kind == "junction" else roads
             if linked is not None and linked not in known:
                 faults.add(f"link to a {kind} that is not in the file", name)
-        for _ in _dangling_lanes(road, roads):
+        for _ in _dangling_lane_links(road, roads):
             faults.add("link to a lane that is not in the file", name)
     for junction in top.all("junction"):
         name = junction.attrib.get("id", "")
@@ -185,42 +185,67 @@ def _link_at(road: Element, end: str) -> tuple[str, str | None]:
     return kind, link.attrib.get("elementId")
 
 
-def _dangling_lanes(
+def _dangling_lane_links(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
     """Yields the links of a road's lanes to lanes that do not exist."""
-
-    def sections(one: Element) -> list[Element]:
-        found = list(one.all("lanes", "laneSection"))
-        return sorted(found, key=lambda section: section.number("s", 0.0))
-
-    def lanes(section: Element) -> Iterator[Element]:
-        for side in ("left", "center", "right"):
-            yield from section.all(side, "lane")
-
-    own = sections(road)
-    for k, section in enumerate(own):
-        for end, at in zip(_ENDS, (k - 1, k + 1), strict=True):
-            if 0 <= at < len(own):
-                beside = [own[at]]
-                # One side of a road may continue through others.
-                while _is_single_sided(own[at]) and 0 < at < len(own) - 1:
-                    at += 1 if end == "successor" else -1
-                    beside.append(own[at])
-            else:
-                kind, linked = _link_at(road, end)
-                if kind != "road" or linked is None or linked not in roads:
-                    continue
-                # The link names the end of the other road; some files omit it.
-                others = sections(roads[linked])
-                beside = others[:1] + others[-1:]
-            there = {
-                lane.attrib.get("id") for one in beside for lane in lanes(one)
-            }
-            for lane in lanes(section):
+    for k, section in enumerate(_lane_sections(road)):
+        for end in _ENDS:
+            beyond = _lanes_beyond(road, k, end, roads)
+            if beyond is None:
+                continue
+            for lane in _section_lanes(section):
                 for link in lane.all("link", end):
-                    if link.attrib.get("id") not in there:
+                    if link.attrib.get("id") not in beyond:
                         yield link
+
+
+def _lanes_beyond(
+    road: Element, k: int, end: str, roads: Mapping[str, Element]
+) -> set[str | None] | None:
+    """Returns the numbers of the lanes beyond one end of a road's section.
+
+    Args:
+        road: the road.
+        k: index of the section.
+        end: `predecessor` or `successor`.
+        roads: name of a road -> the road.
+
+    Returns:
+        The numbers as in the file. None beyond an end of the road that no
+        known road follows.
+    """
+    own = _lane_sections(road)
+    step = 1 if end == "successor" else -1
+    at = k + step
+    if 0 <= at < len(own):
+        beside = [own[at]]
+        # One side of a road may continue through others.
+        while _is_single_sided(own[at]) and 0 < at < len(own) - 1:
+            at += step
+            beside.append(own[at])
+    else:
+        kind, linked = _link_at(road, end)
+        if kind != "road" or linked is None or linked not in roads:
+            return None
+        # The link names the end of the other road; some files omit it.
+        others = _lane_sections(roads[linked])
+        beside = others[:1] + others[-1:]
+    return {
+        lane.attrib.get("id") for one in beside for lane in _section_lanes(one)
+    }
+
+
+def _lane_sections(road: Element) -> list[Element]:
+    """Returns the sections of a road's lanes, sorted along the road."""
+    found = list(road.all("lanes", "laneSection"))
+    return sorted(found, key=lambda section: section.number("s", 0.0))
+
+
+def _section_lanes(section: Element) -> Iterator[Element]:
+    """Yields the lanes of a section."""
+    for side in ("left", "center", "right"):
+        yield from section.all(side, "lane")
 
 
 def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:

@@ -170,7 +170,7 @@ def _build(
         for one in thing_structures(road, lanes, faults)
     ]
     decks = list(imported_streets.bridge_decks(raised))
-    kerb = _kerb(ground)
+    kerb = _kerb_height(ground)
     kerbs = KerbHeights(ground, kerb)
     surface = RoadHeights(ground)
     marks: list[Structure] = []
@@ -287,8 +287,11 @@ def _count_spans(
                 faults.add(kind, road.name)
 
 
-def _kerb(bands: Sequence[LaneBand]) -> float:
-    """Returns the height of sidewalks above the road [m]."""
+def _kerb_height(bands: Sequence[LaneBand]) -> float:
+    """Returns the height of sidewalks above the road [m].
+
+    The height is the median of the heights in the file, within usual limits.
+    """
     kerbs = [
         band.lane.height
         for band in bands

@@ -34,7 +34,7 @@ from cns_drake.imports.openstreetmap.reading import Local, OsmWay, has_tag
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     area_kind,
-    driven_ways,
+    driven_directions,
     green_kind,
     is_marked,
     lanes_beside,
@@ -309,12 +309,12 @@ def drivable_streets(
         width = street_width(tags)
         if width is None or _is_elsewhere(name, tags, bridges):
             continue
-        ways_driven = driven_ways(tags)
-        if any(ways_driven):
+        directions = driven_directions(tags)
+        if any(directions):
             aside = lanes_beside(tags, width)
             place = (local(line), nodes)
             streets.append(
-                Street(*place, *ways_driven, aside, width, name, tags)
+                Street(*place, *directions, aside, width, name, tags)
             )
     return streets
 

@@ -244,11 +244,11 @@ def street_width(
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, where)
     if lanes:
         return LANE * lanes + 0.5
-    is_one_way = not all(driven_ways(tags))
+    is_one_way = not all(driven_directions(tags))
     return max(0.6 * usual, 3.5) if is_one_way else usual
 
 
-def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
+def driven_directions(tags: Mapping[str, str]) -> tuple[bool, bool]:
     """Returns whether cars may drive along a street, and against it.
 
     The first result is for the direction of the street's line, the second for
@@ -279,9 +279,9 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     """
     lanes = tag_value(tags, "lanes", count, _LANES_OF_STREET, None)
     if not lanes:
-        lanes = 2.0 if all(driven_ways(tags)) else 1.0
+        lanes = 2.0 if all(driven_directions(tags)) else 1.0
     # If two cars cannot pass each other, both directions keep to the middle.
-    if width < _TWO_CARS and all(driven_ways(tags)):
+    if width < _TWO_CARS and all(driven_directions(tags)):
         return 0.0
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
 
@@ -400,7 +400,7 @@ def lane_layout(tags: Mapping[str, str], width: float) -> LaneLayout:
     There are no lanes if cars may not use the street, or if it is too narrow.
     `width` is the width of the carriageway [m].
     """
-    is_along, is_against = driven_ways(tags)
+    is_along, is_against = driven_directions(tags)
     directions = is_along + is_against
     most = int(width / _LEAST_LANE_WIDTH)
     if directions == 0 or most < directions:

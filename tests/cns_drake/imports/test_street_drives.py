@@ -11,7 +11,7 @@ from cns_drake.imports.foreign_city import Street
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.tags import (
-    driven_ways,
+    driven_directions,
     is_marked,
     lanes_beside,
 )
@@ -159,7 +159,7 @@ def test_a_roundabout_is_driven_one_way():
     ring = 15 * np.column_stack([np.cos(angle), np.sin(angle)])
     nodes = [*range(10, 18), 10]
     tags = {"highway": "residential", "junction": "roundabout"}
-    forward, backward = driven_ways(tags)
+    forward, backward = driven_directions(tags)
     lanes = make_lanes(
         [
             street(ring, nodes, forward, backward),
@@ -194,7 +194,7 @@ def test_a_roundabout_is_driven_one_way():
     ],
 )
 def test_ways_that_cars_may_use(tags, expected):
-    assert driven_ways(tags) == expected
+    assert driven_directions(tags) == expected
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from evaluation.alignment.anchor_search import Ties, optimise
+from evaluation.alignment.pose_graph import Ties, optimise
 
 EYE = np.eye(4)
 

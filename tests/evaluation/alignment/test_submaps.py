@@ -10,8 +10,8 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz
-from evaluation.alignment.anchor_search import fit_anchor
 from evaluation.alignment.loop_search import Loop
+from evaluation.alignment.pose_graph import fit_anchor
 from evaluation.alignment.submaps import Submaps
 
 
