@@ -5,7 +5,7 @@ roads, lanes and junctions. The import only reports, as faults, links to things
 that are not in the file.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import replace
 from itertools import pairwise
@@ -189,9 +189,10 @@ def _dangling_lane_links(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
     """Yields the links of a road's lanes to lanes that do not exist."""
-    for k, section in enumerate(_lane_sections(road)):
+    own = _lane_sections(road)
+    for k, section in enumerate(own):
         for end in _ENDS:
-            beyond = _lanes_beyond(road, k, end, roads)
+            beyond = _lanes_beyond(road, own, k, end, roads)
             if beyond is None:
                 continue
             for lane in _section_lanes(section):
@@ -201,12 +202,17 @@ def _dangling_lane_links(
 
 
 def _lanes_beyond(
-    road: Element, k: int, end: str, roads: Mapping[str, Element]
+    road: Element,
+    own: Sequence[Element],
+    k: int,
+    end: str,
+    roads: Mapping[str, Element],
 ) -> set[str | None] | None:
     """Returns the numbers of the lanes beyond one end of a road's section.
 
     Args:
         road: the road.
+        own: the sections of its lanes, along the road.
         k: index of the section.
         end: `predecessor` or `successor`.
         roads: name of a road -> the road.
@@ -215,7 +221,6 @@ def _lanes_beyond(
         The numbers as in the file. None beyond an end of the road that no
         known road follows.
     """
-    own = _lane_sections(road)
     step = 1 if end == "successor" else -1
     at = k + step
     if 0 <= at < len(own):
