@@ -172,11 +172,11 @@ def simulate(
         scenario: Name of a shipped drive, as cns-drake list shows it, or a
             scenario file of your own.
         transient: Temporary changes to the city, such as snow=0.25,leaves=0.15.
-            The switches are: snow, the depth of the snow [m]; leaves, the share
-            of leaves that trees keep; parked_cars, scaffolds, works, furniture
-            and roadsides, which share of these things is changed or added, from
-            0 to 1; height_limit, the greatest height of buildings and plants
-            [m]; and seed, an integer that selects the random changes. May be
+            The switches are snow (depth of the snow [m]), leaves (share of the
+            leaves that trees keep), parked_cars, scaffolds, works, furniture
+            and roadsides (share of these things that is changed or added, from
+            0 to 1), height_limit (greatest height of buildings and plants [m])
+            and seed (an integer that selects the random changes). May be
             repeated.
         driver: Model of the driver. With real, the car wanders in its lane and
             changes lanes, as in published data sets. With none, the car stays

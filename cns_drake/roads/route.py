@@ -49,7 +49,7 @@ class RouteLeg(BaseModel):
             first leg enters its road [m]. Only in the first leg.
         end: where the drive ends, or where the car turns round: the distance
             from the point where the leg enters the road [m]. Only in the last
-            leg, and in a leg at whose end the car turns round on the same road.
+            leg, and in a leg that ends with a turn on the same road.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

@@ -123,8 +123,8 @@ class BtcConfig(MethodConfig):
             with the most matching triangles; [O] 50.
         normal_limit: largest difference between the normals of two planes that
             match; [O] 0.2.
-        distance_limit: largest distance from the centre of a plane to a plane
-            that it matches [m]; [O] 0.5.
+        distance_limit: largest distance between the centre of a plane and
+            another plane that still matches this plane [m]; [O] 0.5.
     """
 
     voxel_size: PositiveFloat = 2.0

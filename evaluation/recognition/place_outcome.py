@@ -434,12 +434,14 @@ def place_numbers(
     Args:
         now: outcome of the method in the condition.
         before: outcome of the method in the baseline; None to leave out the
-            results that compare the condition with the baseline. `kept`,
-            `kept_r1` and `kept_strict` are AUC, R@1 and strict AUC in the
-            condition, divided by the same metric in the baseline. `lost` is the
-            number of queries that are right only in the baseline, and `found`
-            the number of queries that are right only in the condition. For
-            `visible_change_added`, see the function.
+            results that compare the condition with the baseline.
+
+    Yields:
+        The metrics of the condition and, compared with the baseline, `kept`,
+        `kept_r1` and `kept_strict` (AUC, R@1 and strict AUC in the condition,
+        divided by the same metric in the baseline), `lost` and `found` (numbers
+        of queries that are right only in the baseline, and only in the
+        condition), and the result of the function `visible_change_added`.
     """
     outcomes = now.outcomes
     values = now.by_mode["all"].areas

@@ -186,8 +186,8 @@ class RetrievalProtocol:
     def name_with(self, method: Method) -> str:
         """Returns the name of the protocol for the results of one method.
 
-        Options that a method chooses itself (see `of`) do not make a shipped
-        protocol `own`.
+        A shipped protocol keeps its name even if the method chooses some
+        options itself (see `of`): its name does not become "own".
         """
         return self._named(lambda one: one.of(method))
 

@@ -224,10 +224,12 @@ def _reranked(
 def checked_scores(
     method: Method, function: str, scores: object, number: int
 ) -> np.ndarray:
-    """Returns scores (number,) as float64; refuses anything else.
+    """Returns the scores of a method as a float64 array of shape (number,).
 
-    Complex and masked arrays are refused, because a conversion would drop the
-    imaginary part or the mask.
+    Raises:
+        InputError: the scores have another shape or are no numbers, or they are
+            complex or masked: a conversion would drop the imaginary part or the
+            mask.
     """
     fault = ""
     try:

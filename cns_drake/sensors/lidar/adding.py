@@ -295,9 +295,11 @@ def add_described_lidar(
         weather: weather of calibrated returns.
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
-        unseen: see `add_lidar`. This also holds for all further arguments.
+        unseen: bodies that the LiDAR does not see. This argument and the
+            following ones are those of `add_lidar`.
         motion_distortion: whether the bodies of the LiDAR's plant keep moving
-            during a revolution. A recorded drive connects a `Sweep` instead.
+            during a revolution. A recorded drive connects a `Sweep` instead of
+            setting this argument.
         structures: table of the structures.
         anchored_frames: frames that never move.
         moving_bodies: frames that move during a revolution.
