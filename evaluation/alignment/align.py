@@ -390,8 +390,8 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
 def make_consistent(drive: Drive) -> tuple[Submaps, float]:
     """Returns a drive's submaps, with poses that are corrected for drift.
 
-    The poses of a drive that has drifted are corrected so that they agree at
-    places which the drive passes more than once.
+    The corrected poses of a drive that has drifted agree at places that the
+    drive passes more than once.
 
     Returns:
         The submaps, and the upper quartile of the errors at such places before

@@ -111,7 +111,7 @@ def find_candidates(source: Submaps, target: Submaps) -> Candidates:
 
 
 def find_guesses(candidates: Candidates) -> list[Guess]:
-    """Returns guesses of the pose of the source's world in the target's.
+    """Returns guesses of the pose of the source's world in the target's world.
 
     A candidate is a pair of keyframes that look alike. Two candidates determine
     a guess, which is then refined with all candidates that agree with it. The

@@ -486,8 +486,8 @@ def read_cloud(
 
     The ending of the file's name gives the format: `.pcd` and `.ply` in all
     their encodings; `.npy` with an N x 3 or N x 4 array or a structured array;
-    `.bin` with float32 numbers, such as KITTI's x, y, z and intensity of each
-    point.
+    `.bin` with float32 numbers, such as x, y, z and intensity of each point in
+    KITTI.
 
     Args:
         path: an existing file of a scan; see `read_blocks` for maps.

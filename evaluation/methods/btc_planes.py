@@ -88,8 +88,7 @@ def base_plane(
     """Returns the largest plane that patches form; outdoors, the ground.
 
     Similar patches are merged into larger planes, and patches to which no other
-    patch is similar are dropped. Then similar planes are merged with each
-    other.
+    patch is similar are dropped. Then similar planes are merged.
 
     Args:
         planes: patches, one for each voxel.

@@ -195,9 +195,9 @@ def peaks(
 
     The image is divided into square segments, each of which has at most one
     peak: the cell that has points in the most layers, or the first of several
-    such cells. A cell is part of a line, and no peak, if in some direction one
-    neighbour has nearly as many layers and the opposite neighbour at least half
-    as many.
+    such cells. A cell is part of a line, and not a peak, if in some direction
+    one neighbour has points in nearly as many layers as the cell, and the
+    opposite neighbour has points in at least half as many.
 
     Args:
         num_heights: (rows, columns) number of layers with points in each cell.

@@ -164,7 +164,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     these maps, a filled cell of the query is common if the place has a filled
     cell at the same or an adjacent position in the same layer.
 
-    Of several poses with equal counts, the first one is used. All counts are
+    Of several poses with equal counts, the first pose is used. All counts are
     integers, so that scores are the same on every processor.
     """
 

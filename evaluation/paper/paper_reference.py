@@ -72,7 +72,7 @@ def paper() -> Reference:
     Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
     contradicts the F1 beside it. The paper does not state whether a method was
     scored on all queries or only on queries with a match (the mode, see
-    `evaluation.recognition.metrics`). This is inferred from the relation
+    `evaluation.recognition.metrics`). The mode is inferred from the relation
     between R@1, F1 and AUC in all rows of the method.
     """
     changes = {
@@ -161,8 +161,8 @@ def findings(
     """Returns a verdict on each of the paper's findings that can be tested.
 
     A finding can be tested if `results` and `changes` contain the data on this
-    finding. Only results on the paper's maps, with its methods and its
-    protocol, count. If a method has several results on a pair, the first one
+    finding. Only results on the paper's maps, with the paper's methods and
+    protocol, count. If a method has several results on a pair, the first result
     counts, as in the report's tables.
     """
     shown = {
