@@ -196,6 +196,12 @@ def nearest(
 
 
 def _by_structure(both: _Labelled) -> dict[str, float]:
+    """Returns precision and recall by structures, and numbers of structures.
+
+    For each kind of change, such as `gone`, the keys are `precision_gone`,
+    `recall_gone` and `gone`, which is the number of structures that changed in
+    this way according to the ground truth. A rate without structures is NaN.
+    """
     pair, truth, predicted, counted = both
     found = {}
     for k, (name, (side, label)) in enumerate(_CHANGES.items()):
@@ -238,6 +244,14 @@ def _predicted_shares(both: _Labelled) -> dict[str, float]:
 
 
 def _updated_map(both: _Labelled) -> dict[str, float]:
+    """Returns completeness, accuracy and Chamfer distance of an updated map.
+
+    The updated map consists of the points of A that are not predicted gone, and
+    the points of B that are not predicted kept. It is compared with B's map.
+    Completeness is the share of B's points that are near the updated map,
+    accuracy the share of the updated map's points that are near B's map. All
+    are NaN if one of the two maps has no points to compare.
+    """
     pair, truth, predicted, counted = both
     stays = predicted.A != Label.GONE
     comes = predicted.B != Label.KEPT

@@ -22,37 +22,28 @@ The module needs the optional packages of the extra `judge`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import PredefinedSplit, cross_val_score
 from threadpoolctl import threadpool_limits
 
+from cns_drake.base import terminal
 from cns_drake.base.progress import track
 from evaluation.clouds.count_images import count_image, image_points
 from evaluation.drives import Drive
+from evaluation.real.patch_features import describe, patches
 
-_PATCHES = 16
-_HALF_WIDTH = 4.0
-# Least range of the middle of a patch [m].
-_LEAST_RANGE = 5.0
-# Greatest range of the middle of a patch [m].
-_MOST_RANGE = 30.0
-_FEWEST_POINTS = 150
-# Greatest number of neighbourhoods in a patch.
-_NEIGHBOURHOODS = 160
-# Radius of a neighbourhood [m].
-_RADIUS = 0.75
 # Scans closer to each other than this are from one place [m].
 _ONE_PLACE = 30.0
 # Greatest number of scans per drive.
 _MOST_SCANS = 40
 # Greatest number of folds of the cross-validation.
 _MOST_FOLDS = 3
+# Number of boosted trees.
 _TREES = 120
-_QUANTILES = (0.1, 0.5, 0.9)
 # Greatest intensity after scaling, like KITTI's, which never reaches 1.
 _FULL = 99.0
 
@@ -71,6 +62,8 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
         bright = scan["intensity"] if "intensity" in names else empty
         scan = np.stack([scan["x"], scan["y"], scan["z"], bright], axis=1)
     table = np.asarray(scan, float)
+    if not len(table):
+        return np.zeros((0, 5))
     bright = table[:, 3] * (100.0 if table[:, 3].max() <= 1.0 else 1.0)
     bright = np.minimum(np.rint(bright), _FULL)
     if ring is None:
@@ -101,6 +94,7 @@ def image_table(scan: np.ndarray) -> np.ndarray:
 def places_of(
     drives: Iterable[Drive],
     table: Callable[[np.ndarray], np.ndarray] = scan_table,
+    note: Callable[[str], None] = terminal.note,
 ) -> list[list[np.ndarray]]:
     """Returns at most 40 scans of each drive, as a list for each place.
 
@@ -109,10 +103,11 @@ def places_of(
     the earliest place whose first scan is less than 30 m away. Scans at one
     position are therefore always at one place, even if a drive comes back, or
     if they are from different drives. Each scan is a table as `scan_table`
-    returns it.
+    returns it. Scans without points are left out, and `note` is told how many.
     """
     places: dict[tuple, list[np.ndarray]] = {}
     for drive in drives:
+        num_empty = 0
         world = drive.world_frame, (drive.scenario or {}).get("map")
         for k in range(0, len(drive), -(-len(drive) // _MOST_SCANS)):
             p_WS = drive.X_WS[k, :3, 3]
@@ -123,197 +118,16 @@ def places_of(
                 and np.linalg.norm(p_WS - first[1]) < _ONE_PLACE
             )
             place = next(near, (world, tuple(p_WS)))
-            places.setdefault(place, []).append(table(drive.scan(k)))
+            scan = table(drive.scan(k))
+            if len(scan):
+                places.setdefault(place, []).append(scan)
+            num_empty += not len(scan)
+        if num_empty:
+            note(f"{drive.name}: {num_empty} scans without points left out")
     return list(places.values())
 
 
-def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yields up to sixteen patches of a scan, at random positions.
-
-    A patch contains the points (M, 5) in a square with sides of 8 m, in the
-    form of `scan`.
-
-    Args:
-        scan: (N, 5) the scan, see `scan_table`.
-        rng: random generator of the positions.
-    """
-    ranges = np.linalg.norm(scan[:, :3], axis=1)
-    near = np.flatnonzero((ranges > _LEAST_RANGE) & (ranges < _MOST_RANGE))
-    found = 0
-    for row in rng.permutation(near)[: 4 * _PATCHES]:
-        apart = np.abs(scan[:, :2] - scan[row, :2]).max(axis=1)
-        patch = scan[apart < _HALF_WIDTH]
-        if len(patch) >= _FEWEST_POINTS:
-            yield patch
-            found += 1
-        if found == _PATCHES:
-            return
-
-
-def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns the features of a piece of a scan: name -> value.
-
-    A name begins with the group of the feature, such as `intensity`.
-
-    Args:
-        patch: (M, 5) the piece, see `scan_table`.
-        rng: random generator, which chooses the points whose neighbourhoods are
-            described.
-    """
-    p, bright, ring = patch[:, :3], patch[:, 3], patch[:, 4]
-    tree = cKDTree(p)
-    has_intensity = np.isfinite(bright).all()
-    result = _intensity(bright, tree) if has_intensity else {}
-    result |= _density(p, ring, tree)
-    low = np.quantile(p[:, 2], 0.05)
-    height = p[:, 2] - low
-    for part in (0.25, *_QUANTILES, 0.99):
-        result[f"height: {part:.0%}"] = float(np.quantile(height, part))
-    result["height: 2 to 5 m"] = float(np.mean((height > 2) & (height < 5)))
-    result["height: below 0.3 m"] = float(np.mean(height < 0.3))
-    result |= _ground_steps(p[height < 0.5])
-
-    count = min(len(p), _NEIGHBOURHOODS)
-    chosen = rng.choice(len(p), count, replace=False)
-    groups = tree.query_ball_point(p[chosen], _RADIUS)
-    chosen = chosen[[len(g) >= 8 for g in groups]]
-    shapes = [_shape(p[g], ring[g]) for g in groups if len(g) >= 8]
-    if not shapes:
-        return result
-    table = np.array(shapes)
-    linear, planar, scattered, up, residual, within, between = table.T
-    flat = planar > 0.5
-    kinds = ("linear", linear), ("planar", planar), ("scattered", scattered)
-    for name, values in kinds:
-        result[f"eigenvalues: {name}"] = float(np.mean(values))
-        result[f"eigenvalues: {name}, 90 %"] = float(np.quantile(values, 0.9))
-    result["eigenvalues: mainly scattered"] = float(
-        np.mean(scattered > np.maximum(linear, planar))
-    )
-    result["eigenvalues: oblique"] = _masked_mean(
-        (up > 0.3) & (up < 0.85), flat
-    )
-    result["eigenvalues: up"] = _masked_mean(up > 0.95, flat)
-    ground = flat & (up > 0.95) & (p[chosen, 2] < low + 0.5)
-    for name, mask in (("ground", ground), ("walls", flat & (up < 0.2))):
-        for kind, values in (
-            ("all", residual),
-            ("within rings", within),
-            ("between rings", between),
-        ):
-            known = values[mask & np.isfinite(values)]
-            for part in _QUANTILES:
-                key = f"roughness: {name}, {kind}, {part:.0%} [log mm]"
-                result[key] = _quantile(known, part)
-    result["intensity: ground"] = _masked_mean(bright[chosen], ground)
-    return result
-
-
-def _intensity(bright: np.ndarray, tree: cKDTree) -> dict[str, float]:
-    rows = tree.query(tree.data, 7)[1][:, 1:]
-    spread = bright[rows].std(axis=1)
-    result = {
-        "intensity: spread among 6": float(np.median(spread)),
-        "intensity: spread among 6, mean": float(np.mean(spread)),
-        "intensity: values": float(len(np.unique(bright))),
-        "intensity: zeros": float(np.mean(bright == 0.0)),
-        "intensity: spread": float(np.std(bright)),
-        "intensity: mean": float(np.mean(bright)),
-    }
-    for part in (0.05, 0.25, 0.5, 0.75, 0.95):
-        result[f"intensity: {part:.0%}"] = float(np.quantile(bright, part))
-    return result
-
-
-def _density(
-    p: np.ndarray, ring: np.ndarray, tree: cKDTree
-) -> dict[str, float]:
-    ranges = np.linalg.norm(p, axis=1)
-    distance = tree.query(p, 5)[0][:, 1:] / ranges[:, None]
-    result = {"density: points": float(np.log(len(p)))}
-    for part in _QUANTILES:
-        key = f"density: neighbour, {part:.0%}"
-        result[key] = float(np.quantile(distance[:, 0], part))
-    result["density: isolated"] = float(np.mean(distance[:, 3] > 0.02))
-    along, across = np.full((2, 1), np.nan)
-    if np.isfinite(ring).all():
-        order = np.lexsort((np.arctan2(p[:, 1], p[:, 0]), ring))
-        gap = np.linalg.norm(np.diff(p[order], axis=0), axis=1)
-        gap /= ranges[order][1:]
-        along = gap[np.diff(ring[order]) == 0.0]
-        rows = tree.query(p, 16)[1] % len(p)
-        other = ring[rows] != ring[:, None]
-        first = rows[np.arange(len(p)), other.argmax(axis=1)]
-        across = np.linalg.norm(p - p[first], axis=1) / ranges
-        across = across[other.any(axis=1)]
-    for part in _QUANTILES:
-        result[f"density: along rings, {part:.0%}"] = _quantile(along, part)
-        result[f"density: across rings, {part:.0%}"] = _quantile(across, part)
-    for size in (0.2, 0.5, 1.0):
-        cells = len(np.unique(np.floor(p / size), axis=0))
-        result[f"voxels: of {size} m a point"] = cells / len(p)
-    return result
-
-
-def _ground_steps(p: np.ndarray) -> dict[str, float]:
-    """Returns the differences in height of neighbouring cells of the ground."""
-    cell = np.floor(p[:, :2] / 0.5).astype(int)
-    places, which = np.unique(cell, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    mean = np.bincount(which, p[:, 2]) / np.bincount(which)
-    heights = {tuple(k): z for k, z in zip(places, mean, strict=True)}
-    steps = np.array(
-        [
-            abs(z - heights.get((i + 1, j), np.nan))
-            for (i, j), z in heights.items()
-        ]
-    )
-    steps = steps[np.isfinite(steps)]
-    return {
-        f"ground: steps, {part:.0%}": _quantile(steps, part)
-        for part in _QUANTILES
-    }
-
-
-def _shape(p: np.ndarray, ring: np.ndarray) -> tuple[float, ...]:
-    """Returns the shape of a neighbourhood: shares, normal and residuals.
-
-    The shares of lines, planes and scatter are those of Demantke et al. (2011).
-    Residuals from the plane are logarithms of mm, in three kinds: of all
-    points, within rings, and of the rings' means.
-    """
-    spread = p - p.mean(axis=0)
-    values, vectors = np.linalg.eigh(spread.T @ spread / len(p))
-    c, b, a = np.sqrt(np.maximum(values, 1e-12))
-    residual = spread @ vectors[:, 0]
-    within = between = np.nan
-    if np.isfinite(ring[0]):
-        _, which, count = np.unique(
-            ring, return_inverse=True, return_counts=True
-        )
-        mean = np.bincount(which, residual) / count
-        many = count >= 3
-        if many.sum() >= 3:
-            between = _log_mm(mean[many].std())
-            within = _log_mm((residual - mean[which])[many[which]].std())
-    shares = (a - b) / a, (b - c) / a, c / a
-    return *shares, abs(vectors[2, 0]), _log_mm(c), within, between
-
-
-def _log_mm(metres: float) -> float:
-    return float(np.log(max(1e3 * metres, 1e-2)))
-
-
-def _masked_mean(values: np.ndarray, mask: np.ndarray) -> float:
-    """Returns the mean of the masked values; NaN if there are fewer than 5."""
-    return float(values[mask].mean()) if mask.sum() >= 5 else np.nan
-
-
-def _quantile(values: np.ndarray, part: float) -> float:
-    """Returns a quantile of values; NaN if there are fewer than 5."""
-    return float(np.quantile(values, part)) if len(values) >= 5 else np.nan
-
-
+@dataclass(frozen=True)
 class Features:
     """The features of all patches of a set of scans (real or simulated).
 
@@ -324,16 +138,28 @@ class Features:
         place: (N,) number of the place at which each patch was recorded.
     """
 
-    def __init__(self, places: list[list[np.ndarray]], seed: int = 0):
+    rows: list[dict[str, float]]
+    place: np.ndarray
+
+    @classmethod
+    def of_places(
+        cls, places: list[list[np.ndarray]], seed: int = 0
+    ) -> Features:
+        """Returns the features of random patches of scans.
+
+        Args:
+            places: scans by place, see `places_of`.
+            seed: seed of the random choice of patches.
+        """
         rng = np.random.default_rng(seed)
-        self.rows = []
+        rows = []
         numbers = []
         for number, scans in enumerate(places):
             for scan in scans:
                 for patch in patches(scan, rng):
-                    self.rows.append(describe(patch, rng))
+                    rows.append(describe(patch, rng))
                     numbers.append(number)
-        self.place = np.array(numbers)
+        return cls(rows, np.array(numbers))
 
     def of(self, names: list[str]) -> np.ndarray:
         """Returns some features of all patches as an array (N, F).
@@ -349,12 +175,8 @@ class Features:
 
     def part(self, mask: np.ndarray) -> Features:
         """Returns the features of the patches that a mask selects."""
-        part = object.__new__(Features)
-        part.rows = [
-            row for row, kept in zip(self.rows, mask, strict=True) if kept
-        ]
-        part.place = self.place[mask]
-        return part
+        kept = np.flatnonzero(mask).tolist()
+        return Features([self.rows[k] for k in kept], self.place[mask])
 
 
 def common_names(sets: list[Features]) -> list[str]:
@@ -445,23 +267,27 @@ def judge_draws(
     simulated: list[list[np.ndarray]],
     draws: int,
 ) -> dict:
-    """Returns how well a classifier tells real from simulated scans.
+    """Returns the mean result of `aucs_by_group` over random draws of patches.
 
-    The result is that of `aucs_by_group`, averaged over several random samples
-    of patches.
+    Groups of features that a draw lacks are left out. The numbers of patches
+    are those of the first draw.
 
     Args:
         real, simulated: scans by place, see `places_of`.
-        draws: number of random samples of patches.
+        draws: number of random draws of patches.
     """
-    results = []
-    for seed in track(range(draws), "judging", draws, "draws"):
-        sets = Features(real, seed), Features(simulated, seed)
-        results.append(aucs_by_group(*sets))
-    for key in ("auc", "control"):
-        results[0][key] = {
+    results = [
+        aucs_by_group(
+            Features.of_places(real, seed), Features.of_places(simulated, seed)
+        )
+        for seed in track(range(draws), "judging", draws, "draws")
+    ]
+    means = {
+        key: {
             group: float(np.mean([one[key][group] for one in results]))
             for group in results[0][key]
             if all(group in one[key] for one in results)
         }
-    return results[0]
+        for key in ("auc", "control")
+    }
+    return {"patches": results[0]["patches"], **means}

@@ -397,9 +397,9 @@ def judge_scans(
     drive = source()
     is_of_images = isinstance(source, ImageSource)
     table = judge.image_table if is_of_images else judge.scan_table
-    places = judge.places_of([drive], table)
+    places = judge.places_of([drive], table, reporter.note)
     if len(places) < 2:
         reporter.note(f"{drive.name}: one place, not judged")
         return None
-    simulated = judge.places_of((one() for one in made), table)
+    simulated = judge.places_of((one() for one in made), table, reporter.note)
     return judge.judge_draws(places, simulated, _DRAWS)

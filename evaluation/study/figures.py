@@ -1,4 +1,4 @@
-"""Draws the figures of a study's cities, and names their files."""
+"""Draws the figures of a study's cities and changes, and names their files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -81,7 +81,7 @@ def draw_city(
     return drives
 
 
-def draw_stages(
+def draw_change_with_spread(
     reporter: Reporter,
     map_name: str,
     stages: tuple[str, str],
@@ -91,6 +91,10 @@ def draw_stages(
     stems: tuple[Path, Path],
 ) -> ChangeResult:
     """Draws the change between two drives, and returns it with its spread.
+
+    The spread over shifted grids is measured here, and not by the task
+    `change`, because it takes sixteen times as long as the change itself, and
+    only drawn changes need it.
 
     Args:
         reporter: reports progress.
@@ -126,7 +130,7 @@ def draw_stages(
     return result
 
 
-def drawing_job(
+def city_job(
     city: MapDrives, files: StudyFiles, planned: ExtractionJobs
 ) -> tuple[Part, Job]:
     """Returns the job that draws a city, and the file of its result.
@@ -177,7 +181,7 @@ def change_job(
     part = files.part("changes", earlier.name, later.name)
     step = MakePart(
         part,
-        draw_stages,
+        draw_change_with_spread,
         (
             city.name,
             (earlier.stage, later.stage),

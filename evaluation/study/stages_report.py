@@ -314,7 +314,7 @@ class _CityReport:
             ),
         )
         assert isinstance(planned, ExtractionJobs)
-        self._drawing, job = figures.drawing_job(city, self._files, planned)
+        self._drawing, job = figures.city_job(city, self._files, planned)
         jobs = [job]
         self._changes = []
         for pair in city.change_pairs():

@@ -94,7 +94,7 @@ def main() -> None:
     except InputError as error:
         raise SystemExit(f"error: {error}") from None
     result = judge_draws(*sets, arguments.draws)
-    first = Features(sets[0]), Features(sets[1])
+    first = Features.of_places(sets[0]), Features.of_places(sets[1])
     result["features"] = strongest(*first, common_names([*first]))
     if arguments.json:
         print(json.dumps(result, indent=1))

@@ -154,7 +154,7 @@ class FacadePlan:
         and in its recess. Paving far above or below the ground is ignored.
         """
         depths = {"shop": _SHOP_DEPTH, "gate": _GATE_DEPTH}
-        deep = depths.get(door.kind, self.style.depth + _DOOR_DEEPER)
+        deep = depths.get(door.kind, self.style.recess + _DOOR_DEEPER)
         middle = (door.x0 + door.x1) / 2
         x, out = np.meshgrid(
             [door.x0 + _JAMB, middle, door.x1 - _JAMB],
@@ -196,7 +196,7 @@ def plan_facade(
         to_drive: distance from the wall to the nearest drive [m].
     """
     floor, ground = base - panel.origin[2], ground - panel.origin[2]
-    cells = bays.stretches(panel.length, style.pitch, _MARGIN)
+    cells = bays.stretches(panel.length, style.window_pitch, _MARGIN)
     first = max(0, math.floor(-floor / style.storey))
     last = math.ceil((panel.height - floor) / style.storey)
     if style.use == "church":
@@ -204,12 +204,12 @@ def plan_facade(
     top = panel.height - _FROM_TOP - style.cornice
     openings = []
     for row in range(first, last):
-        low = floor + row * style.storey + style.sill
+        low = floor + row * style.storey + style.window_sill
         if (
             low >= max(_FROM_FOOT, ground + _FROM_GROUND)
-            and low + _LEAST_PART * style.height <= top
+            and low + _LEAST_PART * style.window_height <= top
         ):
-            high = min(low + style.height, top)
+            high = min(low + style.window_height, top)
             openings += [
                 Opening(row, min(k, len(cells) - 1 - k), x0, x1, low, high)
                 for k, (x0, x1) in enumerate(cells)
@@ -413,17 +413,17 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
     elif kind == "gate":
         bay = bays.gate(_GATE_WIDTH, height, _GATE_DEPTH)
     elif kind == "door":
-        depth = style.depth + _DOOR_DEEPER
+        depth = style.recess + _DOOR_DEEPER
         bay = bays.house_door(_DOOR_WIDTH, 0.0, height, depth)
     else:
         has_bars = plan.to_drive < _BARS_WITHIN
         has_sill = plan.to_drive < _SILLS_WITHIN and z0 > 0.2
         bay = bays.window(
-            style.width,
+            style.window_width,
             0.0,
             height,
-            style.depth,
-            mullions=int(has_bars and style.width > _WIDEST_LEAF),
+            style.recess,
+            mullions=int(has_bars and style.window_width > _WIDEST_LEAF),
             transom=0.7 * height
             if has_bars and height > _HIGHEST_PANE
             else None,
@@ -435,7 +435,7 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
         depth = relief.depth
         material = "body"
         if kind == "window" and depth > 0.0:
-            material = "glass" if depth == style.depth else "frames"
+            material = "glass" if depth == style.recess else "frames"
         elif kind == "shop" and depth >= _SHOP_DEPTH:
             material = "glass"
         elif kind in ("door", "gate") and depth > 0.0:

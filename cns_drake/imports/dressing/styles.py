@@ -49,11 +49,11 @@ class Style:
     Attributes:
         use: use of the building, such as `flats`.
         storey: height of a storey.
-        pitch: distance between the centres of neighbouring windows.
-        width: width of a window.
-        sill: height of a window's lower edge above the floor.
-        height: height of a window.
-        depth: depth of a window's recess.
+        window_pitch: distance between the centres of neighbouring windows.
+        window_width: width of a window.
+        window_sill: height of a window's lower edge above the floor.
+        window_height: height of a window.
+        recess: depth of a window's recess.
         wall, roof, glass, frame, trim, door, sign: finishes of these parts.
         shops: whether the ground floor may have shops on the street.
         balconies: whether every other window may have a balcony.
@@ -65,11 +65,11 @@ class Style:
 
     use: str
     storey: float
-    pitch: float
-    width: float
-    sill: float
-    height: float
-    depth: float
+    window_pitch: float
+    window_width: float
+    window_sill: float
+    window_height: float
+    recess: float
     wall: Finish
     roof: Finish
     glass: Finish
@@ -184,11 +184,13 @@ def make_style(
     return Style(
         use=use,
         storey=storey,
-        pitch=pitch,
-        width=round(min(width, pitch - 0.6), 2),
-        sill=round((storey - window) * (0.62 if storey < 5.0 else 0.4), 2),
-        height=round(window, 2),
-        depth=0.22 if is_old else 0.14,
+        window_pitch=pitch,
+        window_width=round(min(width, pitch - 0.6), 2),
+        window_sill=round(
+            (storey - window) * (0.62 if storey < 5.0 else 0.4), 2
+        ),
+        window_height=round(window, 2),
+        recess=0.22 if is_old else 0.14,
         wall=wall,
         roof=roof or drawn_roof,
         glass=_finish(rng, "glass"),

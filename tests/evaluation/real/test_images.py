@@ -285,8 +285,10 @@ class Scanned:
 @pytest.mark.night
 def test_images_are_told_from_images_of_scans(tmp_path, monkeypatch):
     judge = pytest.importorskip("evaluation.real.judge")
+    from evaluation.real import patch_features
+
     monkeypatch.setattr(judge, "_TREES", 10)
-    monkeypatch.setattr(judge, "_NEIGHBOURHOODS", 40)
+    monkeypatch.setattr(patch_features, "_NEIGHBOURHOODS", 40)
     folder = tmp_path / "imgs"
     folder.mkdir()
     rows = []

@@ -15,11 +15,11 @@ PLACES = 6
 
 @pytest.fixture(scope="module")
 def judge():
-    from evaluation.real import judge
+    from evaluation.real import judge, patch_features
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge, "_TREES", 10)
-        patch.setattr(judge, "_NEIGHBOURHOODS", 40)
+        patch.setattr(patch_features, "_NEIGHBOURHOODS", 40)
         yield judge
 
 
@@ -71,7 +71,7 @@ def make_place(folder, seed, *, rough=0.005, bias=0.0, texture=3.0):
 def features(judge, program, folder, seed, **options):
     for place in range(PLACES):
         make_place(folder / str(place), 100 * seed + place, **options)
-    return judge.Features(program.read_places(folder))
+    return judge.Features.of_places(program.read_places(folder))
 
 
 @pytest.fixture(scope="module")
@@ -114,9 +114,11 @@ def test_it_finds_the_difference(
 
 
 def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
+    from evaluation.real import patch_features
+
     # Means need neither a classifier nor many patches.
     for name in ("_PATCHES", "_NEIGHBOURHOODS"):
-        monkeypatch.setattr(judge, name, 5)
+        monkeypatch.setattr(patch_features, name, 5)
     monkeypatch.setattr(
         judge,
         "tell_apart",
@@ -131,7 +133,9 @@ def test_a_result_is_the_mean_of_draws(judge, program, tmp_path, monkeypatch):
             make_place(folder, 100 * seed + place)
         sets.append(program.read_places(tmp_path / str(seed)))
     single = [
-        judge.aucs_by_group(*(judge.Features(places, seed) for places in sets))
+        judge.aucs_by_group(
+            *(judge.Features.of_places(places, seed) for places in sets)
+        )
         for seed in (0, 1)
     ]
     mean = judge.judge_draws(*sets, 2)
@@ -216,3 +220,14 @@ def test_on_a_straight_road_places_are_runs(judge):
             runs.append([one])
     found = judge.places_of([Drive(*((one, 0.0) for one in x))])
     assert [[scan[0, 0] for scan in place] for place in found] == runs
+
+
+def test_scans_without_points_are_left_out(judge):
+    drive = Drive((0.0, 0.0), (5.0, 0.0), (90.0, 0.0))
+    drive.name = "one"
+    drive.scan = lambda k: np.zeros((0, 4)) if k else np.ones((1, 4))
+    told = []
+    found = judge.places_of([drive], note=told.append)
+    assert [len(place) for place in found] == [1]
+    assert told == ["one: 2 scans without points left out"]
+    assert judge.image_table(np.zeros((0, 4))).shape == (0, 5)
