@@ -30,21 +30,17 @@ from cns_drake.sensors.imu.imu import add_imu as add_imu
 from cns_drake.sensors.imu.noise import ImuNoise as ImuNoise
 from cns_drake.sensors.lidar.adding import add_lidar as add_lidar
 from cns_drake.sensors.lidar.adding import add_lidar_view as add_lidar_view
+from cns_drake.sensors.lidar.beams import BeamPattern as BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar as Lidar
 from cns_drake.sensors.lidar.lidar import RayHits as RayHits
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
 )
-from cns_drake.sensors.lidar.patterns import BeamPattern as BeamPattern
 from cns_drake.sensors.lidar.patterns import (
     DirectionPattern as DirectionPattern,
 )
-from cns_drake.sensors.lidar.patterns import (
-    NoddingPattern as NoddingPattern,
-)
-from cns_drake.sensors.lidar.patterns import (
-    RosettePattern as RosettePattern,
-)
+from cns_drake.sensors.lidar.patterns import NoddingPattern as NoddingPattern
+from cns_drake.sensors.lidar.patterns import RosettePattern as RosettePattern
 from cns_drake.sensors.lidar.patterns import SpinningPattern as SpinningPattern
 from cns_drake.sensors.lidar.patterns import (
     make_flash_pattern as make_flash_pattern,
@@ -54,9 +50,7 @@ from cns_drake.sensors.lidar.presets import (
     make_beam_pattern as make_beam_pattern,
 )
 from cns_drake.sensors.odometry.odometry import Odometry as Odometry
-from cns_drake.sensors.odometry.odometry import (
-    OdometrySensor as OdometrySensor,
-)
+from cns_drake.sensors.odometry.odometry import OdometrySensor as OdometrySensor
 from cns_drake.sensors.odometry.odometry import add_odometry as add_odometry
 from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,

@@ -13,209 +13,34 @@ rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
-import math
 from typing import NamedTuple
 import weakref
 
 import numpy as np
-from numpy.typing import ArrayLike
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RotationMatrix
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.curved_shapes import (
-    CapsuleAxes,
-    NearCurvedShapes,
-    circumscribe,
+from cns_drake.ray_casting.curved_shapes import CapsuleAxes, NearCurvedShapes
+from cns_drake.ray_casting.embree_primitives import (
+    CURVED,
+    FLAT,
+    PROXY,
+    PROXY_OWNER,
+    Primitives,
+    merge_first,
+    merge_second,
 )
 from cns_drake.ray_casting.moving_groups import Placed
-from cns_drake.ray_casting.ray_groups import Member, RayGroup
+from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
-from cns_drake.scene.surfaces import (
-    CapsuleSurface,
-    CylinderSurface,
-    EllipsoidSurface,
-    HalfSpaceSurface,
-    TriangleSurface,
-    merge_triangles,
-)
 
-# Masks of geometry: triangles, curved shapes, and proxies of these.
-FLAT = 1
-CURVED = 2
-PROXY = 4
 SOLID = FLAT | CURVED
 ALL = SOLID | PROXY
-# Owner of the primitives of proxies.
-PROXY_OWNER = -2
-# Longest cones and rounded segments [radii]: longer ones lose hits to single
-# precision (measured at 3000: one in 40), and are cut into pieces.
-_SLENDEREST = 700.0
-# Greatest number of these pieces.
-_MOST_PIECES = 1000
-
-
-class Primitives(NamedTuple):
-    """The data of one Embree geometry.
-
-    Attributes:
-        kind: Embree's number for the type of geometry.
-        buffers: slot, format and array of each buffer.
-        owners: (P,) int32 for each primitive, the number of its member in the
-            group.
-        mask: `FLAT`, `CURVED`, or `PROXY` for polyhedra around curved shapes.
-    """
-
-    kind: int
-    buffers: list[tuple[int, int, np.ndarray]]
-    owners: np.ndarray
-    mask: int = CURVED
-
-
-def merge_first(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the Embree geometries of a group for the first hierarchy.
-
-    Every group adds its triangles. A group that can move also adds its curved
-    shapes; any other group adds a polyhedron around each curved shape instead.
-    All rays are cast on the first hierarchy.
-    """
-    members = _numbered(group)
-    flat = [
-        (index, X_LG, surface)
-        for index, X_LG, surface in members
-        if isinstance(surface, TriangleSurface)
-    ]
-    if flat:
-        yield _as_primitives(flat, FLAT)
-    if group.frame_id is not None:
-        yield from merge_curved(members)
-        return
-    curved = [
-        (PROXY_OWNER, X_LG, circumscribe(surface))
-        for _, X_LG, surface in members
-        if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
-    ]
-    if curved:
-        yield _as_primitives(curved, PROXY)
-
-
-def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the Embree geometries of a group for the second hierarchy.
-
-    A group that cannot move adds its curved shapes; any other group adds
-    nothing. A ray is cast on the second hierarchy only if it hits one of the
-    polyhedra around curved shapes, or starts in such a polyhedron (see
-    `merge_first`).
-    """
-    if group.frame_id is None:
-        yield from merge_curved(_numbered(group))
-
-
-def _numbered(group: RayGroup) -> list[Member]:
-    """Returns a group's members, numbered from 0 within the group.
-
-    The primitives then depend only on the shapes, so that groups of the same
-    shapes can share them.
-    """
-    return [(k, X, surface) for k, (_, X, surface) in enumerate(group.members)]
-
-
-def _as_primitives(
-    surfaces: Sequence[tuple[int, RigidTransform, TriangleSurface]], mask: int
-) -> Primitives:
-    merged, owners = merge_triangles(surfaces)
-    vertices = merged.p_GVset.astype(np.float32)
-    corners = merged.triangles.astype(np.uint32)
-    buffers = [
-        (embree.VERTEX_BUFFER, embree.FLOAT3, vertices),
-        (embree.INDEX_BUFFER, embree.UINT3, corners),
-    ]
-    return Primitives(embree.TRIANGLE, buffers, owners, mask)
-
-
-def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
-    """Yields one Embree geometry for each kind of curved shape in a group.
-
-    Embree intersects spheres, cones, discs and rounded segments exactly (in
-    single precision).
-
-    Args:
-        members: index, pose X_LG in the group's frame L, and surface of each
-            geometry G of the group.
-    """
-    cones: list[tuple[int, ArrayLike]] = []
-    capsules: list[tuple[int, ArrayLike]] = []
-    spheres: list[tuple[int, ArrayLike]] = []
-    discs: list[tuple[int, ArrayLike, ArrayLike]] = []
-    for index, X_LG, surface in members:
-        if isinstance(surface, TriangleSurface | HalfSpaceSurface):
-            continue
-        if isinstance(surface, EllipsoidSurface):
-            radius = surface.semi_axes[0]
-            spheres.append((index, [[*X_LG.translation(), radius]]))
-            continue
-        axis = X_LG.rotation().matrix()[:, 2]
-        ends = [
-            [*(X_LG.translation() + side * axis), surface.radius]
-            for side in (-surface.length / 2.0, surface.length / 2.0)
-        ]
-        is_cone = isinstance(surface, CylinderSurface)
-        segments = cones if is_cone else capsules
-        segments += [(index, piece) for piece in _cut_shape(ends, surface)]
-        if is_cone:
-            # Embree closes cones as well, but rounding of the axis tilts the
-            # ends of flat ones; discs do not tilt.
-            discs.append((index, ends, [-axis, axis]))
-
-    for kind, segments in (
-        (embree.CONE, cones),
-        (embree.ROUND_SEGMENT, capsules),
-    ):
-        first_ends = 2 * np.arange(len(segments), dtype=np.uint32)
-        if segments:
-            ends_of = embree.INDEX_BUFFER, embree.UINT, first_ends
-            yield Primitives(
-                kind, [_vertices(segments), ends_of], _owners(segments)
-            )
-    if discs:
-        normals = _float32(d[2] for d in discs)
-        facing = embree.NORMAL_BUFFER, embree.FLOAT3, normals
-        owners = np.repeat(_owners(discs), 2)
-        yield Primitives(embree.DISC, [_vertices(discs), facing], owners)
-    if spheres:
-        yield Primitives(embree.SPHERE, [_vertices(spheres)], _owners(spheres))
-
-
-def _owners(shapes: Iterable[tuple]) -> np.ndarray:
-    return np.array([owner for owner, *_ in shapes], np.int32)
-
-
-def _cut_shape(
-    ends: Sequence[ArrayLike], surface: CylinderSurface | CapsuleSurface
-) -> list[np.ndarray]:
-    """Cuts a long shape; returns the ends (2, 4) of each piece.
-
-    The ends are centre and radius. Rays that start inside the shape hit the
-    joints.
-    """
-    slenderness = surface.length / surface.radius
-    num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
-    first, last = (np.asarray(end) for end in ends)
-    joints = np.linspace(first, last, max(num, 1) + 1)
-    return [joints[k : k + 2] for k in range(len(joints) - 1)]
-
-
-def _vertices(shapes: Iterable[tuple]) -> tuple[int, int, np.ndarray]:
-    places = _float32(shape[1] for shape in shapes)
-    return embree.VERTEX_BUFFER, embree.FLOAT4, places
-
-
-def _float32(arrays: Iterable[ArrayLike]) -> np.ndarray:
-    return np.concatenate([np.asarray(a) for a in arrays]).astype(np.float32)
 
 
 # Embree treats smaller direction components as positive, whatever their sign. A

@@ -11,17 +11,10 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.embree_hierarchy import (
-    CURVED,
-    SOLID,
-    EmbreeScene,
-)
+from cns_drake.ray_casting.embree_hierarchy import SOLID, EmbreeScene
+from cns_drake.ray_casting.embree_primitives import CURVED
 from cns_drake.ray_casting.exact_triangles import ExactTriangles
-from cns_drake.ray_casting.ray_groups import (
-    Motion,
-    group_geometries,
-    serves,
-)
+from cns_drake.ray_casting.ray_groups import Motion, group_geometries, serves
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 

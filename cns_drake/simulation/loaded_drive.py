@@ -28,7 +28,7 @@ from cns_drake.simulation.recording_schedule import (
     RecordingPlan,
     plan_recording,
 )
-from cns_drake.traffic import lane_graph, traffic_plan
+from cns_drake.traffic import lane_graph, queues, traffic_plan
 from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
@@ -212,7 +212,7 @@ def plan_scenario_traffic(
             ego_box=EGO_BOX,
         )
     if wanted.queues:
-        return traffic_plan.plan_queues(
+        return queues.plan_queues(
             graph,
             seed=wanted.seed,
             duration=trajectory.duration,

@@ -15,8 +15,8 @@ from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar.adding import connect_lidar
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar
-from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 

@@ -30,7 +30,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.lidar.patterns import BeamPattern
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.simulation.loaded_drive import load_drive, structure_list
 from cns_drake.simulation.station import make_station
 

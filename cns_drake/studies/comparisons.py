@@ -1,6 +1,6 @@
 """Makes the two drives of each condition of an experiment."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 import math
@@ -12,19 +12,15 @@ import numpy as np
 from pydantic import Field
 
 from cns_drake.ageing.years import LAST_YEAR
-from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import natural_key
-from cns_drake.base.number_text import whole_number
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import Route, draw_route
 from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.provenance import combined_digest, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
-from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.sensors.sensor_config import Section
@@ -85,8 +81,6 @@ VIEWPOINTS: Mapping[str, tuple[float, float]] = {
 _MOST_ROOM = 0.5
 # The same for a car that follows others, because then all wait for each other.
 _FOLLOWED_ROOM = 0.25
-# Columns of a table of frozen drives.
-_FROZEN = ("map", "level", "drives")
 
 
 class DrawnRoute(Section):
@@ -903,74 +897,3 @@ def with_lidars_moved(
             rpy_deg=(roll, pitch, yaw + heading_deg),
         )
     return drive.replaced(lidars=lidars)
-
-
-def frozen_drives(table: str) -> dict[tuple[str, int], str]:
-    """Reads a table of drives that must stay the same in all releases.
-
-    Args:
-        table: name of a CSV file in the folder of the shipped worlds.
-
-    Returns:
-        (map, level) -> fingerprint, a hash of the drives that are compared. The
-        level is the degree of difficulty, see `docs/levels.md`.
-
-    Raises:
-        InputError: there is no such file, or a level is not a number.
-    """
-    path = worlds_folder() / table
-    return {
-        (
-            row["map"],
-            whole_number(row["level"], f"{path}: line {line}: level"),
-        ): row["drives"]
-        for line, row in read_records(path, _FROZEN)
-    }
-
-
-def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
-    """Returns a hash of all drives and of the cities along these drives.
-
-    Args:
-        compared: the drives.
-        worlds: cache, world file -> digest of the files of its world. This
-            function adds the digests of the worlds of these drives.
-
-    Raises:
-        InputError: a file of a world cannot be read.
-    """
-    for drive in compared.drives:
-        if drive.world_file not in worlds:
-            worlds[drive.world_file] = combined_digest(digest_inputs(drive))
-    return fingerprint(
-        {
-            "drives": compared.fingerprint(),
-            "worlds": [worlds[one.world_file] for one in compared.drives],
-        }
-    )
-
-
-def check_frozen(
-    table: str, compared: Mapping[tuple[str, int], Sequence[str]]
-) -> None:
-    """Checks that the drives of a comparison are listed in a table.
-
-    Maps that are not in the table are not checked.
-
-    Args:
-        table: name of a file in the folder of the shipped worlds; see
-            `frozen_drives`.
-        compared: (map, level) -> fingerprints of the compared drives. Levels
-            are degrees of difficulty, see `docs/levels.md`.
-
-    Raises:
-        InputError: a fingerprint differs from the table's.
-    """
-    frozen = frozen_drives(table)
-    for (name, level), prints in compared.items():
-        wanted = frozen.get((name, level))
-        if wanted not in (None, fingerprint({"drives": list(prints)})):
-            raise InputError(
-                f"{table}: level {level} of {name}: the experiment's drives are"
-                " not the frozen ones; leave out `frozen` to measure them"
-            )

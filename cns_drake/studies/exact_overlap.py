@@ -22,7 +22,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.sensors.lidar.patterns import BeamCoverage, BeamPattern
+from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.drives import Drive, check_same_world
 from evaluation.drives.sampling import within_range

@@ -26,9 +26,6 @@ from cns_drake.studies.comparisons import (
     Compared,
     MissingError,
     PairMaker,
-    check_frozen,
-    frozen_drives,
-    frozen_print,
     with_lidars_beside,
 )
 from cns_drake.studies.experiment import (
@@ -44,6 +41,11 @@ from cns_drake.studies.experiment import (
     conditions,
     method_variants,
     num_levels,
+)
+from cns_drake.studies.frozen_drives import (
+    check_frozen,
+    frozen_drives,
+    frozen_print,
 )
 from cns_drake.studies.made_maps import (
     MadeMaps,

@@ -19,7 +19,8 @@ from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.streets import EgoBox
-from cns_drake.traffic.traffic_plan import EgoPath, Tracks, TrafficPlan
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 from cns_drake.traffic.walkers import gait_rate
 

@@ -32,9 +32,9 @@ from stages import (
 )
 
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.embree_hierarchy import (
+from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
+from cns_drake.ray_casting.embree_primitives import (
     FLAT,
-    EmbreeHierarchy,
     merge_first,
     merge_second,
 )

@@ -17,7 +17,7 @@ from cns_drake.city.geometry import (
     looks_up,
     turned_up,
 )
-from cns_drake.imports.dressing import facade_pieces
+from cns_drake.imports.dressing import facade_pieces, roof_pieces
 from cns_drake.imports.dressing.drive_views import DriveViews
 from cns_drake.imports.dressing.facade_pieces import FacadePlan
 from cns_drake.imports.dressing.styles import Style, make_style
@@ -108,7 +108,7 @@ def _split_building(
     width, depth = np.ptp(corners[:, :2], axis=0)
     top = walls if len(walls) else one.triangles
     height = max(1.0, float(top[:, :, 2].max()) - base)
-    is_flat = bool(len(roof)) and facade_pieces.is_flat_roof(roof)
+    is_flat = bool(len(roof)) and roof_pieces.is_flat_roof(roof)
     rng = random_generator(seed, "dressing", one.draw_name)
     area = 0.8 * float(width * depth)
     style = make_style(one.tags, one.year, area, height, is_flat, rng)
@@ -239,7 +239,7 @@ def _dress_building(
         counts += facade_pieces.add_facade(out, plan, rng)
     has_own_roof = some.one.lod >= _LOD_WITH_ROOF or not len(some.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
-        facade_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
+        roof_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
     return out.finish(footprint), counts
 

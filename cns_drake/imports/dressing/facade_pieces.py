@@ -14,19 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon, box
+from shapely.geometry import box
 
 from cns_drake.city.facades import (
     Assembly,
     Relief,
-    add_chimney,
     bays,
     details,
-    equip_roof,
     lifted,
     single_wall,
 )
-from cns_drake.city.geometry import Finish, Mesh, triangulate, upper_sides
+from cns_drake.city.geometry import Mesh, triangulate, upper_sides
 from cns_drake.imports.dressing.styles import Style
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
@@ -551,121 +549,3 @@ def _add_signs(
         awnings = []
     out.add_to("sign", *awnings)
     return Counter({"shop windows": len(shops), "awnings": len(awnings)})
-
-
-# A roof is level if the z of its unit normal is greater than this.
-_LEVEL_COSINE = 0.999
-# Level parts have the same height if they differ by less than this [m].
-_SAME_HEIGHT = 0.1
-# A roof is flat if at least this share of its area is level.
-_FLAT_PART = 0.6
-# Level parts smaller than this get no equipment [m^2].
-_LEAST_ROOF = 40.0
-# Roof area per piece of equipment [m^2].
-_AREA_OF_ITEM = 90.0
-# Greatest number of pieces of equipment on a roof.
-_MOST_ITEMS = 6
-_ITEMS = {
-    "flats": "stair_house vents skylight tank vents dish",
-    "office": "lift_house air_handler ac_unit ac_unit vents cooling_tower",
-    "retail": "air_handler ac_unit skylight vents ac_unit dish",
-    "public": "stair_house air_handler skylight vents ac_unit mast",
-    "industrial": "skylight vents skylight vents air_handler tank",
-    "house": "vents dish",
-}
-_CHIMNEYS = ("house", "flats", "public")
-_BRICK = Finish((0.45, 0.27, 0.22), "brick")
-# Depth of a chimney's foot below the ridge [m].
-_BELOW_RIDGE = 0.35
-# Scale of a chimney relative to the shared mesh.
-_CHIMNEY_SCALE = 0.6
-# Points of a ridge are at most this far below its highest one [m].
-_RIDGE = 0.15
-
-
-def is_flat_roof(roof: np.ndarray) -> bool:
-    """Returns whether most of the area of a roof is level.
-
-    `roof` contains the triangles (M, 3, 3) of the roof [m].
-    """
-    above = np.abs(upper_sides.long_normals(roof)[:, 2])
-    level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL_COSINE
-    return bool(above[level].sum() >= _FLAT_PART * above.sum())
-
-
-def add_roof_pieces(
-    out: Assembly, roof: np.ndarray, style: Style, is_flat: bool
-) -> None:
-    """Adds equipment to a flat roof, or chimneys to a pitched roof.
-
-    Args:
-        out: the building under assembly, which gets the parts.
-        roof: triangles (M, 3, 3) of the roof [m].
-        style: style of the building, whose use decides what is added.
-        is_flat: whether the roof is flat.
-    """
-    items = _ITEMS.get(style.use, "").split()
-    if is_flat and items and (found := _largest_level(roof)) is not None:
-        area, z = found
-        count = min(_MOST_ITEMS, len(items), int(area.area / _AREA_OF_ITEM) + 1)
-        ring = np.array(area.exterior.coords)[:-1]
-        equip_roof(out, ring, z, items[:count])
-    if not is_flat and style.use in _CHIMNEYS:
-        _add_chimneys(out, roof)
-
-
-def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
-    """Returns the largest level part of a roof, without holes, and its z."""
-    level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL_COSINE]
-    best: tuple[Polygon, float] | None = None
-    if not len(level):
-        return None
-    steps = np.round(level[:, :, 2].mean(axis=1) / _SAME_HEIGHT)
-    for step in np.unique(steps):
-        some = level[steps == step]
-        whole = shapely.union_all(
-            [Polygon(one) for one in np.round(some[:, :, :2], 3)],
-            grid_size=1e-3,
-        )
-        for part in shapely.get_parts(whole):
-            if isinstance(part, Polygon) and part.area > _LEAST_ROOF:
-                part = _without_holes(part)
-                if best is None or part.area > best[0].area:
-                    best = part, float(some[:, :, 2].max())
-    return best
-
-
-def _without_holes(area: Polygon) -> Polygon:
-    """Returns the largest piece of an area that is divided at its holes."""
-    while area.interiors:
-        x0, y0, x1, y1 = area.bounds
-        x = Polygon(area.interiors[0]).centroid.x
-        halves = [
-            part
-            for half in (box(x0, y0, x, y1), box(x, y0, x1, y1))
-            for part in shapely.get_parts(area.intersection(half))
-            if isinstance(part, Polygon)
-        ]
-        area = max(halves, key=lambda part: part.area)
-    return area
-
-
-def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
-    corners = roof.reshape(-1, 3)
-    ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE]
-    start = ridge[np.lexsort([ridge[:, 1], ridge[:, 0]])[0]]
-    end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
-    length = float(np.linalg.norm(end - start))
-    yaw = math.atan2(end[1] - start[1], end[0] - start[0])
-    sides = upper_sides.UpperSides(roof)
-    count = 1 + int(length > 15.0)
-    for k, share in enumerate(out.rng.uniform(0.12, 0.88, 2)[:count]):
-        x, y, z = start + share * (end - start)
-        height = float(sides.heights(np.array([[x, y]]))[0])
-        # There may be no ridge between two gables.
-        if height > z - 1.0:
-            item = "chimney_row" if out.rng.random() < 0.3 else "chimney"
-            scale = (_CHIMNEY_SCALE, _CHIMNEY_SCALE, _CHIMNEY_SCALE)
-            xyz = (x, y, height - _BELOW_RIDGE)
-            part = f"chimney_{k}"
-            add_chimney(out, part, xyz, _BRICK, item=item, yaw=yaw, scale=scale)

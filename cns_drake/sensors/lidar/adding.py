@@ -14,10 +14,8 @@ from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.scene import perception_geometry
-from cns_drake.sensors.carriers import (
-    body_and_pose,
-    connect_motion,
-)
+from cns_drake.sensors.carriers import body_and_pose, connect_motion
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.config import (
     LidarSection,
     WeatherConfig,
@@ -26,7 +24,6 @@ from cns_drake.sensors.lidar.config import (
 )
 from cns_drake.sensors.lidar.lidar import Lidar, Structures
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
-from cns_drake.sensors.lidar.patterns import BeamPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 

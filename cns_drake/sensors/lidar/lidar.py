@@ -36,8 +36,9 @@ from cns_drake.scene.perception_geometry import (
     list_geometry,
     structure_name,
 )
+from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE, BeamPattern, Beams
+from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

@@ -13,8 +13,8 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, SceneHits
 from cns_drake.ray_casting.rays import rotate
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.structure_table import StructureTable
+from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.lidar.patterns import BeamPattern, Beams
 from cns_drake.sensors.lidar.presets import check_preset
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import find_sides, meet_sides

@@ -7,8 +7,8 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 import pytest
 
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.patterns import (
-    BeamPattern,
     DirectionPattern,
     NoddingPattern,
     RosettePattern,

@@ -15,7 +15,7 @@ from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import make_scenario
-from cns_drake.sensors.lidar.patterns import BeamCoverage
+from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.map_task import TRUTH, measure_maps
 from cns_drake.studies.map_truth import (

@@ -12,9 +12,9 @@ from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import DriverConfig, TrafficConfig
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.loaded_drive import load_stage, plan_scenario_traffic
+from cns_drake.traffic.follower import Follower, find_runs
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import STEP, EgoBox, make_streets
-from cns_drake.traffic.traffic_plan import Follower, find_runs
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicles import (
     CURRENT,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.traffic.traffic_plan import Tracks
+from cns_drake.traffic.tracks import Tracks
 
 
 @pytest.fixture

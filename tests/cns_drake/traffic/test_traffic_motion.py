@@ -14,6 +14,7 @@ from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.body_shapes import Limb
+from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_motion import (
     MOVING_SPEED,
     BodyStates,
@@ -24,7 +25,7 @@ from cns_drake.traffic.traffic_motion import (
     make_traffic,
     traffic_structures,
 )
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, Tracks, TrafficPlan
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0

@@ -1,0 +1,83 @@
+"""Plans vehicles that stand in queues in all lanes between junctions."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from cns_drake.base.elementary import arcsin, arctan2
+from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.streets import STEP, EgoBox
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.vehicle_kinds import KINDS, draw_kinds
+
+# Least and greatest gap between vehicles in a queue [m].
+_GAPS = (1.5, 3.5)
+# Least distance of a vehicle from the ego car that passes it [m].
+_LETS_PASS = 0.4
+
+
+def plan_queues(
+    graph: LaneGraph,
+    *,
+    seed: int,
+    duration: float,
+    ego: EgoPath,
+    ego_box: EgoBox,
+) -> TrafficPlan:
+    """Plans vehicles that stand in queues in all lanes between junctions.
+
+    A vehicle is absent while the ego car is at the vehicle's place.
+
+    Args:
+        graph: lanes and crossings.
+        seed: seed of the random kinds of vehicles and gaps between them.
+        duration: duration of the drive [s].
+        ego: function that takes times (K,) [s], and returns positions (K, 2)
+            [m] and headings (K,) [rad] of the ego car.
+        ego_box: the rectangle on the ground that the ego car covers.
+    """
+    rng = np.random.default_rng(seed)
+    kinds, rows = [], []
+    for number in graph.lanes:
+        points = graph.pieces[number].points
+        lane = shapely.LineString(points)
+        end = lane.length - float(rng.uniform(*_GAPS))
+        while True:
+            kind = KINDS[int(draw_kinds(1, rng)[0])]
+            begin = end - kind.size[0]
+            if begin < 0.0:
+                break
+            # Both axles stand on the lane; slopes are assumed to be small.
+            rear, front = (
+                shapely.get_coordinates(
+                    lane.interpolate(begin + kind.size[0] / 2 + axle),
+                    include_z=True,
+                )[0]
+                for axle in kind.axles
+            )
+            middle = rear + (front - rear) * (
+                -kind.axles[0] / (kind.axles[1] - kind.axles[0])
+            )
+            x, y, z = (front - rear) / np.linalg.norm(front - rear)
+            kinds.append(kind)
+            rows.append([*middle, float(arctan2(y, x)), -float(arcsin(z))])
+            end = begin - float(rng.uniform(*_GAPS))
+    places = np.array(rows).reshape(-1, 5)
+    times = np.arange(0.0, duration + 2 * STEP, STEP)
+    present = np.ones((len(times), len(kinds)), bool)
+    boxes = [
+        EgoBox(-kind.size[0] / 2, kind.size[0] / 2, kind.size[1] / 2).corners(
+            row[None, :2], row[3:4]
+        )[0]
+        for kind, row in zip(kinds, places, strict=True)
+    ]
+    tree = shapely.STRtree(shapely.polygons(boxes) if boxes else [])
+    passing = shapely.polygons(ego_box.corners(*ego(times)))
+    step, near = tree.query(passing, "dwithin", _LETS_PASS)
+    for shift in (-1, 0, 1):
+        present[np.clip(step + shift, 0, len(times) - 1), near] = False
+    tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
+    walkers = Tracks(STEP, np.zeros((len(times), 0, 5)))
+    return TrafficPlan(tuple(kinds), tracks, walkers)
