@@ -22,9 +22,10 @@ from cns_drake.sensors.lidar.config import (
     make_pattern,
     make_returns,
 )
-from cns_drake.sensors.lidar.lidar import Lidar, Structures
+from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.lidar.seen_geometry import Structures
 from cns_drake.sensors.system_names import check_new_sensor, check_unused_names
 
 if TYPE_CHECKING:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Collection, Mapping, Sequence
 import operator
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -22,40 +21,31 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
-from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
-from cns_drake.base.progress import doing
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
-from cns_drake.scene.perception_geometry import (
-    GeometryList,
-    GeometryReader,
-    PerceptionGeometry,
-    list_geometry,
-    structure_name,
-)
-from cns_drake.sensors.lidar.beams import BeamPattern, Beams
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import (
+    POINT_DTYPE,
+    Revolution,
+    assemble_points,
+    shared_revolution,
+)
+from cns_drake.sensors.lidar.seen_geometry import (
+    GeometryView,
+    SeenGeometry,
+    Structures,
+)
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.
     from cns_drake.sensors.returns.calibrated import CalibratedReturns
-    from cns_drake.sensors.returns.materials import Materials
 
-# The class of points without a structure: SemanticKITTI's outlier.
-SCATTERED_LABEL = 1
 _WITHOUT_GREY = Fields(BaseField.kXYZs)
 _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
-
-
-class Structures(Protocol):
-    """A table from which a LiDAR takes the labels and ids of what it hits."""
-
-    def labels(self, names: Sequence[str]) -> Labels:
-        """Returns the labels and instance ids of structures, by their names."""
 
 
 class RayHits(NamedTuple):
@@ -225,17 +215,21 @@ class Lidar(LeafSystem):
         self._measurement = measurement
         self._returns = returns
         self.role = role
-        self.unseen = None if unseen is None else frozenset(unseen)
-        for place in self.unseen or ():
+        for place in unseen or ():
             if not isinstance(place, FrameId | GeometryId):
                 raise TypeError(
                     f"unseen: {place!r} is not a FrameId or GeometryId; "
                     "add_lidar also takes a RigidBody or Frame"
                 )
-        self.structures = structures
-        self.anchored_frames = frozenset(anchored_frames)
-        self.num_threads = num_threads
-        self._first = _shared_revolution(pattern.beams(0), returns)
+        view = GeometryView(
+            parent_frame_id=parent_frame_id,
+            role=role,
+            unseen=None if unseen is None else frozenset(unseen),
+            structures=structures,
+            anchored_frames=frozenset(anchored_frames),
+            num_threads=num_threads,
+        )
+        self._first = shared_revolution(pattern.beams(0), returns)
         # When each column fires, as a fraction of the revolution.
         self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
@@ -262,7 +256,7 @@ class Lidar(LeafSystem):
             self.DeclareCacheEntry(
                 description=f"ray-casting scene, {what}",
                 value_producer=ValueProducer(
-                    allocate=lambda: Value(SeenGeometry(self)),
+                    allocate=lambda: Value(SeenGeometry(view)),
                     calc=lambda context, seen, calc_ball=calc_ball: (
                         self._update(
                             context, seen.get_value(), calc_ball(context)
@@ -561,7 +555,7 @@ class Lidar(LeafSystem):
     def _measure(
         self,
         seen: SeenGeometry,
-        turn: _Turn,
+        turn: Revolution,
         p_WSset: np.ndarray,
         R_WSset: np.ndarray,
         times: np.ndarray,
@@ -597,12 +591,12 @@ class Lidar(LeafSystem):
         )
         return hits.geometry.take(turn.table.place.take(returns.beams)), returns
 
-    def _turn_at(self, time: float) -> tuple[int, _Turn]:
+    def _turn_at(self, time: float) -> tuple[int, Revolution]:
         """Returns number and beams of the revolution at a time [s]."""
         frame = round(time / self.pattern.period) - self.causal
         if self.pattern.repeats:
             return frame, self._first
-        return frame, _shared_revolution(
+        return frame, shared_revolution(
             self.pattern.beams(frame), self._returns
         )
 
@@ -716,268 +710,3 @@ class _Measured(NamedTuple):
         # A Context is cloned together with this value. It never changes, and
         # geometry ids cannot be copied.
         return self
-
-
-class SeenGeometry:
-    """The geometry that a LiDAR sees in a Context, kept until it changes.
-
-    A clone of a Context starts with an empty scene, because a scene with moving
-    geometry cannot be shared.
-
-    Attributes:
-        scene: scene on which rays are cast; None before the first update. A hit
-            on geometry i of the scene is a hit on `built[i]`.
-        built: the geometries in the scene.
-        label: (num_geometries,) uint16 class of each geometry.
-        moving_label: (num_geometries,) uint16 class of each geometry while it
-            moves.
-        instance: (num_geometries,) uint16 structure of each geometry.
-    """
-
-    def __init__(self, lidar: Lidar):
-        self._lidar = lidar
-        self._reader = GeometryReader()
-        self._geometries: tuple[PerceptionGeometry, ...] = ()
-        self._records: GeometryList | None = None
-        self.built: tuple[PerceptionGeometry, ...] = ()
-        self._X_WAs: dict[FrameId, RigidTransform] = {}
-        self.scene: RayCastingScene | None = None
-        self._materials: Materials | None = None
-
-    def __deepcopy__(self, memo: dict) -> SeenGeometry:
-        return SeenGeometry(self._lidar)
-
-    def update(
-        self,
-        query_object: QueryObject,
-        records: GeometryList | None,
-        motions: Mapping[FrameId, Motion],
-        known: moving_groups.KnownPoses,
-        seen: moving_groups.Ball,
-        p_WS: np.ndarray,
-    ) -> None:
-        """Moves geometry whose frame has moved, and rebuilds changed geometry.
-
-        Args:
-            query_object: query object of the SceneGraph, with geometry and
-                poses.
-            records: all geometry with the LiDAR's role; if None, this function
-                lists the geometry.
-            motions: motions of frames that move during the revolution.
-            known: poses of frames that are known, so that the SceneGraph need
-                not be queried.
-            seen: the ball within which beams can hit geometry.
-            p_WS: the position of the sensor in the world, (3,) [m].
-
-        Raises:
-            InputError: a geometry cannot be read; see
-                `cns_drake.scene.perception_geometry.GeometryReader.read`.
-        """
-        inspector = query_object.inspector()
-
-        def calc_X_WF(frame: FrameId) -> RigidTransform:
-            return known.find(frame, query_object.GetPoseInWorld)
-
-        if records is None:
-            records = list_geometry(inspector, self._lidar.role)
-        if self.scene is None or records is not self._records:
-            self._read(records, inspector.world_frame_id())
-        try:
-            if self.scene is None or not (
-                self._is_built(calc_X_WF) and self.scene.serves(p_WS)
-            ):
-                self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
-            assert self.scene is not None
-            self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
-        except BaseException:
-            # Some of its geometry may have moved already.
-            self.scene = None
-            raise
-        self._records = records
-
-    def labels(self, moving: np.ndarray) -> np.ndarray:
-        """Returns the present class of each geometry, (num_geometries,) uint16.
-
-        Args:
-            moving: instance ids of the structures that are moving.
-        """
-        moves = np.zeros(MAX_INSTANCE + 1, bool)
-        moves[moving] = True
-        return np.where(moves[self.instance], self.moving_label, self.label)
-
-    def materials(self, returns: CalibratedReturns) -> Materials:
-        """Returns the material of each geometry of `scene`."""
-        if self._materials is None:
-            self._materials = returns.materials(
-                self.built, self._lidar.structures
-            )
-        return self._materials
-
-    def _read(self, records: GeometryList, world: FrameId) -> None:
-        unseen = self._lidar.unseen
-        if unseen is None:
-            unseen = frozenset([self._lidar.parent_frame_id]) - {world}
-        doing("reading meshes")
-        self._geometries = self._reader.read(
-            one
-            for one in records
-            if one.frame_id not in unseen and one.geometry_id not in unseen
-        )
-
-    def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
-        """Returns whether the scene is up to date."""
-        if self.built is not self._geometries and (
-            len(self.built) != len(self._geometries)
-            or not all(map(operator.is_, self.built, self._geometries))
-        ):
-            return False
-        return all(
-            X_WA.IsExactlyEqualTo(calc_X_WF(frame_id))
-            for frame_id, X_WA in self._X_WAs.items()
-        )
-
-    def _build(
-        self,
-        world: FrameId,
-        calc_X_WF: Callable[[FrameId], RigidTransform],
-        p_WS: np.ndarray,
-    ) -> None:
-        doing("preparing the ray casting")
-        structures = self._lidar.structures
-        self._materials = None
-        names = [
-            structure_name(geometry.name, is_scoped=structures is None)
-            for geometry in self._geometries
-        ]
-        self.label, self.moving_label, self.instance = (
-            number_structures(names)
-            if structures is None
-            else structures.labels(names)
-        )
-        anchored = self._lidar.anchored_frames | {world}
-        # Copies: Drake's references go on changing.
-        self._X_WAs = {
-            frame_id: RigidTransform(calc_X_WF(frame_id))
-            for frame_id in {g.frame_id for g in self._geometries}
-            if frame_id in anchored and frame_id != world
-        }
-        self.scene = RayCastingScene(
-            self._geometries,
-            anchored,
-            calc_X_WF,
-            num_threads=self._lidar.num_threads,
-            previous=self.scene,
-            p_WS=p_WS,
-        )
-        self.built = self._geometries
-
-
-class BeamTable(NamedTuple):
-    """Properties of the beams that are the same in every scan.
-
-    Attributes:
-        d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
-        p_Sset: (num_beams, 3) float32 where beams start [m]; (0, 3) if all
-            beams start at the origin of S.
-        ring: (num_beams,) uint16 number of each beam's laser.
-        t_ns: (num_beams,) uint32 firing time since the start of the revolution
-            [ns].
-        place: (num_beams,) position of each beam in the order in which rays are
-            cast.
-    """
-
-    d_Sset: np.ndarray
-    p_Sset: np.ndarray
-    ring: np.ndarray
-    t_ns: np.ndarray
-    place: np.ndarray
-
-
-class _Turn:
-    """The beams of a revolution, ready for casting and assembling.
-
-    Attributes:
-        beams: the beams in firing order.
-        d_Sset_cast: (N, 3) directions in the order of casting.
-        calibrated: the revolution of a unit with calibrated returns; None for
-            ideal returns.
-        table: constants for assembling points.
-    """
-
-    def __init__(self, beams: Beams, returns: CalibratedReturns | None):
-        self.beams = beams
-        self.d_Sset_cast = beams.d_Sset[beams.packet_order]
-        d_Sset, p_Sset = beams.d_Sset, np.zeros((0, 3))
-        self.calibrated = None if returns is None else returns.turn(beams)
-        if self.calibrated is not None:
-            d_Sset = self.calibrated.reported
-            p_Sset = self.calibrated.p_SLset
-        self.table = BeamTable(
-            d_Sset.astype(np.float32),
-            p_Sset.astype(np.float32),
-            beams.ring,
-            beams.t_ns,
-            np.argsort(beams.packet_order),
-        )
-
-
-@lru_cache(maxsize=4)
-def _shared_revolution(
-    beams: Beams, returns: CalibratedReturns | None
-) -> _Turn:
-    """Returns a revolution; LiDARs with equal beams and returns share it.
-
-    Sharing saves memory, because Drake's bindings may keep a dropped Diagram
-    with its LiDARs.
-    """
-    return _Turn(beams, returns)
-
-
-@compiled
-def assemble_points(
-    scan: np.ndarray,
-    table: BeamTable,
-    returns: Returns,
-    met: np.ndarray,
-    label: np.ndarray,
-    instance: np.ndarray,
-    step: np.float32,
-) -> None:
-    """Fills a scan: one point of `POINT_DTYPE` for each of N returns.
-
-    Args:
-        scan: (N,) points, whose fields are set.
-        table: properties of the beams.
-        returns: beam, range and intensity of each return.
-        met: (N,) int32 index of the hit geometry in `label` and `instance`;
-            negative for returns from rain, snow or fog.
-        label, instance: uint16 class and instance id of each geometry.
-        step: step of the rounded coordinates [m]; 0 for exact coordinates.
-    """
-    # As names of their own, fields are fast.
-    beams, ranges, intensity = returns.beams, returns.ranges, returns.intensity
-    for k in range(len(beams)):
-        # For a signed index, numba looks at each use whether it counts from
-        # the end.
-        beam = np.uint64(beams[k])
-        point = scan[k]
-        x = table.d_Sset[beam, 0] * ranges[k]
-        y = table.d_Sset[beam, 1] * ranges[k]
-        z = table.d_Sset[beam, 2] * ranges[k]
-        if len(table.p_Sset):
-            x += table.p_Sset[beam, 0]
-            y += table.p_Sset[beam, 1]
-            z += table.p_Sset[beam, 2]
-        if step > 0:
-            x = np.rint(x / step) * step
-            y = np.rint(y / step) * step
-            z = np.rint(z / step) * step
-        point.x, point.y, point.z = x, y, z
-        point.intensity = intensity[k]
-        point.ring, point.t = table.ring[beam], table.t_ns[beam]
-        if met[k] < 0:
-            point.label, point.instance = SCATTERED_LABEL, 0
-        else:
-            geometry = np.uint64(met[k])
-            point.label = label[geometry]
-            point.instance = instance[geometry]

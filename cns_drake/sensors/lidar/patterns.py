@@ -1,4 +1,4 @@
-"""The beams of a LiDAR: directions and firing times.
+"""Beam patterns of LiDARs: spinning, flash, rosette, nodding and others.
 
 The scan patterns of Livox's LiDARs do not repeat. Livox publishes their fields
 of view, rates and numbers of lines, but no formula for the motion of the beams.
@@ -18,24 +18,6 @@ from numpy.typing import ArrayLike
 
 from cns_drake.base.elementary import cos, sin
 from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
-
-# One return, in the sensor frame. Fields have C alignment, for readers that map
-# structs onto the bytes. NumPy's copies leave the two bytes after `ring`
-# undefined.
-POINT_DTYPE = np.dtype(
-    [
-        ("x", "<f4"),
-        ("y", "<f4"),
-        ("z", "<f4"),
-        ("intensity", "<f4"),
-        ("ring", "<u2"),
-        ("t", "<u4"),
-        ("label", "<u2"),
-        ("instance", "<u2"),
-    ],
-    align=True,
-)
-
 
 # Revolutions per second of the two wedge prisms of the Mid series: 7294 and
 # -4664 per minute, the defaults of HELIOS++ for such optics. Together they

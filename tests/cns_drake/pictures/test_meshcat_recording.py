@@ -22,7 +22,7 @@ from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 PERIOD = 0.05
 NUM_FRAMES = 101

@@ -20,7 +20,7 @@ from cns_drake.recording.recorded_topics import (
     make_calibration,
     recording_topics,
 )
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD = 0.05

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.drives import ros_types
 from cns_drake.recording import messages
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 # The variance of a value without noise.
 EXACT = 1e-12

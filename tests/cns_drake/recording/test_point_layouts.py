@@ -12,7 +12,7 @@ from cns_drake.base.drives.point_layouts import (
 )
 from cns_drake.base.drives.ros_types import POINT_CLOUD, deserialize
 from cns_drake.recording.messages import encode_point_cloud
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
 XYZ = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)]

@@ -18,7 +18,7 @@ import pytest
 from cns_drake.motion.vehicle_motion import Sweep
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.measurement import MeasurementModel
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 
 def test_box_room():

@@ -17,10 +17,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.multibody.plant import (
-    AddMultibodyPlantSceneGraph,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 import pytest
@@ -29,9 +26,9 @@ from scipy.spatial.transform import Rotation
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.adding import add_lidar
-from cns_drake.sensors.lidar.lidar import SCATTERED_LABEL
 from cns_drake.sensors.lidar.patterns import DirectionPattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.lidar.scan_assembly import SCATTERED_LABEL
 
 INERTIA = SpatialInertia.SolidBoxWithMass(1.0, 1.0, 1.0, 1.0)
 GREY = np.full(4, 0.5)

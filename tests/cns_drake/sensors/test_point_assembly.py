@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors.lidar.lidar import BeamTable, assemble_points
 from cns_drake.sensors.lidar.measurement import Returns
-from cns_drake.sensors.lidar.patterns import POINT_DTYPE
 from cns_drake.sensors.lidar.presets import make_beam_pattern
+from cns_drake.sensors.lidar.scan_assembly import (
+    POINT_DTYPE,
+    BeamTable,
+    assemble_points,
+)
 
 
 @pytest.mark.parametrize("step", [0.0, 2.0**-10, 0.003])

@@ -1,0 +1,226 @@
+"""The geometry that a LiDAR sees, as a scene for ray casting.
+
+The scene is kept from scan to scan, until the geometry changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+import operator
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
+from pydrake.math import RigidTransform
+
+from cns_drake.base.progress import doing
+from cns_drake.ray_casting import moving_groups
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import Motion
+from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
+from cns_drake.scene.perception_geometry import (
+    GeometryList,
+    GeometryReader,
+    PerceptionGeometry,
+    list_geometry,
+    structure_name,
+)
+
+if TYPE_CHECKING:
+    # Slow to import, and ideal returns do without.
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+    from cns_drake.sensors.returns.materials import Materials
+
+
+class Structures(Protocol):
+    """A table from which a LiDAR takes the labels and ids of what it hits."""
+
+    def labels(self, names: Sequence[str]) -> Labels:
+        """Returns the labels and instance ids of structures, by their names."""
+
+
+@dataclass(frozen=True)
+class GeometryView:
+    """Which geometry a LiDAR sees, and how its rays are cast.
+
+    Attributes:
+        parent_frame_id: the frame P that carries the LiDAR.
+        role: role of the geometry that is seen.
+        unseen: frames and geometries that are not seen; None for P, unless that
+            is the world's frame.
+        structures: table of the structures' labels and instance ids; None for
+            ids in alphabetical order.
+        anchored_frames: frames that never move, besides the world's.
+        num_threads: number of threads that share the rays.
+    """
+
+    parent_frame_id: FrameId
+    role: Role
+    unseen: frozenset[FrameId | GeometryId] | None
+    structures: Structures | None
+    anchored_frames: frozenset[FrameId]
+    num_threads: int
+
+
+class SeenGeometry:
+    """The geometry that a LiDAR sees in a Context, kept until it changes.
+
+    A clone of a Context starts with an empty scene, because a scene with moving
+    geometry cannot be shared.
+
+    Attributes:
+        scene: scene on which rays are cast; None before the first update. A hit
+            on geometry i of the scene is a hit on `built[i]`.
+        built: the geometries in the scene.
+        label: (num_geometries,) uint16 class of each geometry.
+        moving_label: (num_geometries,) uint16 class of each geometry while it
+            moves.
+        instance: (num_geometries,) uint16 structure of each geometry.
+    """
+
+    def __init__(self, view: GeometryView):
+        """Begins without a scene; `view` says which geometry is seen."""
+        self._view = view
+        self._reader = GeometryReader()
+        self._geometries: tuple[PerceptionGeometry, ...] = ()
+        self._records: GeometryList | None = None
+        self.built: tuple[PerceptionGeometry, ...] = ()
+        self._X_WAs: dict[FrameId, RigidTransform] = {}
+        self.scene: RayCastingScene | None = None
+        self._materials: Materials | None = None
+
+    def __deepcopy__(self, memo: dict) -> SeenGeometry:
+        return SeenGeometry(self._view)
+
+    def update(
+        self,
+        query_object: QueryObject,
+        records: GeometryList | None,
+        motions: Mapping[FrameId, Motion],
+        known: moving_groups.KnownPoses,
+        seen: moving_groups.Ball,
+        p_WS: np.ndarray,
+    ) -> None:
+        """Moves geometry whose frame has moved, and rebuilds changed geometry.
+
+        Args:
+            query_object: query object of the SceneGraph, with geometry and
+                poses.
+            records: all geometry with the LiDAR's role; if None, this function
+                lists the geometry.
+            motions: motions of frames that move during the revolution.
+            known: poses of frames that are known, so that the SceneGraph need
+                not be queried.
+            seen: the ball within which beams can hit geometry.
+            p_WS: the position of the sensor in the world, (3,) [m].
+
+        Raises:
+            InputError: a geometry cannot be read; see
+                `cns_drake.scene.perception_geometry.GeometryReader.read`.
+        """
+        inspector = query_object.inspector()
+
+        def calc_X_WF(frame: FrameId) -> RigidTransform:
+            return known.find(frame, query_object.GetPoseInWorld)
+
+        if records is None:
+            records = list_geometry(inspector, self._view.role)
+        if self.scene is None or records is not self._records:
+            self._read(records, inspector.world_frame_id())
+        try:
+            if self.scene is None or not (
+                self._is_built(calc_X_WF) and self.scene.serves(p_WS)
+            ):
+                self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
+            assert self.scene is not None
+            self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
+        except BaseException:
+            # Some of its geometry may have moved already.
+            self.scene = None
+            raise
+        self._records = records
+
+    def labels(self, moving: np.ndarray) -> np.ndarray:
+        """Returns the present class of each geometry, (num_geometries,) uint16.
+
+        Args:
+            moving: instance ids of the structures that are moving.
+        """
+        moves = np.zeros(MAX_INSTANCE + 1, bool)
+        moves[moving] = True
+        return np.where(moves[self.instance], self.moving_label, self.label)
+
+    def materials(self, returns: CalibratedReturns) -> Materials:
+        """Returns the material of each geometry of `scene`."""
+        if self._materials is None:
+            self._materials = returns.materials(
+                self.built, self._view.structures
+            )
+        return self._materials
+
+    def _read(self, records: GeometryList, world: FrameId) -> None:
+        """Reads the geometry that is seen, out of a list of all geometry."""
+        unseen = self._view.unseen
+        if unseen is None:
+            unseen = frozenset([self._view.parent_frame_id]) - {world}
+        doing("reading meshes")
+        self._geometries = self._reader.read(
+            one
+            for one in records
+            if one.frame_id not in unseen and one.geometry_id not in unseen
+        )
+
+    def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
+        """Returns whether the scene is up to date."""
+        if self.built is not self._geometries and (
+            len(self.built) != len(self._geometries)
+            or not all(map(operator.is_, self.built, self._geometries))
+        ):
+            return False
+        return all(
+            X_WA.IsExactlyEqualTo(calc_X_WF(frame_id))
+            for frame_id, X_WA in self._X_WAs.items()
+        )
+
+    def _build(
+        self,
+        world: FrameId,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        p_WS: np.ndarray,
+    ) -> None:
+        """Makes the scene of the geometry that was read.
+
+        Args:
+            world: the world's frame.
+            calc_X_WF: returns the pose of a frame.
+            p_WS: the position of the sensor in the world, (3,) [m].
+        """
+        doing("preparing the ray casting")
+        structures = self._view.structures
+        self._materials = None
+        names = [
+            structure_name(geometry.name, is_scoped=structures is None)
+            for geometry in self._geometries
+        ]
+        self.label, self.moving_label, self.instance = (
+            number_structures(names)
+            if structures is None
+            else structures.labels(names)
+        )
+        anchored = self._view.anchored_frames | {world}
+        # Copies: Drake's references go on changing.
+        self._X_WAs = {
+            frame_id: RigidTransform(calc_X_WF(frame_id))
+            for frame_id in {g.frame_id for g in self._geometries}
+            if frame_id in anchored and frame_id != world
+        }
+        self.scene = RayCastingScene(
+            self._geometries,
+            anchored,
+            calc_X_WF,
+            num_threads=self._view.num_threads,
+            previous=self.scene,
+            p_WS=p_WS,
+        )
+        self.built = self._geometries
