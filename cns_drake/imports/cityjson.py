@@ -1,4 +1,4 @@
-"""Reads CityJSON 1.0 to 2.0 and CityJSONSeq files as structures.
+"""Reads CityJSON 1.0 to 2.0 and CityJSONSeq files.
 
 https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
 objects. In a sequence (.jsonl), the first line is of type CityJSON, and each
@@ -8,9 +8,8 @@ direction and units of the axes of the file's reference system.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 import itertools
 from pathlib import Path
 import re
@@ -18,166 +17,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyproj
-from pyproj.exceptions import CRSError, ProjError
-import shapely
-from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.json_text import parse_json
-from cns_drake.city.geometry import Finish
-from cns_drake.imports import foreign_city
-from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.faces import face_triangles, joined
-from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.reference_systems import (
+    ReferenceSystem,
+    horizontal_system,
+    reference_system,
+    to_degrees,
+)
 
-# Direction of an axis -> its row among east, north and up, and its sign.
-_ROWS = {
-    "east": (0, 1.0),
-    "west": (0, -1.0),
-    "north": (1, 1.0),
-    "south": (1, -1.0),
-    "up": (2, 1.0),
-    "down": (2, -1.0),
-}
-# A city may be at most this far outside its system's area of use [deg].
-_NEAR_AREA_DEG = 0.5
 # A projection that changes lengths by more than this share is refused.
 _MOST_STRETCHED = 0.005
-_PLAIN = ("east [metre]", "north [metre]", "up [metre]")
-
-
-@dataclass(frozen=True, eq=False)
-class ReferenceSystem:
-    """The reference system of a CityJSON file: axes and units of coordinates.
-
-    If the system defines no heights, heights are assumed to have the unit of
-    the first two coordinates.
-
-    Attributes:
-        name: name of the system in the file; "" if there is none.
-        axes: direction and unit of each of the three coordinates, in words.
-        matrix: (3, 3) converts coordinates to metres east, north and up.
-        heights_assumed: whether the unit of heights is assumed.
-    """
-
-    name: str = ""
-    axes: tuple[str, ...] = _PLAIN
-    matrix: np.ndarray = field(default_factory=lambda: np.eye(3))
-    heights_assumed: bool = False
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether coordinates are already metres east, north and up."""
-        return self.axes == _PLAIN
-
-    @property
-    def is_north_first(self) -> bool:
-        """Whether the first coordinate points north or south."""
-        return self.axes[0].startswith(("north", "south"))
-
-    def to_metres(self, points: np.ndarray) -> np.ndarray:
-        """Converts coordinates (N, 3) to metres east, north and up."""
-        if self.is_plain:
-            return points
-        return points @ self.matrix.T
-
-    def exchanged(self) -> ReferenceSystem:
-        """Returns the reference system with its first two axes exchanged.
-
-        Many programs write the coordinate east first although the definition of
-        the system says north first, or the other way round.
-        """
-        axes = (self.axes[1], self.axes[0], self.axes[2])
-        return replace(self, axes=axes, matrix=self.matrix[:, [1, 0, 2]])
-
-    def has_place(self, first: float, second: float) -> bool:
-        """Returns whether a place is in or near the system's area of use.
-
-        `first` and `second` are the first two coordinates of the place, in the
-        order of the system's definition. The result is True for a system
-        without an area of use, because nothing rules out the place.
-        """
-        system = _horizontal_system(self.name)
-        if system.area_of_use is None:
-            return True
-        longitude, latitude = _degrees(system, first, second)
-        west, south, east, north = system.area_of_use.bounds
-        near = _NEAR_AREA_DEG
-        return bool(
-            west - near <= longitude <= east + near
-            and south - near <= latitude <= north + near
-        )
-
-
-def _horizontal_system(name: str) -> pyproj.CRS:
-    """Returns the system of the first two coordinates.
-
-    A system that is composed of codes, such as EPSG:31468+5783, has no area of
-    use; its horizontal part does.
-    """
-    system = pyproj.CRS.from_user_input(name)
-    return (system.sub_crs_list or [system])[0]
-
-
-def _degrees(
-    system: pyproj.CRS, first: float, second: float
-) -> tuple[float, float]:
-    """Returns the longitude and latitude of a place [deg]."""
-    to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
-    longitude, latitude = to_degrees.transform(first, second)
-    return longitude, latitude
-
-
-def reference_system(name: str, where: str) -> ReferenceSystem:
-    """Returns the axes and units of a reference system, by its name.
-
-    Args:
-        name: EPSG code, or the URL or URN of an EPSG code; "" for metres east,
-            north and up.
-        where: place of the name in the file, for error messages.
-
-    Raises:
-        InputError: the system is unknown, is in degrees, or has axes that are
-            not east, north and up.
-    """
-    if not name:
-        return ReferenceSystem()
-    try:
-        system = pyproj.CRS.from_user_input(name)
-    except (CRSError, ProjError) as error:
-        raise InputError(
-            f"{where}: {name} is not a known reference system (such as "
-            "https://www.opengis.net/def/crs/EPSG/0/7415)"
-        ) from error
-    parts = system.sub_crs_list or [system]
-    axes = [axis for part in parts for axis in part.axis_info]
-    if any(part.is_geographic for part in parts):
-        raise InputError(
-            f"{where}: {name} is in degrees; project it to metres first (for"
-            " example with cjio's crs_reproject)"
-        )
-    # Direction, unit, and length of the unit in metres, for each axis.
-    meanings = [
-        (axis.direction, axis.unit_name, axis.unit_conversion_factor)
-        for axis in axes
-    ]
-    heights_assumed = len(axes) == 2
-    if heights_assumed:
-        meanings.append(("up", *meanings[0][1:]))
-    rows = [_ROWS.get(direction, (-1, 0.0)) for direction, _, _ in meanings]
-    if sorted(row for row, _ in rows) != [0, 1, 2]:
-        listed = ", ".join(f"{a.name} ({a.direction})" for a in axes)
-        raise InputError(
-            f"{where}: {name} ({system.name}) has the axes {listed}, which are"
-            " not east, north and up; reproject the file first"
-        )
-    matrix = np.zeros((3, 3))
-    for column, (row, sign) in enumerate(rows):
-        matrix[row, column] = sign * meanings[column][2]
-    words = tuple(f"{direction} [{unit}]" for direction, unit, _ in meanings)
-    return ReferenceSystem(name, words, matrix, heights_assumed)
 
 
 # Members of objects that are read, or that do not place anything.
@@ -193,9 +46,6 @@ _MOST_VOTES = 1000
 # is more than this [m^3, m^2].
 _LEAST_VOTE = 1e-3
 _BEYOND = "coordinates beyond the area of their reference system"
-# A geometry of a lower level of detail is left out if a higher one covers more
-# than this share of it.
-_COVERED = 0.5
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
 
@@ -208,29 +58,6 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
-_WATER = Finish(foreign_city.WATER, "water")
-# Beginning of a type -> its class, and a finish if that of the class would
-# mislead.
-_CLASSES: dict[str, tuple[str, Finish | None]] = {
-    "Building": ("building", None),
-    "Bridge": ("other-structure", None),
-    "Tunnel": ("other-structure", None),
-    "OtherConstruction": ("other-structure", None),
-    "Road": ("road", None),
-    "Railway": ("other-ground", None),
-    "TransportSquare": ("road", None),
-    "Square": ("road", None),
-    "Track": ("road", None),
-    "Waterway": ("other-ground", _WATER),
-    "WaterBody": ("other-ground", _WATER),
-    "LandUse": ("other-ground", None),
-    "PlantCover": ("terrain", Finish(foreign_city.LAWN)),
-    "SolitaryVegetationObject": ("vegetation", None),
-    "TINRelief": ("terrain", None),
-    "CityFurniture": ("other-object", None),
-    "GenericCityObject": ("other-structure", None),
-}
-_LONGEST_NAME = 80
 
 
 class CityGeometry(NamedTuple):
@@ -370,8 +197,8 @@ def _check_lengths(name: str, place: np.ndarray, path: Path) -> None:
     first, second, _ = np.linalg.solve(defined.matrix, place).tolist()
     if not defined.has_place(first, second):
         return
-    system = _horizontal_system(name)
-    degrees = _degrees(system, first, second)
+    system = horizontal_system(name)
+    degrees = to_degrees(system, first, second)
     factors = pyproj.Proj(system).get_factors(*degrees)
     extremes = factors.tissot_semimajor, factors.tissot_semiminor
     stretch = max(extremes, key=lambda factor: abs(factor - 1.0))
@@ -730,227 +557,3 @@ def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
         else str(surfaces[value].get("type", ""))
         for value in values
     ]
-
-
-def import_cityjson(
-    path: Path, lod: float | None, year_attribute: str | None
-) -> ForeignCity:
-    """Imports a city from a CityJSON file; the origin is its centre.
-
-    `lod` is the level of detail to read; None for the highest level of each
-    object. `year_attribute` is the attribute with the year of construction;
-    None for the usual names.
-
-    Raises:
-        InputError: if the file cannot be used.
-    """
-    city = read_cityjson(path)
-    low, high = city.bounds()
-    origin = np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
-    return ForeignCity(
-        import_structures(city, origin, lod, year_attribute),
-        tuple(origin.tolist()),
-        city.system.name,
-        city.faults,
-        axes=() if city.system.is_plain else city.system.axes,
-    )
-
-
-def import_structures(
-    city: CityFile,
-    origin: np.ndarray,
-    lod: float | None,
-    year_attribute: str | None,
-) -> list[Imported]:
-    """Returns a structure for each object that has a surface.
-
-    A building and its parts become one structure.
-
-    Args:
-        city: the content of the file.
-        origin: (3,) origin of the map in the file's coordinates [m].
-        lod: level of detail to read; None for the highest level of each object.
-        year_attribute: attribute with the year of construction; None for the
-            usual names.
-    """
-    groups = _families(city)
-    names = _unique_names(groups)
-    found = []
-    for root, members in groups.items():
-        first = city.objects[root]
-        chosen = _geometries(members, lod, city.faults)
-        surfaces = _surfaces(chosen, root, city.faults, origin)
-        if not any(map(len, surfaces.values())):
-            kind = "object without a surface"
-            if not chosen and any(one.geometries for one in members):
-                kind = f"object without level of detail {lod:g}"
-            city.faults.add(f"{kind}, left out", root)
-            continue
-        name = names[root]
-        semantic_class, finish = _class_of(first.kind)
-        years = [
-            construction_year(one.attributes, year_attribute, name, city.faults)
-            for one in members
-        ]
-        found.append(
-            foreign_city.make_imported(
-                name,
-                semantic_class,
-                first.kind,
-                surfaces,
-                {"body": finish, "roof": foreign_city.RED_ROOF},
-                next((year for year in years if year is not None), None),
-                tags={
-                    key: str(value)
-                    for one in reversed(members)
-                    for key, value in one.attributes.items()
-                    if isinstance(value, str | int | float)
-                },
-                lod=max(geometry.lod for geometry in chosen),
-            )
-        )
-    return found
-
-
-def _families(city: CityFile) -> dict[str, list[CityObject]]:
-    """Returns id of each object without parents -> the object and its parts."""
-    groups: dict[str, list[CityObject]] = {}
-    for name, one in city.objects.items():
-        root = name
-        seen = {name}
-        while True:
-            parents = [
-                p
-                for p in city.objects[root].parents
-                if p in city.objects
-                # A group is not one structure: it may contain half a city.
-                and city.objects[p].kind != "CityObjectGroup"
-            ]
-            if not parents or parents[0] in seen:
-                break
-            root = parents[0]
-            seen.add(root)
-        groups.setdefault(root, []).append(one)
-    return groups
-
-
-def _unique_names(ids: Iterable[str]) -> dict[str, str]:
-    """Returns id -> unique name of letters, digits, dots and dashes."""
-    plain = {
-        one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
-        or "object"
-        for one in ids
-    }
-    counts = Counter(plain.values())
-    names: dict[str, str] = {}
-    taken: set[str] = set()
-    for one, name in plain.items():
-        number = 1
-        while name in taken or (number == 1 and counts[plain[one]] > 1):
-            name = f"{plain[one]}_{number}"
-            number += 1
-        taken.add(name)
-        names[one] = name
-    return names
-
-
-def _geometries(
-    members: list[CityObject], lod: float | None, faults: ImportFaults
-) -> list[CityGeometry]:
-    """Returns the geometries of an object and its parts that are used.
-
-    What a part shows in more detail is not used again from its whole, or the
-    other way round.
-    """
-    chosen: list[tuple[CityObject, CityGeometry]] = []
-    for one in members:
-        usable = [g for g in one.geometries if lod is None or g.lod == lod]
-        if usable:
-            highest = max(g.lod for g in usable)
-            chosen += [(one, g) for g in usable if g.lod == highest]
-    # A footprint is dropped if there is any better geometry.
-    chosen = [pair for pair in chosen if pair[1].lod >= 1.0] or chosen
-    kept = []
-    for one, geometry in chosen:
-        is_whole = not one.parents
-        # Levels with the same integer part, such as 2 and 2.2, may be used
-        # together.
-        better = [
-            other
-            for owner, other in chosen
-            if _is_house(one)
-            and _is_house(owner)
-            and other.lod > geometry.lod
-            and (is_whole or int(other.lod) > int(geometry.lod))
-        ]
-        if better and _is_covered(geometry, better):
-            faults.add("geometry with a better one inside, left out", one.name)
-        else:
-            kept.append(geometry)
-    return kept
-
-
-def _is_house(one: CityObject) -> bool:
-    """Returns whether an object is a building or its part, not a balcony."""
-    return not one.parents or one.kind.endswith("Part")
-
-
-def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:
-    """Returns whether other geometries cover one, seen from above."""
-    own = _footprint([one])
-    shared = own.intersection(_footprint(others)).area
-    return bool(shared > _COVERED * own.area)
-
-
-def _footprint(geometries: Iterable[CityGeometry]) -> BaseGeometry:
-    polygons = [
-        shapely.make_valid(shapely.Polygon(np.round(face[0][:, :2], 3)))
-        for geometry in geometries
-        for face in geometry.faces
-        if len(face[0]) > 2
-    ]
-    return shapely.union_all([one for one in polygons if one.area > 0.0])
-
-
-def _surfaces(
-    geometries: Iterable[CityGeometry],
-    name: str,
-    faults: ImportFaults,
-    origin: np.ndarray,
-) -> dict[str, np.ndarray]:
-    """Returns `body` and `roof` -> triangles (M, 3, 3) in the world [m].
-
-    Surfaces without triangles are left out.
-    """
-    found: dict[str, list[np.ndarray]] = {}
-    for geometry in geometries:
-        faces = [
-            face_triangles([ring - origin for ring in face], name, faults)
-            for face in geometry.faces
-        ]
-        if geometry.is_solid and _volume(faces) < -1e-3:
-            faults.add("solid turned inside out, reversed", name)
-            faces = [triangles[:, ::-1] for triangles in faces]
-        for triangles, kind in zip(faces, geometry.kinds, strict=True):
-            if kind == "ClosureSurface":
-                faults.add("face that only closes a solid, left out", name)
-                continue
-            part = "roof" if kind == "RoofSurface" else "body"
-            found.setdefault(part, []).append(triangles)
-    return {part: np.concatenate(found[part]) for part in sorted(found)}
-
-
-def _volume(faces: list[np.ndarray]) -> float:
-    """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
-    triangles = joined(faces)
-    if len(triangles) == 0:
-        return 0.0
-    a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
-
-
-def _class_of(kind: str) -> tuple[str, Finish | None]:
-    for beginning, look in _CLASSES.items():
-        if kind.startswith(beginning):
-            return look
-    return "other-object", None

@@ -12,9 +12,9 @@ from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
 from cns_drake.imports import map_files
-from cns_drake.imports.cityjson import import_cityjson
+from cns_drake.imports.cityjson_structures import import_cityjson
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives import search
+from cns_drake.imports.drives import cell_graph, search, street_graph
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import ForeignCity, Imported
@@ -76,8 +76,10 @@ def import_city(
     side = options.drive_on or ("left" if city.keeps_left else "right")
     drives = (
         own
-        or search.find_drives(search.StreetGraph(city.streets, space, side))
-        or search.find_drives(search.CellGraph(space))
+        or search.find_drives(
+            street_graph.StreetGraph(city.streets, space, side)
+        )
+        or search.find_drives(cell_graph.CellGraph(space))
     )
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)

@@ -28,12 +28,9 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.progress import track
-from evaluation.alignment.registration import (
-    Surface,
-    covariances,
-    make_surface,
-)
-from evaluation.clouds.cloud_files import OnNote, no_note, read_blocks
+from evaluation.alignment.registration import Surface, covariances, make_surface
+from evaluation.clouds.cloud_files import read_blocks
+from evaluation.clouds.notes import OnNote, no_note
 from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.localisation.robust import MAX_RANGE, align_robustly

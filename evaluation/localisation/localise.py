@@ -22,7 +22,8 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import track
-from evaluation.clouds.cloud_files import OnNote, read_cloud
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.clouds.notes import OnNote
 from evaluation.drives.sampling import cropped, sample_frames
 from evaluation.drives.scan_files import FileDrive
 from evaluation.localisation.estimators import (

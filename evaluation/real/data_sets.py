@@ -19,7 +19,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
-from evaluation.clouds.cloud_files import OnNote, read_cloud
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.clouds.notes import OnNote
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.text_tables import read_poses, read_quaternions

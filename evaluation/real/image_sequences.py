@@ -25,13 +25,13 @@ from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
 from cns_drake.base.points import from_xyz, xyz
 from cns_drake.base.progress import track
-from evaluation.clouds.cloud_files import OnNote
 from evaluation.clouds.count_images import (
     check_image,
     count_image,
     image_points,
     read_image,
 )
+from evaluation.clouds.notes import OnNote
 from evaluation.drives.scan_files import FileDrive
 from evaluation.drives.text_tables import read_poses
 from evaluation.methods.method import yaw_pose

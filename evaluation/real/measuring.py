@@ -19,7 +19,7 @@ from typing import Any
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
-from evaluation.clouds.cloud_files import OnNote
+from evaluation.clouds.notes import OnNote
 from evaluation.localisation import estimators
 from evaluation.methods import MethodConfig, shipped_methods
 from evaluation.methods.method import run_module

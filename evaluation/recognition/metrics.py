@@ -35,6 +35,13 @@ from scipy.special import stdtr, stdtrit
 
 from cns_drake.base.json_text import json_values
 from evaluation.drives.sampling import travelled
+from evaluation.recognition.precision_recall import (
+    PrCurve,
+    areas_under,
+    pr_curve,
+    recall_of,
+    weighted_counts,
+)
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
 # Length of a block of the route [m].
@@ -45,135 +52,6 @@ Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 
 MAX_RANK = 25
-
-
-@dataclass(frozen=True)
-class PrCurve:
-    """The precision-recall curve: a point for every distinct score.
-
-    The threshold of the first point is the best score.
-
-    Attributes:
-        thresholds: (K,) least accepted scores, decreasing.
-        true_positives: (K,) TP at each threshold.
-        false_positives: (K,) FP at each threshold.
-        false_negatives: (K,) FN at each threshold.
-    """
-
-    thresholds: np.ndarray
-    true_positives: np.ndarray
-    false_positives: np.ndarray
-    false_negatives: np.ndarray
-
-    @property
-    def precision(self) -> np.ndarray:
-        """(K,) precision TP / (TP + FP) at each threshold."""
-        return self.true_positives / (
-            self.true_positives + self.false_positives
-        )
-
-    @property
-    def recall(self) -> np.ndarray:
-        """(K,) recall TP / (TP + FN) at each threshold; 0 if TP + FN is 0."""
-        return recall_of(self.true_positives, self.false_negatives)
-
-    @property
-    def f1(self) -> np.ndarray:
-        """(K,) F1 = 2 TP / (2 TP + FP + FN)."""
-        return 2.0 * self.true_positives / (self.true_positives + self.counted)
-
-    @property
-    def counted(self) -> np.ndarray:
-        """(K,) TP + FP + FN at each threshold: all but the true negatives."""
-        return self.true_positives + self.false_positives + self.false_negatives
-
-    @property
-    def auc(self) -> float:
-        """Area under the precision-recall curve, by the trapezoidal rule.
-
-        The area is from recall 0 to the greatest recall of the curve. Left of
-        the first point, the precision is that of the first point. The area is 0
-        if no answer is ever accepted.
-        """
-        return float(areas_under(self.precision[None], self.recall[None])[0])
-
-    def strict_auc(self, num_with_match: int) -> float:
-        """Returns the area under the curve with recall = TP / N.
-
-        N, the number of queries with a match, includes queries with a wrong
-        accepted answer, which TP / (TP + FN) ignores.
-        """
-        recall = recall_of(
-            self.true_positives, num_with_match - self.true_positives
-        )
-        return float(areas_under(self.precision[None], recall[None])[0])
-
-    @property
-    def recall_at_full_precision(self) -> float:
-        """Greatest recall at a precision of 1; 0 if no threshold has it."""
-        return float(self.recall[self.false_positives == 0].max(initial=0.0))
-
-
-def pr_curve(outcomes: QueryOutcomes) -> PrCurve:
-    """Returns the exact precision-recall curve of all given queries."""
-    thresholds, tp, fp, fn = weighted_counts(
-        outcomes, np.ones((1, len(outcomes)))
-    )
-    return PrCurve(
-        thresholds, *(row[0].astype(np.int64) for row in (tp, fp, fn))
-    )
-
-
-def weighted_counts(
-    outcomes: QueryOutcomes, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Returns TP, FP and FN at every distinct score, for weighted queries.
-
-    Args:
-        outcomes: outcomes of Q queries.
-        weights: (B, Q) number of times that each query counts in each of B
-            samples.
-
-    Returns:
-        (K,) thresholds, decreasing; (B, K) TP; (B, K) FP; (B, K) FN.
-    """
-    answered = np.flatnonzero(~np.isnan(outcomes.best_scores))
-    order = answered[np.argsort(-outcomes.best_scores[answered], kind="stable")]
-    scores = outcomes.best_scores[order]
-    # The last query of each group of equal scores, which are accepted together.
-    is_last = np.append(scores[1:] != scores[:-1], len(scores) > 0)
-    ends = np.flatnonzero(is_last)
-
-    def accepted(counts: np.ndarray) -> np.ndarray:
-        return np.cumsum(weights[:, order] * counts[order], axis=1)[:, ends]
-
-    tp = accepted(outcomes.is_right)
-    fp = accepted(~outcomes.is_right)
-    with_match = (weights * outcomes.has_match).sum(axis=1, keepdims=True)
-    fn = with_match - accepted(outcomes.has_match)
-    return scores[ends], tp, fp, fn
-
-
-def areas_under(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
-    """Returns the areas (B,) under B precision-recall curves.
-
-    Args:
-        precision: (B, K) precision at K thresholds; K can be 0.
-        recall: (B, K) recall at these thresholds, increasing.
-    """
-    # Imported here: it is slow to load.
-    from scipy.integrate import trapezoid
-
-    start = (precision[:, :1] * recall[:, :1]).sum(axis=1)
-    return start + trapezoid(precision, recall, axis=1)
-
-
-def recall_of(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns the recall TP / (TP + FN); 0 where TP + FN is 0.
-
-    The counts `tp` and `fn` and the result are arrays of the same shape.
-    """
-    return tp / np.maximum(tp + fn, 1)
 
 
 @dataclass(frozen=True)

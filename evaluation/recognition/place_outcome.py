@@ -23,7 +23,6 @@ from evaluation.recognition.metrics import (
     own_samples,
     paired_samples,
     percentile_interval,
-    pr_curve,
 )
 from evaluation.recognition.pose_errors import (
     PoseErrors,
@@ -31,6 +30,7 @@ from evaluation.recognition.pose_errors import (
     is_accepted,
     pose_metrics,
 )
+from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval

@@ -10,7 +10,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.recognition.metrics import pr_curve
+from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
 # Greatest errors of a localised query's pose.

@@ -11,12 +11,8 @@ from cns_drake.base.files import completing
 from cns_drake.base.listing import listed
 from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
-from evaluation.clouds.cloud_files import (
-    OnNote,
-    is_cloud,
-    no_note,
-    read_cloud,
-)
+from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.clouds.notes import OnNote, no_note
 from evaluation.drives.sampling import cropped
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -27,10 +27,10 @@ from evaluation.recognition.metrics import (
     Interval,
     paired_samples,
     percentile_interval,
-    pr_curve,
     resampled_weights,
 )
 from evaluation.recognition.place_outcome import kept_share
+from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import (
     COSTS,

@@ -9,7 +9,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports import cityjson
-from cns_drake.imports.cityjson import import_structures, read_cityjson
+from cns_drake.imports.cityjson import read_cityjson
+from cns_drake.imports.cityjson_structures import import_structures
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.ground import ground_of
 

@@ -18,7 +18,7 @@ from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.structures import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
-from cns_drake.imports.cityjson import import_cityjson
+from cns_drake.imports.cityjson_structures import import_cityjson
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
 from cns_drake.imports.dressing.facade_pieces import (
     add_facade,

@@ -6,7 +6,8 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.drives.search import driven_path, lane_links, make_lanes
+from cns_drake.imports.drives.search import driven_path
+from cns_drake.imports.drives.street_graph import lane_links, make_lanes
 from cns_drake.imports.foreign_city import Street
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
-from cns_drake.imports.cityjson import import_cityjson
+from cns_drake.imports.cityjson_structures import import_cityjson
 from cns_drake.imports.dressing.paving import guessed_streets, paved_gaps
 from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.ground import ground_of

@@ -6,12 +6,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz, xyz
-from evaluation.clouds.cloud_files import (
-    _decompress_lzf,
-    is_cloud,
-    read_blocks,
-    read_cloud,
-)
+from evaluation.clouds.cloud_files import is_cloud, read_blocks, read_cloud
+from evaluation.clouds.pcd_files import _decompress_lzf
 
 RNG = np.random.default_rng(11)
 POINTS = RNG.normal(scale=40.0, size=(500, 3)).astype(np.float32)

@@ -1,0 +1,223 @@
+"""Reads PCD files (PCL, up to 0.7): ascii, binary and binary_compressed."""
+
+from collections.abc import Iterator
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.base.number_text import is_number
+from evaluation.clouds.notes import OnNote
+from evaluation.clouds.record_reading import (
+    BYTE_ORDER_MARK,
+    HEADER_LIMIT_BYTES,
+    check_size,
+    read_records,
+    read_text_records,
+    record_type,
+)
+
+_PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
+_PCD_SIZES = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
+_UNMOVED = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+# LZF expands three bytes to at most 264. Compressed files are unpacked in
+# memory; larger ones must not be compressed.
+_LZF_RATIO = 88
+_UNPACKED_LIMIT_BYTES = 1 << 27
+
+
+def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
+    """Reads an ascii, binary or binary_compressed PCD file (PCL, up to 0.7).
+
+    Padding (fields named `_`) gets names of its own. VIEWPOINT is not applied,
+    because programs disagree whether it moves the points; a note says so.
+    """
+    header, offset = _read_pcd_header(path)
+    if _is_moved(header.get("VIEWPOINT", [])):
+        on_note(
+            f"{path}: VIEWPOINT is not applied; the points are taken as they"
+            " are written"
+        )
+    dtype, count = _describe_pcd(header)
+    encoding = header["DATA"][0].lower() if header["DATA"] else ""
+    if encoding == "ascii":
+        # A point takes at least one byte, which bounds the buffer.
+        check_size(path, offset + count, exactly=False)
+        return read_text_records(path, offset, count, block, dtype, "PCD")
+    if encoding == "binary":
+        check_size(path, offset + count * dtype.itemsize, exactly=True)
+        return read_records(path, dtype, offset, count, block)
+    if encoding == "binary_compressed":
+        return _read_compressed(path, offset, dtype, count, block)
+    raise ValueError(f"unknown PCD encoding {encoding!r}")
+
+
+def _read_pcd_header(path: Path) -> tuple[dict[str, list[str]], int]:
+    """Returns keyword -> values, and the offset of the points [bytes]."""
+    header = {}
+    with open(path, "rb") as stream:
+        while stream.tell() < HEADER_LIMIT_BYTES:
+            raw = stream.readline(HEADER_LIMIT_BYTES).removeprefix(
+                BYTE_ORDER_MARK
+            )
+            words = raw.split(b"#")[0].decode("ascii", "replace").split()
+            if words:
+                header[words[0].upper()] = words[1:]
+            if "DATA" in header:
+                return header, stream.tell()
+            if not raw:
+                break
+    raise ValueError("not a PCD file: no DATA line in the header")
+
+
+def _is_moved(viewpoint: list[str]) -> bool:
+    """Returns whether a viewpoint differs from the origin's."""
+    if not all(map(is_number, viewpoint)):
+        return True
+    return bool(viewpoint) and list(map(float, viewpoint)) != _UNMOVED
+
+
+def _describe_pcd(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
+    """Returns the type of a point and the number of points."""
+
+    def of(keyword: str) -> list[int]:
+        try:
+            return [int(word) for word in header[keyword]]
+        except (KeyError, ValueError) as error:
+            raise ValueError(
+                f"PCD header: {keyword} is missing or wrong"
+            ) from error
+
+    if "FIELDS" not in header:
+        raise ValueError("PCD header: FIELDS is missing or wrong")
+    names = header["FIELDS"]
+    sizes = of("SIZE")
+    kinds = [
+        _PCD_TYPES.get(kind.upper(), "") for kind in header.get("TYPE", [])
+    ]
+    counts = of("COUNT") if "COUNT" in header else [1] * len(names)
+    numbers = of("POINTS")[:1] if "POINTS" in header else []
+    if "WIDTH" in header or not numbers:
+        # Unorganised clouds of old writers have no height.
+        height = of("HEIGHT")[:1] if "HEIGHT" in header else [1]
+        numbers.append(math.prod([*of("WIDTH")[:1], *height]))
+    if not len(names) == len(sizes) == len(kinds) == len(counts):
+        raise ValueError(
+            "PCD header: FIELDS, SIZE, TYPE and COUNT differ in length"
+        )
+    fields: list[tuple] = []
+    for position, name in enumerate(names):
+        size = sizes[position]
+        kind = kinds[position]
+        count = counts[position]
+        if size not in _PCD_SIZES.get(kind, ()) or count < 1:
+            raise ValueError(
+                f"PCD header: {name}: no type {header['TYPE'][position]} of"
+                f" SIZE {size} and COUNT {count}"
+            )
+        # PCL names all padding `_`; a NumPy type needs different names.
+        unique = f"_{position}" if name == "_" else name
+        shape = () if count == 1 else (count,)
+        fields.append((unique, f"<{kind}{size}", shape))
+    dtype = record_type(fields, "PCD header: field")
+    for name in "xyz":
+        if name not in names or dtype[name].kind != "f":
+            raise ValueError(f"PCD header: no field {name} of type F")
+    number = numbers[0]
+    if numbers[-1] != number:
+        raise ValueError(
+            f"PCD header: POINTS {number} against {numbers[-1]} of WIDTH x"
+            " HEIGHT"
+        )
+    if number < 0:
+        raise ValueError("PCD header: a negative number of points")
+    return dtype, number
+
+
+def _read_compressed(
+    path: Path, offset: int, dtype: np.dtype, count: int, block: int
+) -> Iterator[np.ndarray]:
+    with open(path, "rb") as stream:
+        stream.seek(offset)
+        head = stream.read(8)
+        if len(head) != 8:
+            raise ValueError("PCD: the file is cut off")
+        num_packed, num_plain = np.frombuffer(head, dtype="<u4").tolist()
+        if num_plain != count * dtype.itemsize:
+            raise ValueError("PCD: the compressed size does not fit the header")
+        if num_plain > _LZF_RATIO * num_packed:
+            raise ValueError(
+                f"PCD: {num_packed} bytes cannot hold {num_plain} of them"
+            )
+        if max(num_packed, num_plain) > _UNPACKED_LIMIT_BYTES:
+            raise ValueError(
+                f"PCD: {num_plain} bytes compressed in one piece are more than"
+                f" {_UNPACKED_LIMIT_BYTES} (save it as binary)"
+            )
+        check_size(path, offset + 8 + num_packed, exactly=True)
+        packed = np.frombuffer(stream.read(num_packed), dtype=np.uint8)
+    plain = np.empty(num_plain, dtype=np.uint8)
+    if not _decompress_lzf(packed, plain):
+        raise ValueError("PCD: the compressed data is damaged")
+    for start in range(0, max(count, 1), block):
+        yield _interleaved(plain, dtype, count, slice(start, start + block))
+
+
+def _interleaved(
+    plain: np.ndarray, dtype: np.dtype, count: int, part: slice
+) -> np.ndarray:
+    """Returns points of a file that stores its `count` points by fields."""
+    points = np.empty(len(range(count)[part]), dtype=dtype)
+    start = 0
+    for name in dtype.names or ():
+        scalar = dtype[name]
+        end = start + count * scalar.itemsize
+        column = plain[start:end].view(scalar.base)
+        points[name] = column.reshape(count, *scalar.shape)[part]
+        start = end
+    return points
+
+
+@compiled
+def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
+    """Expands LZF data; returns whether it was sound and filled `plain`.
+
+    Format: each sequence begins with a control byte c. If c < 32, then c + 1
+    literal bytes follow. Otherwise the sequence copies earlier bytes. The upper
+    three bits of c are the length minus two; if they are 7, the next byte is
+    added to the length. The lower five bits and one more byte are the distance
+    back minus one.
+    """
+    source = 0
+    target = 0
+    while source < len(packed):
+        control = int(packed[source])
+        source += 1
+        if control < 32:
+            length = control + 1
+            if source + length > len(packed) or target + length > len(plain):
+                return False
+            for _ in range(length):
+                plain[target] = packed[source]
+                source += 1
+                target += 1
+            continue
+        length = control >> 5
+        if length == 7:
+            if source >= len(packed):
+                return False
+            length += int(packed[source])
+            source += 1
+        if source >= len(packed):
+            return False
+        distance = ((control & 31) << 8) + int(packed[source]) + 1
+        source += 1
+        length += 2
+        if distance > target or target + length > len(plain):
+            return False
+        # Bytes are copied one by one: source and target may overlap.
+        for _ in range(length):
+            plain[target] = plain[target - distance]
+            target += 1
+    return target == len(plain)
