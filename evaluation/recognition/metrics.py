@@ -305,9 +305,9 @@ def compared_by_auc(
     The p-value comes from a t test. Several sets can have the same query drive.
     The variance of the sum over the sets of one drive comes from a bootstrap,
     whose samples contain the same blocks of the route for both methods and for
-    all sets of the drive. With n blocks, this variance is multiplied by n / (n
-    - 1). Different drives are independent: their variances add up, and their
-      degrees of freedom (n - 1 for each drive) add up.
+    all sets of the drive. With n blocks, this variance is multiplied by
+    n/(n-1). Different drives are independent: their variances add up, and their
+    degrees of freedom (n - 1 for each drive) add up.
 
     Args:
         answers: method -> its outcomes on each set of queries. The queries must
