@@ -48,8 +48,9 @@ class RouteLeg(BaseModel):
         start: where the drive starts: the distance from the point where the
             first leg enters its road [m]. Only in the first leg.
         end: where the drive ends, or where the car turns round: the distance
-            from the point where the leg enters the road [m]. Only in the last
-            leg, and in a leg that ends with a turn on the same road.
+            from the point where the leg enters the road [m]. Allowed only
+            in the last leg, and in a leg that ends with a turn on the same
+            road.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

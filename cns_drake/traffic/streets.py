@@ -410,7 +410,7 @@ def _speeds(piece: Piece) -> np.ndarray:
 def find_conflicts(
     graph: LaneGraph,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns where paths of vehicles, and crossings, are in conflict.
+    """Returns where vehicles are in conflict with each other or with crossings.
 
     A path through a junction is called a way. Two different ways are in
     conflict if the areas that vehicles sweep on them overlap. A way and a
@@ -422,14 +422,14 @@ def find_conflicts(
             crossings.
 
     Returns:
-        Three arrays (2, P + C, P + C) with indices k, a, b. k is 0 for two
-        small vehicles, and 1 if at least one is large. a and b are numbers of
-        pieces or, from P on, of crossings.
+        Three arrays (2, P + C, P + C) with indices `k, a, b`. `k` is 0 for two
+        small vehicles, and 1 if at least one is large. `a` and `b` are numbers
+        of pieces or, from P on, of crossings.
 
-        - Distance of a vehicle's front along a at which it reaches the area of
-          b [m]; inf without a conflict, or if a is a crossing.
-        - Distance of a vehicle's rear along a at which it leaves the area of b
-          [m]; 0 without a conflict, or if a is a crossing.
+        - How far the vehicle's front has gone along `a` when the vehicle reaches
+          the area of `b` [m]; inf without a conflict, or if `a` is a crossing.
+        - How far the vehicle's rear has gone along `a` when the vehicle has left
+          the area of `b` [m]; 0 without a conflict, or if `a` is a crossing.
         - `SPLIT` for two ways that overlap only at their beginning, because
           they come from the same lane; `MERGE` for two ways that overlap only
           at their end, because they lead to the same lane; otherwise 0.

@@ -78,8 +78,9 @@ class ScanContextConfig(MethodConfig):
         candidates: number of contexts that the search in the KD-tree returns;
             [E] 50. If each place has n contexts, the search returns n *
             `candidates` contexts.
-        search_ratio: share of all shifts of the context that are compared,
-            around the shift that fits the aligning key best; [C] 0.1.
+        search_ratio: which share of all shifts of the context is compared.
+            These shifts lie around the one that fits the aligning key best; [C]
+            0.1.
     """
 
     variant: Variant = "augmented-polar"

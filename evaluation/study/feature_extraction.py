@@ -144,8 +144,9 @@ class KeptScans:
         Args:
             frame: number of the frame.
             scan: structured array (M,) in the sensor's frame.
-            max_range: greatest absolute x, y and z of a point in the sensor's
-                frame [m], however the sensor is rotated and tilted.
+            max_range: greatest absolute coordinate of a point that is needed
+                [m], in the frame of the sensor after any rotation. So all
+                points are stored that a rotation can bring within this limit.
         """
         # A corner of the cube may lie on an axis of a rotated sensor.
         max_range *= math.sqrt(3.0)
