@@ -132,9 +132,9 @@ def export(
     from above.
 
     Args:
-        drives: Drives to export. If you name none, pointnetvlad and overlap
-            export all shipped drives, or with --vary only the drives of the
-            experiment.
+        drives: Drives to export. With --format pointnetvlad or overlap, you can
+            leave them out: then all shipped drives are exported, or with --vary
+            only the drives of the experiment.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
             mulran (MulRan), tum (only the trajectory), mcap (a repaired copy),
             pointnetvlad (clouds and pickle files for PointNetVLAD), overlap

@@ -438,11 +438,10 @@ def _turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
 
 
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
-    """Returns `stages.yaml` without structures that a new city lacks.
+    """Returns `stages.yaml` with only the structures that a new city has.
 
-    A redrawn city can have fewer houses in a row than the original city, for
-    which the file was written. Groups that lose all their structures are left
-    out.
+    The file was written for the original city. Rows of a redrawn city can
+    consist of fewer houses. Groups that lose all their structures are left out.
 
     Args:
         stages: the content of the file.

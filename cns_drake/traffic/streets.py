@@ -426,10 +426,12 @@ def find_conflicts(
         small vehicles, and 1 if at least one is large. `a` and `b` are numbers
         of pieces or, from P on, of crossings.
 
-        - How far the vehicle's front has gone along `a` when the vehicle reaches
-          the area of `b` [m]; inf without a conflict, or if `a` is a crossing.
-        - How far the vehicle's rear has gone along `a` when the vehicle has left
-          the area of `b` [m]; 0 without a conflict, or if `a` is a crossing.
+        - How far the front of a vehicle has gone along `a` when the vehicle
+          reaches the area of `b` [m]; inf without a conflict, or if `a` is a
+          crossing.
+        - How far the rear of a vehicle has gone along `a` when the vehicle has
+          left the area of `b` [m]; 0 without a conflict, or if `a` is a
+          crossing.
         - `SPLIT` for two ways that overlap only at their beginning, because
           they come from the same lane; `MERGE` for two ways that overlap only
           at their end, because they lead to the same lane; otherwise 0.

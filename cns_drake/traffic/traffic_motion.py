@@ -423,7 +423,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects traffic to a LiDAR, which then labels bodies of traffic as moving.
+    """Connects traffic to a LiDAR, which then labels its bodies as moving.
 
     Args:
         builder: builder of a diagram with both systems.

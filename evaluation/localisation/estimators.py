@@ -5,10 +5,10 @@ and parallel algorithms for point cloud registration", JOSS 2024), two
 estimators with a robust kernel, and, as an optional extra, KISS-Matcher (H. Lim
 et al., ICRA 2025). An estimator of your own is a Python function.
 
-small_gicp's point-to-plane error is the offset of a pair times the normal,
-component by component. On surfaces that are parallel to two axes of the world,
-this is the usual error; on other surfaces it also resists a motion along the
-surface.
+In small_gicp, the point-to-plane error of two corresponding points is the
+elementwise product of their offset and the normal, instead of the dot product.
+Both errors are equal on surfaces that are parallel to two axes of the world. On
+other surfaces, the elementwise error also penalises a motion along the surface.
 """
 
 from collections.abc import Callable, Iterable, Iterator

@@ -205,8 +205,8 @@ def made_by(
 
     Args:
         protocol: the protocol.
-        settings: name -> value of settings outside of the protocol that change
-            a number, except settings that have their defaults.
+        settings: name -> value of the settings that affect results, are no part
+            of the protocol, and differ from their defaults.
 
     Returns:
         `protocol`, `protocol_digest` and `version`. With settings, the protocol

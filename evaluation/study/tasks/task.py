@@ -185,7 +185,7 @@ class Pair:
 
     @property
     def is_composed(self) -> bool:
-        """Whether the database differs from the places of a single drive.
+        """Whether the database is anything but all places of one drive.
 
         A composed database has places of several drives, or only some places of
         one drive.
