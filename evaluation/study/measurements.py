@@ -183,7 +183,8 @@ def measure_method(
     check_same_world(placed, placed_query, across_maps=True)
     shown = {} if overlaps is None else overlaps.read()
     return _compare(
-        (choice, method),
+        choice,
+        method,
         with_distractors(
             database,
             distractors,
@@ -194,7 +195,8 @@ def measure_method(
             divides=method.divides,
         ),
         asked,
-        (protocol, radii),
+        protocol,
+        radii,
         lambda radius, matches: shown.get(radius),
         reporter,
         leaves_out_itself=leaves_out_itself,
@@ -252,25 +254,9 @@ def measure_places(
     ):
         method = choice.make()
         mapped, asked = places(k), queries(k)
-
-        def shown(
-            radius: float,
-            matches: np.ndarray,
-            mapped: DriveDescriptors = mapped,
-            asked: DriveDescriptors = asked,
-        ) -> np.ndarray:
-            if radius not in overlaps:
-                overlaps[radius] = best_overlaps(
-                    place_scans,
-                    mapped.places.X_WS,
-                    query_scans,
-                    asked.queries.X_WS,
-                    matches[:, : len(place_scans)],
-                )
-            return overlaps[radius]
-
         outcomes += _compare(
-            (choice, method),
+            choice,
+            method,
             with_distractors(
                 mapped,
                 [parts[k] for parts in distractors],
@@ -278,8 +264,9 @@ def measure_places(
                 divides=method.divides,
             ),
             asked,
-            (protocol, radii),
-            shown,
+            protocol,
+            radii,
+            partial(_shown, overlaps, place_scans, query_scans, mapped, asked),
             reporter,
             truth,
             leaves_out_slow=leaves_out_slow,
@@ -287,11 +274,49 @@ def measure_places(
     return outcomes
 
 
+def _shown(
+    overlaps: dict[float, np.ndarray],
+    place_scans: list[np.ndarray],
+    query_scans: list[np.ndarray],
+    database: DriveDescriptors,
+    query: DriveDescriptors,
+    radius: float,
+    matches: np.ndarray,
+) -> np.ndarray:
+    """Returns how much of each query's scan its best match shows, (Q,).
+
+    Matches follow from the places of the scans, and not from a method. The
+    overlaps of a radius are therefore computed once for all methods.
+
+    Args:
+        overlaps: radius -> overlaps that are known, to which new ones are
+            added.
+        place_scans: scans of the P places of the drive itself, which come first
+            in the database.
+        query_scans: scans of the Q queries.
+        database: the described places.
+        query: the described queries.
+        radius: radius of a match [m].
+        matches: (Q, D) which places match the queries within the radius.
+    """
+    if radius not in overlaps:
+        overlaps[radius] = best_overlaps(
+            place_scans,
+            database.places.X_WS,
+            query_scans,
+            query.queries.X_WS,
+            matches[:, : len(place_scans)],
+        )
+    return overlaps[radius]
+
+
 def _compare(
-    chosen: tuple[MethodChoice, Method],
+    choice: MethodChoice,
+    method: Method,
     database: Searched,
     query: DriveDescriptors,
-    asked: tuple[RetrievalProtocol, tuple[float, ...]],
+    protocol: RetrievalProtocol,
+    radii: tuple[float, ...],
     shown: Callable[[float, np.ndarray], np.ndarray | None],
     reporter: Reporter,
     truth: np.ndarray | None = None,
@@ -302,19 +327,18 @@ def _compare(
     """Returns the outcomes of a method; none if it would take too long.
 
     Args:
-        chosen: the method, as it was chosen and as it was made.
+        choice: the method, as it was chosen.
+        method: the method, as it was made.
         database: the places that are searched.
         query: the described queries.
-        asked: the protocol, and radii of a match [m].
+        protocol, radii: see `measure_places`.
         shown: function that returns overlaps (Q,) of the queries for a radius
             and the matches (Q, D) within it.
         reporter: reports notes.
         truth, leaves_out_slow: see `measure_places`.
         leaves_out_itself: see `Pair`.
     """
-    choice, method = chosen
     searched, drives, num_here, _ = database
-    protocol, radii = asked
     if (
         leaves_out_slow
         and len(searched.places.frames) > _MANY
