@@ -72,8 +72,8 @@ def with_unmarked_crossings(
         path, (first, second) = best
         start = next(places)
         end = next(places)
-        for (way, row), place in ((first, start), (second, end)):
-            cuts[way] = (row, place)
+        for (number, row), place in ((first, start), (second, end)):
+            cuts[number] = (row, place)
         found.append(
             Walkway(
                 resampled(path), _CROSSING_HALF_PATH, start, end, len(crossings)
