@@ -20,12 +20,12 @@ the test of `evaluation.recognition.metrics`.
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 import math
 import re
 import textwrap
-from typing import Any
+from typing import Any, TypeVar
 
 from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
@@ -57,13 +57,16 @@ from evaluation.results.table import (
     COSTS,
     LAST,
     OWN,
+    SETTINGS,
     STAGE,
+    Answers,
     QueryRows,
     Results,
     Row,
 )
 from evaluation.results.table_forms import in_table_order, title
 
+_Measured = TypeVar("_Measured", Row, Answers)
 # Width of a chart on a screen [px].
 WIDE = 860
 # Width of a chart on a phone [px].
@@ -98,6 +101,7 @@ _METRICS = {
     "memory": "memory of the descriptors [bytes]",
     "success_03m_1deg": "success within 0.3 m and 1 deg",
     "success_2m_5deg": "success within 2 m and 5 deg",
+    "protocol.turn_queries": "random yaw",
 }
 # The sign of per cent never begins a line.
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
@@ -113,6 +117,12 @@ _CAUSES = {
 _COLOURS = LinearSegmentedColormap.from_list(
     "shares", colormaps["RdYlBu"](np.linspace(0.15, 0.8, 64))
 )
+# Height of the titles and the caption of a matrix [px].
+_CAPTIONS = 130.0
+# Height of a letter of a slanted name [px].
+_LETTER = 6.0
+# Characters in a line of a method's name below a chart.
+_NAME_WIDTH = 32
 # Columns that say which drives are compared.
 _PAIR = ("map", "database", "query")
 # Beyond this ratio of its values, an axis is logarithmic.
@@ -213,6 +223,10 @@ def draw(
         InputError: the chart has an unknown kind or column, or selects no rows.
     """
     keys = check(chart)
+    if names_of := _file_names(results.rows):
+        results = Results.of(_renamed(results.rows, names_of))
+        if queries is not None:
+            queries = QueryRows.of(_renamed(queries.answers, names_of))
     kind = chart["kind"]
     metric = keys.get("metric", keys.get("y"))
     chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
@@ -248,6 +262,42 @@ def draw(
                 handles=handles, loc="outside lower center", ncols=columns
             )
     return Drawn(message, figure, legend)
+
+
+def _file_names(rows: Sequence[Row]) -> dict[tuple[str, object], str]:
+    """Returns settings of methods that name files, without their folders.
+
+    Paths are too long for a chart. If two paths of a table end alike, all paths
+    stay whole.
+
+    Returns:
+        (Column, value) -> the value without folders; empty if nothing changes.
+    """
+    found = {
+        (name, value): re.sub(r"[^\s\"',\[\]]*/", "", value)
+        for row in rows
+        for name, value in row.factors.items()
+        if name.startswith(SETTINGS) and isinstance(value, str)
+    }
+    different = {(name, short) for (name, _), short in found.items()}
+    if len(different) < len(found):
+        return {}
+    return {key: short for key, short in found.items() if key[1] != short}
+
+
+def _renamed(
+    items: Iterable[_Measured], names_of: Mapping[tuple[str, object], str]
+) -> list[_Measured]:
+    return [
+        replace(
+            one,
+            factors={
+                name: names_of.get((name, value), value)
+                for name, value in one.factors.items()
+            },
+        )
+        for one in items
+    ]
 
 
 def _legend(
@@ -448,9 +498,12 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     over = chart.keys["over"]
     strips = chart.keys.get("strips")
     values = list(dict.fromkeys(row[over] for row in chart.rows))
-    # Names of methods and the caption stand below.
-    figure, panels = chart.panels(_BELOW + len(values) * _ROW)
     names = list(chart.styles)
+    below = [textwrap.fill(name, _NAME_WIDTH) for name in names]
+    longest = max(len(line) for name in below for line in name.split("\n"))
+    # Names of methods and the caption stand below.
+    height = max(_BELOW, _CAPTIONS + _LETTER * longest)
+    figure, panels = chart.panels(height + len(values) * _ROW)
     weakest: list[tuple[float, str, str]] = []
     most = 1
     columns = "label", over, strips or over
@@ -493,7 +546,10 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
         axes.set(xlim=(0, len(names)), ylim=(len(values), 0))
         middles = np.arange(len(names)) + 0.5
         axes.set_xticks(
-            middles, map(escape_dollars, names), rotation=45, ha="right"
+            middles,
+            [escape_dollars(name) for name in below],
+            rotation=45,
+            ha="right",
         )
         for label in axes.get_xticklabels():
             label.set_rotation_mode("anchor")
@@ -508,7 +564,8 @@ def _matrix(chart: _Chart) -> tuple[str, Figure]:
     text = f"{in_words(chart.metric)} in per cent"
     if strips is not None and most > 1:
         text += (
-            f"; a strip for each {in_words(strips)}, the number is of the last"
+            f"; a strip for each value of {in_words(strips)}, the number is of"
+            " the last"
         )
     if losses:
         text += "; bold where its 95 % interval lies below 100"

@@ -46,7 +46,7 @@ _ROUNDING = 1e-9
 # Names, in lower case and with underscores between words -> their range.
 _RANGES = (
     # The label of a chart whose values stand in its cells.
-    (r"\w+_in_per_cent\w*", _ANY),
+    (r"[\w@%]+_in_per_cent\w*", _ANY),
     # Place recognition.
     (r"(paper_s_)?(auc|r1|r@\d+%?|f1|f1max)(_(?!kept)\w+)?", _SHARE),
     (

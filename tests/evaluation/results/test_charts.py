@@ -4,6 +4,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 import math
 import re
+import warnings
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
@@ -134,6 +135,34 @@ def test_a_matrix_has_strips_and_the_last_number():
     ]
     assert drawn.message == ("Least retained share: 0.60 (SOLiD; parked cars)")
     assert not drawn.legend
+
+
+@pytest.mark.parametrize(
+    ("values", "shown"),
+    [
+        (("/far/away/kitti.pth",), "mine, weights kitti.pth"),
+        (("/far/kitti.pth", "/a/mulran.pth"), "mine, weights mulran.pth"),
+        (('["/far/a.pth", "/far/b.pth"]',), 'mine, weights ["a.pth", "b.pth"]'),
+        (("/far/kitti.pth", "/a/kitti.pth"), "mine, weights /a/kitti.pth"),
+    ],
+)
+def test_long_settings_leave_room_for_the_matrix(tmp_path, values, shown):
+    setting = "methods.mine.weights"
+    results = Results.of(
+        row(0.5, {"cause": cause, setting: value}, metric="r1")
+        for value in values
+        for cause in ("none", "age")
+    )
+    chart = {"kind": "matrix", "over": "cause", "metric": "r1"}
+    drawn = charts.draw(chart, results, alone=True)
+    (axes,) = drawn.figure.axes
+    names = [one.get_text() for one in axes.get_xticklabels()]
+    assert shown in [name.replace("\n", " ") for name in names]
+    assert max(len(line) for name in names for line in name.split("\n")) <= 32
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save(drawn.figure, tmp_path / "chart", ("png",))
+    assert axes.get_window_extent().height > 2 * charts._ROW
 
 
 @pytest.mark.parametrize(
