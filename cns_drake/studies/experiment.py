@@ -137,9 +137,9 @@ class MadeMap(Section):
         grow: share of the imported buildings, sampled at random, that change
             between the first stage and today: in the first stage they are
             missing, or lower than today.
-        plain: whether to leave out the windows, roofs and kerbs that the file
-            does not contain. By default these parts are sampled at random, as
-            by `cns-drake import`.
+        plain: whether the city has only the windows, roofs and kerbs that the
+            file contains. By default, missing ones are sampled at random, as by
+            `cns-drake import`.
         seed: seed of all random numbers.
     """
 

@@ -75,9 +75,9 @@ class ScanContextConfig(MethodConfig):
             [m]; [T] 100 and 40.
         lateral_shift: distance by which the variant `augmented-polar` shifts
             the copies of a place to each side [m]; [T] 2.
-        candidates: number of contexts that the search in the KD-tree returns;
-            [E] 50. If each place has n contexts, the search returns n *
-            `candidates` contexts.
+        candidates: number of contexts that the search in the KD-tree returns
+            for each context of a place: n * `candidates` contexts if a place
+            has n contexts; [E] 50.
         search_ratio: which share of all shifts of the context is compared.
             These shifts lie around the one that fits the aligning key best; [C]
             0.1.

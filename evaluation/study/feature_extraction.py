@@ -144,9 +144,9 @@ class KeptScans:
         Args:
             frame: number of the frame.
             scan: structured array (M,) in the sensor's frame.
-            max_range: greatest absolute coordinate of a point that is needed
-                [m], in the frame of the sensor after any rotation. So all
-                points are stored that a rotation can bring within this limit.
+            max_range: limit of the coordinates in the frame of the rotated
+                sensor [m]. A point is stored if some rotation of the sensor can
+                bring all its coordinates within this limit.
         """
         # A corner of the cube may lie on an axis of a rotated sensor.
         max_range *= math.sqrt(3.0)

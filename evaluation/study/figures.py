@@ -138,7 +138,8 @@ def city_job(
     Args:
         city: the city.
         files: files of the study.
-        planned: adds the features that are drawn.
+        planned: gets a job for each drive of the figure, which extracts its
+            features.
     """
     needs: list[str] = []
     features = [

@@ -92,8 +92,9 @@ def repeats_of(
 ) -> list[Repeat]:
     """Returns the second runs of methods on a pair of drives.
 
-    A method has a second run if the reference has its numbers on the pair,
-    measured by another protocol.
+    If the reference has published numbers of a method on this pair, measured by
+    another protocol than the study's, the method runs a second time, by that
+    protocol, for comparison.
 
     Args:
         stages: names of the map, and of the stages of database and query.

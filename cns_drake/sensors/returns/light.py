@@ -76,19 +76,18 @@ class BeamHits(NamedTuple):
 
 
 class Shots(NamedTuple):
-    """The N beams of a revolution, in the order in which rays are cast.
+    """The N beams of a revolution, one per row, in the order of casting.
 
-    The LiDAR may fire the beams in another order. Beam i is the beam with the
-    firing number i.
+    The LiDAR may fire the beams in another order.
 
     Attributes:
         key: key of the frame's random numbers; see
             `cns_drake.sensors.returns.random_numbers.frame_key`.
-        beam: (N,) firing number of each beam.
-        p_WSset: (K, 3) positions of the lasers in the world [m]; beam i starts
-            at position i mod K.
-        times: (T,) float32 firing times as fractions of the revolution; beam i
-            fires at time i mod T.
+        beam: (N,) firing number of the beam in each row.
+        p_WSset: (K, 3) positions of the lasers in the world [m]; the beam in
+            row i starts at `p_WSset[i % K]`.
+        times: (T,) float32 firing times as fractions of the revolution; the
+            beam in row i fires at `times[i % T]`.
         divergence: half angle of a beam [rad].
         max_range: how far light is followed [m].
         materials: materials of all geometries.
