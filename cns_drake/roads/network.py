@@ -108,7 +108,7 @@ class RoadNetwork:
             )
         a, b = self._ends(incoming, outgoing)
         place = self.junctions[junction]
-        turn = _classify(_turn_deg(a, b), len(place.arms))
+        turn = _turn_of(_turn_deg(a, b), len(place.arms))
         # In a right turn, the outermost lane follows the kerb.
         width = self.roads[outgoing.road].lane_width
         radius = place.kerb_radius + width / 2 if turn == "right" else np.inf
@@ -217,8 +217,8 @@ def _turn_deg(a: _Pose, b: _Pose) -> float:
     return float(np.degrees(wrapped(b[3] - a[3])))
 
 
-def _classify(angle_deg: float, num_arms: int) -> Turn:
-    """Returns the kind of turn; None where two roads only join."""
+def _turn_of(angle_deg: float, num_arms: int) -> Turn:
+    """Returns the kind of turn; straight on wherever two roads only join."""
     if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
