@@ -409,15 +409,18 @@ def _painted_strip(
     if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
         ends = sample_stations(first, last, _SLOPE_PIECE)
         pairs = itertools.pairwise(ends)
-        faces = (_quadrilateral(road, *pair, right, left) for pair in pairs)
+        faces = (_painted_face(road, *pair, right, left) for pair in pairs)
         return merge_meshes(*faces)
-    return _quadrilateral(road, first, last, right, left)
+    return _painted_face(road, first, last, right, left)
 
 
-def _quadrilateral(
+def _painted_face(
     road: Road, first: float, last: float, right: float, left: float
 ) -> Mesh:
-    """Returns one plane face between two stations and two offsets [m]."""
+    """Returns one plane face between two stations and two offsets [m].
+
+    The face lies above the road by the thickness of the paint.
+    """
     corners = np.concatenate(
         [
             road.evaluate([first, last], right)[:, :3],
