@@ -17,7 +17,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern, Beams
 from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import check_preset
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
-from cns_drake.sensors.returns.footprint import find_sides, meet_sides
+from cns_drake.sensors.returns.footprint import correct_side_hits, find_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
 from cns_drake.sensors.returns.materials import Materials, find_materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
@@ -223,8 +223,10 @@ class CalibratedReturns:
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
         )
-        rest = meet_sides(sides, side_met, met)
-        lights, ways, ways_met = start_ways(shots, rest, met, sides, side_met)
+        axis_shares = correct_side_hits(sides, side_met, met)
+        lights, ways, ways_met = start_ways(
+            shots, axis_shares, met, sides, side_met
+        )
         receiver = self._receiver(pattern.min_range, pattern.max_range)
         followed = follow(shots, ways, ways_met, receiver.budget.scale)
         light = texture(

@@ -167,7 +167,9 @@ def _share(
 
 
 @compiled
-def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
+def correct_side_hits(
+    sides: Sides, side_hits: BeamHits, hits: BeamHits
+) -> np.ndarray:
     """Corrects the hits of additional rays; returns the axes' shares of light.
 
     At an edge, the axis of a beam hits one surface, and the axis of a
@@ -189,16 +191,16 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
         (N,) fraction of each beam's light that its axis represents; the
         additional rays of the beam represent the other light.
     """
-    rest = np.ones(len(hits.ranges))
+    axis_shares = np.ones(len(hits.ranges))
     for side in range(len(sides.row)):
         i, j = sides.row[side], sides.neighbour[side]
         if side_hits.geometry[side] >= 0:
             if _touch(hits, i, side_hits, side):
                 side_hits.geometry[side] = -1
             else:
-                rest[i] -= sides.share[side]
+                axis_shares[i] -= sides.share[side]
         elif hits.ranges[i] <= hits.ranges[j]:
-            rest[i] -= sides.share[side]
+            axis_shares[i] -= sides.share[side]
             if hits.geometry[j] < 0:
                 continue
             distance = _range_on(hits, j, sides.d_Wset[side])
@@ -210,7 +212,7 @@ def meet_sides(sides: Sides, side_hits: BeamHits, hits: BeamHits) -> np.ndarray:
             side_hits.cosine[side] = hits.cosine[j]
             for axis in range(3):
                 side_hits.normals_W[side, axis] = hits.normals_W[j, axis]
-    return rest
+    return axis_shares
 
 
 @compiled
