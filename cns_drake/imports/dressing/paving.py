@@ -127,7 +127,7 @@ def missing_sidewalks(
         or one.kind.startswith("Water")
     ]
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
-    taken = np.concatenate([_upper_sides(shapes), lanes])
+    taken = np.concatenate([_triangles_from_above(shapes), lanes])
     # The union of a whole city takes long, so only polygons near each street
     # are used.
     tree = STRtree(taken)
@@ -192,7 +192,7 @@ def guessed_streets(
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
     near = near_drives(structures, drives)
     houses = [o for o in near if o.structure.semantic_class == "building"]
-    roofs = _upper_sides(houses, with_lower=False)
+    roofs = _triangles_from_above(houses, with_downward=False)
     reach = paths.buffer(HALF_STREET + _SIDEWALK + _FROM_WALL)
     shapely.prepare(reach)
     roofs = roofs[shapely.intersects(reach, roofs)]
@@ -277,13 +277,13 @@ def paved_gaps(
     roads = [_flat_outline(one) for one in near if one.kind == "Road"]
     walks_tree = STRtree(walks)
     houses = [one for one in near if one.structure.semantic_class == "building"]
-    roofs = _upper_sides(houses)
+    roofs = _triangles_from_above(houses)
     beside = walks_tree.query(roofs, "dwithin", _WIDEST_GAP)[0]
     covered = shapely.union_all([*walks, *roads, *roofs[np.unique(beside)]])
     half = _WIDEST_GAP / 2.0
     closed = covered.buffer(half, 2).buffer(-half, 2)
     gaps = shapely.difference(closed, covered, grid_size=_GRID)
-    other = _upper_sides(
+    other = _triangles_from_above(
         [
             one
             for one in near
@@ -320,15 +320,16 @@ def paved_gaps(
         yield _paved_structure(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
-def _upper_sides(
-    structures: Sequence[Imported], with_lower: bool = True
+def _triangles_from_above(
+    structures: Sequence[Imported], *, with_downward: bool = True
 ) -> np.ndarray:
-    """Returns upward-looking triangles as polygons, seen from above.
+    """Returns triangles of structures as polygons (N,), seen from above [m].
 
-    By default, downward-looking triangles are included.
+    Vertical triangles are left out. Unless `with_downward` is true, which is
+    the default, so are triangles that look downwards.
     """
     triangles = joined(one.triangles for one in structures)
-    if with_lower:
+    if with_downward:
         triangles = turned_up(triangles)
     rings = np.round(triangles[looks_up(triangles)][:, [0, 1, 2, 0], :2], 3)
     return np.asarray(shapely.polygons(rings))
@@ -336,4 +337,4 @@ def _upper_sides(
 
 def _flat_outline(one: Imported) -> BaseGeometry:
     """Returns the area of a level structure, seen from above."""
-    return shapely.coverage_union_all(_upper_sides([one]))
+    return shapely.coverage_union_all(_triangles_from_above([one]))
