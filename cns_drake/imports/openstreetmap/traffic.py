@@ -349,17 +349,19 @@ def _stretches(
             )
 
 
-def _rounded_line(whole: shapely.LineString, mean: float) -> np.ndarray:
+def _rounded_line(
+    line: shapely.LineString, window_length: float
+) -> np.ndarray:
     """Returns evenly spaced points (N, 2) along a line with smooth corners.
 
-    `mean` is the length of the running mean that rounds them [m].
+    `window_length` is the length of the running mean that rounds them [m].
     """
-    count = max(3, round(whole.length / SPACING) + 1)
+    count = max(3, round(line.length / SPACING) + 1)
     places = np.linspace(0.0, 1.0, count)
     points = shapely.get_coordinates(
-        shapely.line_interpolate_point(whole, places, normalized=True)
+        shapely.line_interpolate_point(line, places, normalized=True)
     )
-    window = min(int(mean / SPACING), count // 3) // 2 * 2 + 1
+    window = min(int(window_length / SPACING), count // 3) // 2 * 2 + 1
     reach = window // 2
     # Mirrored at both ends, so that these stay in place.
     longer = np.concatenate(
