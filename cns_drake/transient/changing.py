@@ -106,7 +106,7 @@ def _move_furniture(around: Surroundings, share: float) -> None:
         around.editing.note(
             "furniture: the world has no pole and no traffic sign"
         )
-    obstacles = around.obstacles(ignored=GROUND_CLASSES)
+    obstacles = around.obstacles_except(GROUND_CLASSES)
     for thing, rng in around.chosen("furniture", wanted, share):
         foot = thing.footprint
         middle = np.array(foot.centroid.coords[0])

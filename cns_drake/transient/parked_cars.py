@@ -145,7 +145,7 @@ def make_bays(around: Surroundings) -> dict[str, Bay]:
     if not bays:
         return {}
     standing = Obstacles((n, bay.box()) for n, bay in bays.items())
-    others = around.obstacles(ignored=_PARKED | GROUND_CLASSES)
+    others = around.obstacles_except(_PARKED | GROUND_CLASSES)
     grown = {}
     for name, car in cars.items():
         grown[name] = Bay(car)

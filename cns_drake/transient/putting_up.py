@@ -72,7 +72,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
         around.editing.note(
             f"scaffolds: no building within {_FARTHEST:g} m of the drive"
         )
-    obstacles = around.obstacles(classes=_NOT_THROUGH)
+    obstacles = around.obstacles_of(_NOT_THROUGH)
     for building, rng in around.chosen("scaffolds", fronts, share):
         X_WF, length = _front(building, around.drive)
         length = min(length, _LONGEST_SCAFFOLD)
@@ -344,7 +344,7 @@ def put_up_works(around: Surroundings, share: float) -> None:
     """
     stretches = _stretches(around, "works", _WORKS_CELL, _LENGTHS[0])
     solid, every = (
-        around.obstacles(ignored=ignored) for ignored in (_OPEN, GROUND_CLASSES)
+        around.obstacles_except(ignored) for ignored in (_OPEN, GROUND_CLASSES)
     )
     for stretch, rng in around.chosen("works", stretches, share):
         for _ in range(_TRIES):
@@ -470,7 +470,7 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
     stretches = _stretches(
         around, "roadsides", _STRETCH_CELL, _SHORTEST_STRETCH
     )
-    standing = around.obstacles(ignored=GROUND_CLASSES)
+    standing = around.obstacles_except(GROUND_CLASSES)
     areas = [around.ground.carriageway]
     shapely.prepare(areas[0])
     for name, row in _ROWS.items():

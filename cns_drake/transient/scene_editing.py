@@ -470,32 +470,28 @@ class Surroundings:
         """Returns the structures of some classes."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
-    def obstacles(
-        self,
-        *,
-        ignored: Collection[str] | None = None,
-        classes: Collection[str] = (),
-    ) -> Obstacles:
+    def obstacles_of(self, classes: Collection[str]) -> Obstacles:
         """Returns the areas where new objects must not stand.
 
-        The result contains the area `kept_free` and the footprints of some
-        structures.
-
-        Args:
-            ignored: classes whose structures are no obstacles; structures of
-                all other classes are obstacles.
-            classes: classes whose structures are obstacles, if `ignored` is
-                None.
+        The result contains the area `kept_free` and the footprints of all
+        structures of some classes.
         """
-        feet = (
-            (thing.name, thing.footprint)
+        return self._obstacles(self.of_classes(classes))
+
+    def obstacles_except(self, ignored: Collection[str]) -> Obstacles:
+        """Returns the areas where new objects must not stand.
+
+        The result contains the area `kept_free` and the footprints of all
+        structures except those of the classes `ignored`.
+        """
+        return self._obstacles(
+            thing
             for thing in self.things.values()
-            if (
-                thing.semantic_class in classes
-                if ignored is None
-                else thing.semantic_class not in ignored
-            )
+            if thing.semantic_class not in ignored
         )
+
+    def _obstacles(self, standing: Iterable[LoadedStructure]) -> Obstacles:
+        feet = [(thing.name, thing.footprint) for thing in standing]
         return Obstacles([("", self.kept_free), *feet])
 
     def chosen(
