@@ -84,6 +84,11 @@ _STEEPEST = 0.6
 _HIGHEST_NEW = 20.0
 # Free plots farther than this from all buildings are open country [m].
 _IN_TOWN = 30.0
+# The ground's height at a plot is taken this far in front of it [m].
+_IN_FRONT = 1.0
+# Ground that is farther than this below a building's lowest point is not the
+# building's: something else lies in front of it [m].
+_DEEPEST_BELOW = 0.5
 _GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 _PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
 
@@ -307,12 +312,14 @@ class AgeingCity:
     def _front_height(self, plot: Plot, default: float) -> float:
         """Returns the height of the ground in front of a plot [m].
 
-        A building may reach into the ground.
+        A building may reach into the ground. `default` is the height of the
+        building's lowest point [m]; it is returned where there is no ground in
+        front, or where the ground there is much lower.
         """
         x0, y0, x1, _ = plot.inside(plot.area).bounds
-        at = plot.place((x0 + x1) / 2, y0 - 1.0)
+        at = plot.place((x0 + x1) / 2, y0 - _IN_FRONT)
         z = self._world.ground.heights(np.array([at]))[0]
-        is_known = np.isfinite(z) and z > default - 0.5
+        is_known = np.isfinite(z) and z > default - _DEEPEST_BELOW
         return round(float(z), 3) if is_known else default
 
     def _free_lots(self) -> list[_Lot]:
