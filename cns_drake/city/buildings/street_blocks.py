@@ -20,6 +20,9 @@ from cns_drake.city.geometry.mesh import Mesh
 
 # Taller houses have their fire stairs inside.
 _MOST_FLIGHTS = 8
+# Numbers of the corners of a rectangle at which a corner building stands.
+_FRONT_LEFT = 0
+_FRONT_RIGHT = 1
 # Of fire stairs.
 _IRON = Finish((0.2, 0.2, 0.22))
 
@@ -146,15 +149,17 @@ _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
 class CornerBuilding(Building):
     """The corner house: a curved front, arched windows, a dome or a lantern.
 
-    `corner` is the rounded corner of the rectangle (0: front left,
-    1: front right) and `radius` its radius.
+    `corner` is the rounded corner of the rectangle (`_FRONT_LEFT` or
+    `_FRONT_RIGHT`) and `radius` its radius.
     """
 
     def draw(self) -> None:
         """Samples sizes and style."""
         site = self.site
         side = min(site.width, site.depth, 24.0)
-        self.corner = self.pick(site.free_corners or [0, 1])
+        self.corner = self.pick(
+            site.free_corners or [_FRONT_LEFT, _FRONT_RIGHT]
+        )
         self.radius = round(self.uniform(0.3, 0.42) * side, 1)
         self.ground_height = self.uniform(4.6, 5.4, 2)
         self.first_height = self.uniform(4.2, 4.8, 2)
@@ -262,7 +267,7 @@ def _add_first_floor(
 def _corner_centre(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
     """Returns the middle of the rounded corner's circle."""
     low, high = plan.min(axis=0), plan.max(axis=0)
-    x = low[0] + p.radius if p.corner == 0 else high[0] - p.radius
+    x = low[0] + p.radius if p.corner == _FRONT_LEFT else high[0] - p.radius
     return np.array([x, low[1] + p.radius])
 
 
@@ -426,8 +431,9 @@ class CornerStore(Building):
         self.ground = round(
             min(self.uniform(3.5, 4.1), self.height - self.raised - 0.7), 2
         )
-        # 0 front left, 1 front right.
-        self.corner = self.pick(site.free_corners or [0, 1])
+        self.corner = self.pick(
+            site.free_corners or [_FRONT_LEFT, _FRONT_RIGHT]
+        )
         # Length taken off each edge at the corner.
         self.cut = round(min(self.uniform(2.0, 3.0), 0.3 * site.depth), 2)
         self.storey = self.uniform(2.9, 3.3)
@@ -451,9 +457,10 @@ class CornerStore(Building):
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)
         rectangle = site.outline
-        plan, front = _corners(self, rectangle)
+        plan, front = _cut_rectangle(self, rectangle)
         blind = massing.edges_on(plan, rectangle, site.blind_edges)
-        side = (front - 1) % 5 if self.corner == 0 else (front + 1) % 5
+        along = -1 if self.corner == _FRONT_LEFT else 1
+        side = (front + along) % 5
         top = _add_shop(self, plan, (0, front, side), blind)
         room = self.height - (self.raised + 0.6) - top
         if room > 2.4:
@@ -470,11 +477,18 @@ class CornerStore(Building):
         self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
 
 
-def _corners(p: CornerStore, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
-    """Returns the five corners, and which edge cuts off the corner."""
+def _cut_rectangle(
+    p: CornerStore, rectangle: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Cuts one front corner off a rectangle.
+
+    Returns:
+        The five corners of the outline (5, 2) [m], and the number of the edge
+        that replaces the corner.
+    """
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
     c = p.cut
-    if p.corner == 1:
+    if p.corner == _FRONT_RIGHT:
         points = [(x0, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1), (x0, y1)]
         return np.array(points), 1
     points = [(x0 + c, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0 + c)]
