@@ -307,19 +307,53 @@ def _points_behind(
     piece = piece_in(column)
     places = places_on(streets, piece, s)
     changing = (column == CURRENT) & (cars["left_lane"] >= 0)
-    car = cars[changing]
-    piece = piece[changing]
-    u = (s[changing] - car["change_start"]) / car["change_length"]
+    blended = _blended_with_left_lane(
+        streets,
+        cars[changing],
+        piece[changing],
+        s[changing],
+        back[changing],
+        [place[changing] for place in places],
+    )
+    for place, between in zip(places, blended, strict=True):
+        place[changing] = between
+    return places
+
+
+def _blended_with_left_lane(
+    streets: Streets,
+    cars: np.ndarray,
+    piece: np.ndarray,
+    s: np.ndarray,
+    back: np.ndarray,
+    places: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """Returns x, y, z of places between the lane left and the new lane [m].
+
+    Args:
+        streets: the lanes.
+        cars: (M,) records of vehicles that change lanes.
+        piece: (M,) number of each vehicle's new lane.
+        s: (M,) distance of each place along the new lane [m].
+        back: (M,) distance of each place behind the front bumper [m].
+        places: x, y, z of the places on the new lane, each (M,) [m].
+    """
+    u = (s - cars["change_start"]) / cars["change_length"]
     u = np.minimum(np.maximum(u, 0.0), 1.0)
+    # The quintic of `base.elementary.smooth_step`, but without powers, which
+    # are slow and round in another way.
     share = u * u * u * (10.0 - 15.0 * u + 6.0 * (u * u))
     lengths = streets.pieces["length"]
-    scale = lengths[car["left_lane"]] / lengths[piece]
-    there = car["s"] * scale - back[changing]
-    for place, before in zip(
-        places, places_on(streets, car["left_lane"], there), strict=True
-    ):
-        place[changing] = before + share * (place[changing] - before)
-    return places
+    scale = lengths[cars["left_lane"]] / lengths[piece]
+    there = cars["s"] * scale - back
+    return [
+        before + share * (place - before)
+        for place, before in zip(
+            places,
+            places_on(streets, cars["left_lane"], there),
+            strict=True,
+        )
+    ]
 
 
 @compiled
