@@ -14,14 +14,10 @@ from cns_drake.imports.building_years import construction_year, year_of_date
 from cns_drake.imports.faces import extruded, parts_of, sound_parts
 from cns_drake.imports.foreign_city import RED_ROOF, Imported, make_imported
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
-from cns_drake.imports.openstreetmap.reading import (
-    Local,
-    OsmArea,
-    Tags,
-    has_tag,
-)
+from cns_drake.imports.openstreetmap.reading import Local, OsmArea, Tags
 from cns_drake.imports.openstreetmap.tags import (
     building_kind,
+    has_tag,
     heights,
     why_absent,
 )

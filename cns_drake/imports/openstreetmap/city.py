@@ -33,9 +33,10 @@ from cns_drake.imports.openstreetmap.passages import (
     note_walled_up,
     passages_of,
 )
-from cns_drake.imports.openstreetmap.reading import Local, has_tag
+from cns_drake.imports.openstreetmap.reading import Local
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
+    has_tag,
     heights,
     is_inside,
     length,

@@ -15,25 +15,27 @@ from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.openstreetmap.reading import Local, OsmWay, Tags, has_tag
+from cns_drake.imports.openstreetmap.reading import Local, OsmWay, Tags
 from cns_drake.imports.openstreetmap.tags import (
+    has_tag,
     is_inside,
+    is_railway,
+    is_tunnel,
     length,
-    path_width,
     street_width,
     tag_value,
+    way_width,
 )
 from cns_drake.imports.options import ImportFaults
 
-_RAILS = ("rail", "light_rail", "tram")
 # Usual clear height of a passage for a street [m].
 _STREET_HEIGHT = 4.5
 # Usual clear height of a passage for a path [m].
 _PATH_HEIGHT = 2.8
 # Usual clear height of a passage for a railway [m].
 _RAIL_HEIGHT = 5.5
-_TRACK = 3.5
-_TALLEST = 30.0
+# Greatest plausible clear height of a passage [m].
+_HIGHEST_CLEARANCE = 30.0
 # A passage reaches this far beyond the walls, because ways and outlines meet
 # only nearly [m].
 _BEYOND_WALLS = 0.3
@@ -63,24 +65,6 @@ class Passage(NamedTuple):
     height: float
 
 
-def is_tunnel(tags: Tags) -> bool:
-    """Returns whether a way is below the ground or in a mountain.
-
-    Passages through buildings are no tunnels.
-    """
-    is_below = tags.get("layer", "").startswith("-")
-    return has_tag(tags, "tunnel") and (
-        tags["tunnel"] != "building_passage" or is_below
-    )
-
-
-def width_of(tags: Tags) -> float | None:
-    """Returns the width of a street, path or track [m]; None for others."""
-    if tags.get("railway") in _RAILS:
-        return _TRACK
-    return street_width(tags) or path_width(tags)
-
-
 def _on_the_ground(tags: Tags) -> bool:
     is_above = not re.fullmatch(r"-?0*|.*;.*", tags.get("level", "0"))
     return not (is_tunnel(tags) or is_inside(tags) or is_above)
@@ -98,17 +82,17 @@ def passages_of(
     found = []
     for name, tags, line, _ in ways:
         is_passage = has_tag(tags, "tunnel") or has_tag(tags, "covered")
-        width = width_of(tags)
+        width = way_width(tags)
         if not (is_passage and width and _on_the_ground(tags)):
             continue
         usual = _STREET_HEIGHT if street_width(tags) else _PATH_HEIGHT
-        if tags.get("railway") in _RAILS:
+        if is_railway(tags):
             usual = _RAIL_HEIGHT
         clear = None
         if tags.get("maxheight") not in _NO_HEIGHTS:
             where = (name, faults)
             clear = tag_value(
-                tags, "maxheight", length, _TALLEST, where, _HEADROOM
+                tags, "maxheight", length, _HIGHEST_CLEARANCE, where, _HEADROOM
             )
         course = LineString(local(line))
         area: BaseGeometry
@@ -198,7 +182,7 @@ class WayOpenings:
         used = [
             way
             for way in ways
-            if width_of(way.tags)
+            if way_width(way.tags)
             and _on_the_ground(way.tags)
             and not (has_tag(way.tags, "bridge") or has_tag(way.tags, "area"))
         ]
@@ -232,7 +216,7 @@ class WayOpenings:
             if edges & {frozenset(pair) for pair in pairwise(way.nodes)}:
                 continue  # It leads along the barrier.
             if on_it & {*way.nodes}:
-                half = (width_of(way.tags) or 0.0) / 2.0 + _BESIDE_WAY
+                half = (way_width(way.tags) or 0.0) / 2.0 + _BESIDE_WAY
                 areas.append(line.buffer(half, cap_style="square"))
             elif line.crosses(course):
                 faults.add("way across a barrier, without an opening", way.name)

@@ -22,7 +22,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.city.geometry.polygons import hull_of
-from cns_drake.imports.openstreetmap.tags import TABLES
+from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
 from cns_drake.imports.options import ImportFaults
 
 # A negative id of a file becomes this number minus the id.
@@ -453,11 +453,6 @@ def thing_kind(tags: Tags) -> str:
         if stage in _LIFECYCLE and rest:
             return f"{stage}:{rest}"
     return f"relation of type {tags['type']}" if "type" in tags else "other"
-
-
-def has_tag(tags: Tags, name: str) -> bool:
-    """Returns whether a tag exists and its value is not `no`."""
-    return tags.get(name, "no") != "no"
 
 
 def is_building(tags: Tags) -> bool:

@@ -29,14 +29,15 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.openstreetmap import reading
-from cns_drake.imports.openstreetmap.passages import is_tunnel
-from cns_drake.imports.openstreetmap.reading import Local, OsmWay, has_tag
+from cns_drake.imports.openstreetmap.reading import Local, OsmWay
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     area_kind,
     driven_directions,
     green_kind,
+    has_tag,
     is_marked,
+    is_tunnel,
     lanes_beside,
     path_width,
     sidewalk_sides,

@@ -37,6 +37,10 @@ _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
 _WIDEST = 60.0  # [m]
 _LANES_OF_STREET = 16
+# Values of the tag `railway` of tracks.
+_RAILS = ("rail", "light_rail", "tram")
+# Width that a single track needs [m].
+_TRACK_WIDTH = 3.5
 # Least width of a lane that carries vehicles [m].
 _LEAST_LANE_WIDTH = 2.75
 # Greatest width that drivers use per lane if the file gives no number of lanes
@@ -211,6 +215,27 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
     return None
 
 
+def has_tag(tags: Mapping[str, str], name: str) -> bool:
+    """Returns whether a tag exists and its value is not `no`."""
+    return tags.get(name, "no") != "no"
+
+
+def is_tunnel(tags: Mapping[str, str]) -> bool:
+    """Returns whether a way is below the ground or in a mountain.
+
+    Passages through buildings are no tunnels.
+    """
+    is_below = tags.get("layer", "").startswith("-")
+    return has_tag(tags, "tunnel") and (
+        tags["tunnel"] != "building_passage" or is_below
+    )
+
+
+def is_railway(tags: Mapping[str, str]) -> bool:
+    """Returns whether a way is the track of a railway or tram."""
+    return tags.get("railway") in _RAILS
+
+
 def is_inside(tags: Mapping[str, str]) -> bool:
     """Returns whether an object is inside a building or below the ground."""
     below = [tags.get(key, "").startswith("-") for key in ("layer", "level")]
@@ -306,6 +331,13 @@ def path_width(tags: Mapping[str, str]) -> float | None:
     if usual is None:
         return None
     return tag_value(tags, "width", length, _WIDEST, None) or usual
+
+
+def way_width(tags: Mapping[str, str]) -> float | None:
+    """Returns the width of a street, path or track [m]; None for others."""
+    if is_railway(tags):
+        return _TRACK_WIDTH
+    return street_width(tags) or path_width(tags)
 
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:

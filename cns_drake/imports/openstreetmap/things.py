@@ -11,8 +11,8 @@ from shapely.geometry import LineString
 
 from cns_drake.imports.foreign_city import Thing
 from cns_drake.imports.openstreetmap import reading
-from cns_drake.imports.openstreetmap.reading import Local, has_tag
-from cns_drake.imports.openstreetmap.tags import TABLES, is_inside
+from cns_drake.imports.openstreetmap.reading import Local
+from cns_drake.imports.openstreetmap.tags import TABLES, has_tag, is_inside
 
 # Names of directions, clockwise from north.
 _COMPASS = (

@@ -349,9 +349,7 @@ def _stretches(
             )
 
 
-def _rounded_line(
-    line: shapely.LineString, window_length: float
-) -> np.ndarray:
+def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
     """Returns evenly spaced points (N, 2) along a line with smooth corners.
 
     `window_length` is the length of the running mean that rounds them [m].
