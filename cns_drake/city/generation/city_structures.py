@@ -12,14 +12,13 @@ from shapely.ops import unary_union
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry import (
-    Mesh,
     Structure,
     UpperSides,
     ground_triangles,
     snap,
 )
 from cns_drake.city.ground.districts import share_out
-from cns_drake.city.ground.elevation import aprons, make_ground
+from cns_drake.city.ground.elevation import Ground, Pad, aprons, make_ground
 from cns_drake.city.ground.streets import (
     GROUND_TAG,
     kerb_height,
@@ -85,24 +84,6 @@ class Streets(NamedTuple):
     kerbs: street_areas.KerbMap | None = None
 
 
-def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
-    """Returns all meshes of structures, as a mapping from name to mesh.
-
-    Raises:
-        ValueError: if two different meshes have the same name, or a mesh has no
-            faces.
-    """
-    meshes: dict[str, Mesh] = {}
-    for structure in structures:
-        for name, mesh in structure.model.meshes.items():
-            if not mesh.faces:
-                raise ValueError(f"mesh {name} has no faces")
-            known = meshes.setdefault(name, mesh)
-            if known is not mesh and known.to_obj() != mesh.to_obj():
-                raise ValueError(f"two different meshes are called {name}")
-    return meshes
-
-
 def make_city(world: Path) -> City:
     """Returns the city of a map folder, from its `roads.yaml` and `city.yaml`.
 
@@ -135,15 +116,15 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
             plan has no room.
     """
     streets = Streets(
-        network.areas,
-        street_areas.RoadSurface(network),
-        kerb_height(network),
-        unary_union(list(network.junction_areas.values())),
-        Polygon(),
-        Polygon(),
-        (*street_structures(network), marking_structure(network)),
-        lambda draft: sidewalks.furnish_junctions(draft, network),
-        lambda draft: sidewalks.park_along_streets(draft, network),
+        areas=network.areas,
+        surface=street_areas.RoadSurface(network),
+        kerb_height=kerb_height(network),
+        junctions=unary_union(list(network.junction_areas.values())),
+        margins=Polygon(),
+        reserved=Polygon(),
+        structures=(*street_structures(network), marking_structure(network)),
+        furnish=lambda draft: sidewalks.furnish_junctions(draft, network),
+        park=lambda draft: sidewalks.park_along_streets(draft, network),
     )
     return build_along(streets, plan, source)
 
@@ -169,13 +150,18 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
         draft.frontage = snap(draft.streets.union(streets.margins))
     districts = share_out(plan, draft.streets, source)
     kerb = streets.kerbs or streets.kerb_height
-    place = streets.surface, kerb, draft.streets, plan.bounds
+
+    def ground_with(pads: Sequence[Pad]) -> Ground:
+        return make_ground(
+            streets.surface, kerb, draft.streets, plan.bounds, pads
+        )
+
     terraces = [pad for district in districts for pad in district.terraces]
-    draft.base = make_ground(*place, terraces)
+    draft.base = ground_with(terraces)
     for district in districts:
         place_buildings(draft, district)
     level = aprons(draft.structures, draft.streets)
-    draft.base = make_ground(*place, [*level, *terraces])
+    draft.base = ground_with([*level, *terraces])
     shape = GroundShape(
         draft.base,
         districts,

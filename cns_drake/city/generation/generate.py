@@ -8,10 +8,11 @@ from cns_drake.base.csv_files import csv_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors, write_text
 from cns_drake.base.progress import doing
-from cns_drake.city.generation.city_structures import City, make_city, meshes_of
+from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
+from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
@@ -69,6 +70,24 @@ def structure_table(
         for instance, one in enumerate(structures, start=1)
     )
     return csv_text(names, rows)
+
+
+def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
+    """Returns all meshes of structures, as a mapping from name to mesh.
+
+    Raises:
+        ValueError: if two different meshes have the same name, or a mesh has no
+            faces.
+    """
+    meshes: dict[str, Mesh] = {}
+    for structure in structures:
+        for name, mesh in structure.model.meshes.items():
+            if not mesh.faces:
+                raise ValueError(f"mesh {name} has no faces")
+            known = meshes.setdefault(name, mesh)
+            if known is not mesh and known.to_obj() != mesh.to_obj():
+                raise ValueError(f"two different meshes are called {name}")
+    return meshes
 
 
 def render_city(
