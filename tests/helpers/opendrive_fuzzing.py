@@ -5,7 +5,8 @@ from pathlib import Path
 from cns_drake.base.errors import InputError
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lane_drives import find_lane_drives
-from cns_drake.imports.opendrive.lanes import lane_bands, split_levels
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportFaults

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from cns_drake.base.angles import wrapped
 from cns_drake.imports.drives import search
 from cns_drake.imports.drives.search import Obstacle, WaypointRoute
-from cns_drake.imports.opendrive.lanes import DRIVEN, KerbHeights, LaneBand
+from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
+from cns_drake.imports.opendrive.road_heights import KerbHeights
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_graph import Walkway
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes, usual_limit

@@ -35,14 +35,9 @@ from cns_drake.imports.drives.search import WaypointRoute
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.opendrive import imported_streets, lane_drives
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lanes import (
-    KerbHeights,
-    LaneBand,
-    RoadHeights,
-    is_raised,
-    lane_bands,
-    split_levels,
-)
+from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_bands
+from cns_drake.imports.opendrive.levels import split_levels
+from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads

@@ -22,7 +22,8 @@ from shapely.geometry import LineString, Polygon
 
 from cns_drake.imports.opendrive.curves import Arc, Cubic, Spiral
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lanes import RoadHeights, lane_bands
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.options import ImportFaults
 

@@ -34,11 +34,8 @@ from cns_drake.imports.opendrive.lane_drives import (
     find_lane_drives,
     lanes_for_traffic,
 )
-from cns_drake.imports.opendrive.lanes import (
-    KerbHeights,
-    RoadHeights,
-    lane_bands,
-)
+from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town, write_town
 from cns_drake.imports.options import ImportFaults, ImportOptions

@@ -1,0 +1,137 @@
+"""The heights of imported roads, sidewalks and the ground near them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from cns_drake.imports.opendrive.lanes import (
+    LEAST_WIDTH,
+    SAG,
+    LaneBand,
+    is_raised,
+)
+
+# Number of nearby places whose planes are averaged.
+_NEIGHBOURS = 8
+# Distance between the places of a lane [m].
+_PLACE_SPACING = 0.5
+# A kerb within this distance of a sidewalk has the sidewalk's height [m].
+_BESIDE = 1.0
+# Nearer places have more weight; this distance limits their weight [m].
+_CORE = 0.05
+# Number of places that are processed at a time.
+_BLOCK = 200_000
+# Roads are level if no height [m] and no slope is greater than this.
+_LEVEL = 1e-9
+
+
+class RoadHeights:
+    """The height of imported carriageways, and of the ground near them.
+
+    At a place on a single road, the height is exact. Where roads with different
+    heights overlap in a junction, the height changes gradually from one road to
+    the other (Shepard's interpolation between planes with the grade and roll of
+    the roads).
+    """
+
+    def __init__(self, bands: Sequence[LaneBand]):
+        """Takes all lanes on the ground, at least one."""
+        places = np.concatenate([_places(band) for band in bands])
+        self._p = places[:, :3]
+        heading, roll, grade = places[:, 3:].T
+        across = np.tan(roll)
+        self._slope = np.stack(
+            [
+                grade * np.cos(heading) - across * np.sin(heading),
+                grade * np.sin(heading) + across * np.cos(heading),
+            ],
+            axis=1,
+        )
+        self._tree = cKDTree(self._p[:, :2])
+
+    @property
+    def is_level(self) -> bool:
+        """Whether all roads lie at z = 0."""
+        return bool(
+            np.abs(self._p[:, 2]).max() < _LEVEL
+            and np.abs(self._slope).max() < _LEVEL
+        )
+
+    def heights(self, xy: ArrayLike) -> np.ndarray:
+        """Returns the heights (N,) at places (N, 2) [m]."""
+        xy = np.asarray(xy, dtype=float).reshape(-1, 2)
+        blocks = [
+            self._block(xy[k : k + _BLOCK]) for k in range(0, len(xy), _BLOCK)
+        ]
+        return np.concatenate([np.zeros(0), *blocks])
+
+    def _block(self, xy: np.ndarray) -> np.ndarray:
+        count = min(_NEIGHBOURS, len(self._p))
+        distance, index = self._tree.query(xy, k=count)
+        distance, index = distance.reshape(-1, count), index.reshape(-1, count)
+        away = xy[:, None] - self._p[index, :2]
+        z = self._p[index, 2] + (self._slope[index] * away).sum(axis=2)
+        weight = 1.0 / (distance**2 + _CORE**2) ** 2
+        return (z * weight).sum(axis=1) / weight.sum(axis=1)
+
+
+class KerbHeights:
+    """The height of imported sidewalks above the road, by place.
+
+    An object is called with places (N, 2) in W [m], and returns heights (N,)
+    [m]. `differ` says whether any kerb has another height than the usual one.
+    """
+
+    def __init__(self, bands: Sequence[LaneBand], usual: float):
+        """Takes the lanes on the ground, and the usual height of a kerb [m].
+
+        Kerbs without a height in the file, or away from sidewalks, have the
+        usual one.
+        """
+        self._usual = usual
+        rows = [np.zeros((0, 6))]
+        for band in bands:
+            if is_raised(band.kind, band.lane.height):
+                rise = np.nan_to_num(band.rise, nan=usual)
+                edges = [band.inner[:, :2], band.outer[:, :2], rise]
+                own = _interpolated(band, np.column_stack(edges))
+                wide = np.linalg.norm(own[:, :2] - own[:, 2:4], axis=1)
+                rows.append(own[wide > LEAST_WIDTH])
+        places = np.concatenate(rows)
+        self._inner, self._outer, self._rise = np.split(places, 3, axis=1)
+        self._tree = cKDTree((self._inner + self._outer) / 2.0)
+        self.differ = bool((np.abs(self._rise - usual) > SAG).any())
+
+    def __call__(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the heights (N,) at places (N, 2) [m]."""
+        distance, k = self._tree.query(xy)
+        across = self._outer[k] - self._inner[k]
+        width2 = (across**2).sum(axis=1)
+        part = ((xy - self._inner[k]) * across).sum(axis=1) / width2
+        low, high = self._rise[k].T
+        own = low + np.clip(part, 0.0, 1.0) * (high - low)
+        near = distance < np.sqrt(width2) / 2.0 + _BESIDE
+        return np.where(near, own, self._usual)
+
+
+def _places(band: LaneBand) -> np.ndarray:
+    """Returns (N, 6): places in the middle, and heading, roll and grade."""
+    return _interpolated(
+        band,
+        np.column_stack([band.middle, band.heading, band.roll, band.grade]),
+    )
+
+
+def _interpolated(band: LaneBand, rows: np.ndarray) -> np.ndarray:
+    """Returns values (N, K) of a lane, interpolated between its stations."""
+    # Both sides of a joint stay, with a stretch of no length between them.
+    steps = np.diff(band.s)
+    counts = np.maximum(np.ceil(steps / _PLACE_SPACING).astype(int), 1)
+    first = np.repeat(np.arange(len(steps)), counts)
+    part = (
+        np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    ) / counts[first]
+    between = rows[first] + part[:, None] * (rows[first + 1] - rows[first])
+    return np.concatenate([between, rows[-1:]])
