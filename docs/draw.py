@@ -53,7 +53,7 @@ from evaluation.methods.layered_overlap import (
     LayeredOverlap,
     LayeredOverlapConfig,
 )
-from evaluation.report import figures
+from evaluation.report import point_rendering
 from evaluation.results import charts, summaries
 from evaluation.results.drawing import (
     GONE,
@@ -852,7 +852,7 @@ def maps(path: Path, file: str, middle: Sequence[float]) -> None:
     colours[[Label.KEPT, Label.GONE, Label.NEW]] = (120, 126, 134), GONE, NEW
     figure = Figure(figsize=(_WIDTH, 2.7), layout="constrained")
     words = "older map: gone is red", "newer map: new is blue"
-    view = figures.View(-60.0, 28.0, 12.0)
+    view = point_rendering.View(-60.0, 28.0, 12.0)
     for axes, side, text in zip(
         figure.subplots(1, 2), "AB", words, strict=True
     ):
@@ -861,7 +861,7 @@ def maps(path: Path, file: str, middle: Sequence[float]) -> None:
         labels = np.load(folder / "truth.npy")
         near = (np.abs(points - middle) < (42.0, 26.0, 26.0)).all(axis=1)
         rgb = colours[labels[near]].astype(np.uint8)
-        axes.imshow(figures.render(points[near], rgb, view).image)
+        axes.imshow(point_rendering.render(points[near], rgb, view).image)
         axes.set_title(text, loc="left")
         axes.set_axis_off()
     figure.savefig(path, dpi=_DPI, bbox_inches="tight")

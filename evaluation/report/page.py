@@ -31,7 +31,7 @@ from evaluation.recognition.fault_kinds import (
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report import conclusions, result_tables
-from evaluation.report.figures import ROUTE_COLOURS
+from evaluation.report.map_figures import ROUTE_COLOURS
 from evaluation.report.page_data import (
     Illustration,
     PageDrive,

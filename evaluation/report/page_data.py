@@ -19,7 +19,7 @@ from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.figures import Picture
+from evaluation.report.point_rendering import Picture
 from evaluation.results.drawing import Legend
 from evaluation.results.table_forms import by_pair, in_table_order, title
 

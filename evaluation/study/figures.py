@@ -13,7 +13,7 @@ from evaluation.change.drive_change import (
     spread_over_grids,
 )
 from evaluation.recognition.metrics import MODES
-from evaluation.report import figures
+from evaluation.report import map_figures
 from evaluation.report.page_data import (
     Illustration,
     PageDrive,
@@ -64,7 +64,7 @@ def draw_city(
     for done, (name, summary, fine, source) in enumerate(stages):
         doing("drawing the maps", done, len(stages), "drives")
         drive = summary.read()
-        view = figures.top_view(fine.read(), drive.positions)
+        view = map_figures.top_view(fine.read(), drive.positions)
         names.append(name)
         views.append(view)
         routes.append(drive.positions)
@@ -77,7 +77,7 @@ def draw_city(
         )
     doing("drawing the routes")
     make_folder(stem.parent)
-    figures.draw_routes(map_name, names, views, routes, stem)
+    map_figures.draw_routes(map_name, names, views, routes, stem)
     return drives
 
 
@@ -121,7 +121,7 @@ def draw_change_with_spread(
     result = ChangeResult(map_name, stages, report)
     doing("drawing the change")
     make_folder(stems[0].parent)
-    figures.draw_change(
+    map_figures.draw_change(
         result,
         (clouds[0].read(), clouds[1].read()),
         (earlier.voxels.merged(), later.voxels.merged()),
@@ -283,7 +283,7 @@ def illustrations(
                 change_stems(city, pair),
                 titles,
                 (2, 3),
-                (figures.CHANGE_LEGEND, figures.SETS_LEGEND),
+                (map_figures.CHANGE_LEGEND, map_figures.SETS_LEGEND),
                 strict=True,
             )
         ]

@@ -17,7 +17,7 @@ from evaluation.recognition.place_outcome import (
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.report.figures import top_view
+from evaluation.report.map_figures import top_view
 from evaluation.report.page import Report
 from evaluation.report.page_data import Illustration, make_drive
 from evaluation.report.reference import Finding, Judgement, Reference

@@ -90,7 +90,7 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(with_recordings=False) == set()
     change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
     assert reproduce(with_recordings=False) == STUDY
-    change(code / "evaluation/report/figures.py", "def ", "def  ")
+    change(code / "evaluation/report/map_figures.py", "def ", "def  ")
     assert reproduce(with_recordings=False) == DRAWN
     # Results of one method on all drives, and its part of their features.
     options = {

@@ -11,7 +11,7 @@ from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.methods import shipped_methods
 from evaluation.report import curve_figures
-from evaluation.report.figures import judge_points, top_view, voxel_of_each
+from evaluation.report.map_figures import judge_points, top_view, voxel_of_each
 from evaluation.results.drawing import PIXELS, name_lines, save
 
 

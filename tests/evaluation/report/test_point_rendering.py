@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.report.figures import (
+from evaluation.report.point_rendering import (
     View,
     colour_by_height,
     render,
