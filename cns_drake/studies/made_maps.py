@@ -30,12 +30,8 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies.experiment import Experiment, MadeMap
-from cns_drake.studies.redrawing import (
-    MakeMap,
-    RedrawCity,
-    make_maps,
-    redraw_cities,
-)
+from cns_drake.studies.map_step import MakeMap, make_maps
+from cns_drake.studies.redrawing import RedrawCity, redraw_cities
 from evaluation.drives.sampling import sample_frames
 
 _FACTOR = "factor"

@@ -11,7 +11,6 @@ streets are not parallel to the axes of the world. `worlds/redraws.csv` contains
 the seeds and rotations, which were chosen at random before any method ran.
 """
 
-import abc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -27,8 +26,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
-from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Reporter, Step
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.city_structures import make_city
@@ -36,15 +34,11 @@ from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from cns_drake.studies.map_step import MakeMap, make_maps
 from evaluation.results.table import FROZEN_REDRAW
-from evaluation.study.parts import Part
 
-# The first line of each input that is written here.
-_MARK = b"# Of a city drawn anew by cns-drake"
-# The file in its folder with the fingerprint of a map.
-_PART = "drawn.data"
-# Expected seconds to make a map.
-_COST = 15.0
+# Start of the first line of each input that is written here.
+_MARK = "# Of a city drawn anew by cns-drake"
 # Fields of inputs that hold a place, and lists of places.
 _PLACES = frozenset({"position", "at", "block", "start", "end"})
 _LISTS_OF_PLACES = frozenset({"via", "area", "line", "within", "points"})
@@ -86,88 +80,6 @@ def redraw_cities(
     ]
     make_maps(steps, output, cluster)
     return folders
-
-
-@dataclass(frozen=True)
-class MakeMap(Step):
-    """A job step that makes the folder of a map.
-
-    If the folder contains a map that an earlier run of this step made from
-    other inputs, the map is replaced.
-    """
-
-    folder: Path
-
-    @property
-    def output(self) -> Path:
-        return self.folder
-
-    def is_done(self) -> bool:
-        # A folder that has its final name is complete.
-        return Part(self.folder / _PART).is_current(self.sources())
-
-    def run(self, reporter: Reporter) -> None:
-        made_of = self.sources()
-        if is_older := self.check():
-            files.remove_folder(self.folder)
-        self.make(
-            lambda draft: Part(draft / _PART).write(made_of, None), reporter
-        )
-        if is_older:
-            reporter.note(
-                f"{self.folder}: replaced, since its inputs have changed"
-            )
-
-    def check(self) -> bool:
-        """Returns whether a job step has made a map in this folder before.
-
-        Raises:
-            InputError: the folder, or a file of its name, exists but is not a
-                map that a job step made.
-        """
-        with files.user_errors(self.folder):
-            is_there = os.path.lexists(self.folder)
-            if is_there and not (self.folder / _PART).is_file():
-                raise InputError(
-                    f"{self.folder}: this folder is there already and is not a"
-                    " map that a study made; remove it or give another output"
-                )
-        return is_there
-
-    @abc.abstractmethod
-    def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        """Makes the map's folder.
-
-        Args:
-            finish: function that must be called with the complete folder before
-                it gets its final name.
-            reporter: reports progress.
-        """
-
-    @abc.abstractmethod
-    def sources(self) -> dict[str, object]:
-        """Returns everything on which the map depends, ready for JSON."""
-
-
-def make_maps(steps: Sequence[MakeMap], output: Path, cluster: Cluster) -> None:
-    """Makes maps; finished maps are kept.
-
-    Args:
-        steps: a step for each map.
-        output: folder of the maps, which is created if needed.
-        cluster: runs the steps as jobs.
-
-    Raises:
-        InputError: another file or folder has the name of a map, or maps could
-            not be made; the error names all of these maps.
-    """
-    # Quick checks come before all slow work.
-    for step in steps:
-        step.check()
-    if steps:
-        files.make_folder(output)
-    jobs = [Job(f"city {one.folder.name}", one, cost=_COST) for one in steps]
-    run_jobs(jobs, cluster, "cities")
 
 
 @dataclass(frozen=True)
@@ -247,28 +159,24 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
     return {
         roads.name: network,
-        plan.name: to_yaml(
+        plan.name: marked_yaml(
             "the map's plan with another seed", read_yaml(plan) | {"seed": seed}
         ),
-        STAGES_NAME: to_yaml("its only stage", {"stages": stages}),
+        STAGES_NAME: marked_yaml("its only stage", {"stages": stages}),
     }
 
 
-def to_yaml(title: str, values: dict) -> bytes:
+def marked_yaml(title: str, values: dict) -> bytes:
     """Returns a YAML file with a title in its first comment.
 
     Args:
         title: the title.
         values: the content.
     """
-    comment = (
-        f"{_MARK.decode()} {__version__}: {title}.\n"
-        "# `cns-drake generate --vary` writes it anew when the map changes.\n"
-    )
     text = yaml.safe_dump(
         values, sort_keys=False, default_flow_style=None, width=79
     )
-    return f"{comment}\n{text}".encode()
+    return f"{_MARK} {__version__}: {title}.\n\n{text}".encode()
 
 
 @dataclass(frozen=True)
@@ -375,20 +283,26 @@ class RedrawFrozen(RedrawCity):
         plan = read_yaml(source.plan) | {"seed": self.seed}
         if self.turn_deg:
             roads = turned_content(read_yaml(source.roads), self.turn_deg)
-            texts[source.roads.name] = to_yaml("the map's roads, turned", roads)
+            texts[source.roads.name] = marked_yaml(
+                "the map's roads, turned", roads
+            )
             plan = turned_content(plan, self.turn_deg)
             plan["bounds"] = _turned_bounds(plan["bounds"], self.turn_deg)
-            texts[source.plan.name] = to_yaml("the map's plan, turned", plan)
+            texts[source.plan.name] = marked_yaml(
+                "the map's plan, turned", plan
+            )
         for path in source.drives():
             values = read_yaml(path) | {"map": ".", "driver": _DRIVER}
-            texts[path.name] = to_yaml("the map's drive, by another", values)
+            texts[path.name] = marked_yaml(
+                "the map's drive, by another", values
+            )
         return texts
 
     def finish_inputs(self, draft: Path) -> None:
         source = MapFolder(self.map_folder)
         names = [one.name for one in make_city(draft).structures]
         stages = kept_names(read_yaml(source.stage_plan), names)
-        text = to_yaml("the map's stages", stages)
+        text = marked_yaml("the map's stages", stages)
         (draft / source.stage_plan.name).write_bytes(text)
 
     def sources(self) -> dict[str, object]:

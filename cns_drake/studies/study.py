@@ -52,10 +52,11 @@ from cns_drake.studies.made_maps import (
     distracting_drives,
     made_map_step,
 )
+from cns_drake.studies.map_step import make_maps
 from cns_drake.studies.map_task import DrivenMapTask
 from cns_drake.studies.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recording import is_recorded
-from cns_drake.studies.redrawing import make_maps, redraw_frozen
+from cns_drake.studies.redrawing import redraw_frozen
 from cns_drake.studies.seen_task import SeenTask
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.methods import optional_methods

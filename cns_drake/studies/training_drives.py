@@ -32,7 +32,11 @@ from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.comparisons import with_lidars_moved
 from cns_drake.studies.exact_overlap import VisibleSurfaces, sights_of
-from cns_drake.studies.redrawing import redrawn_inputs, to_yaml, turned_content
+from cns_drake.studies.redrawing import (
+    marked_yaml,
+    redrawn_inputs,
+    turned_content,
+)
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.learned import polar_image
 
@@ -116,7 +120,9 @@ class SampledCity:
         """
         with draft_folder(folder, replaces=True) as draft:
             if self.map_name == DRAWN_STREETS:
-                roads = to_yaml("streets", draw_streets(self._rng(_STREETS)))
+                roads = marked_yaml(
+                    "streets", draw_streets(self._rng(_STREETS))
+                )
                 MapFolder(draft).roads.write_bytes(roads)
                 start_city(draft, self.city_seed)
             else:

@@ -14,7 +14,7 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.studies import redrawing
+from cns_drake.studies import map_step
 from cns_drake.studies.redrawing import (
     RedrawFrozen,
     frozen_redraws,
@@ -143,7 +143,7 @@ def test_versions_that_are_none(tmp_path):
 def test_only_what_is_asked_for_is_drawn(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        redrawing, "run_jobs", lambda jobs, cluster, unit="": drawn.extend(jobs)
+        map_step, "run_jobs", lambda jobs, cluster, unit="": drawn.extend(jobs)
     )
     folders = redraw_frozen(["suburbia"], [2, 4], tmp_path, Cluster(), "mine")
     assert [folder.name for folder in folders] == [

@@ -28,7 +28,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies import recording, redrawing
+from cns_drake.studies import map_step, recording
 from cns_drake.studies.recording import is_recorded, record_all
 from evaluation.change.drive_change import read_map
 from evaluation.drives import open_drive
@@ -181,7 +181,7 @@ def test_drives_of_experiments_share_other_cities(
 ):
     output = tmp_path / "output"
     done = []
-    for module in (recording, redrawing):
+    for module in (recording, map_step):
         monkeypatch.setattr(
             module,
             "run_jobs",

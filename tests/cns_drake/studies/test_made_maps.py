@@ -19,10 +19,11 @@ from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.studies import redrawing
+from cns_drake.studies import map_step
 from cns_drake.studies.experiment import Experiment, MadeMap, load_experiment
 from cns_drake.studies.made_maps import AgeCity, MadeMaps, made_map_step
-from cns_drake.studies.redrawing import MakeMap, RedrawCity
+from cns_drake.studies.map_step import MakeMap
+from cns_drake.studies.redrawing import RedrawCity
 
 DRIVE = """
 map: .
@@ -46,7 +47,7 @@ def steps(monkeypatch):
     """The steps of the jobs of each run, which are not done."""
     runs = []
     monkeypatch.setattr(
-        redrawing,
+        map_step,
         "run_jobs",
         lambda jobs, cluster, unit="": runs.append([job.step for job in jobs]),
     )
@@ -147,7 +148,7 @@ def test_versions_that_cannot_be(town, tmp_path, version):
 def test_an_older_city_is_made_once_and_anew_when_its_inputs_change(
     town, tmp_path, monkeypatch
 ):
-    studies.run_here(monkeypatch, redrawing)
+    studies.run_here(monkeypatch, map_step)
     rates = tuple(sorted(DEFAULT_RATES.items()))
     step = AgeCity(tmp_path / "old", town, (2,), 1, rates)
     assert not step.is_done()

@@ -19,7 +19,7 @@ from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.roads.network import load_road_network
 from cns_drake.scene.world import load_world, structures_in
-from cns_drake.studies import redrawing
+from cns_drake.studies import map_step, redrawing
 from cns_drake.studies.redrawing import (
     RedrawCity,
     redraw_cities,
@@ -50,7 +50,7 @@ def redraw_here(town, seeds, output):
     """Draws cities in the process of the test."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            redrawing,
+            map_step,
             "run_jobs",
             lambda jobs, cluster, unit="": studies.do(jobs),
         )

@@ -16,7 +16,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies import redrawing
+from cns_drake.studies import map_step
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
@@ -611,7 +611,7 @@ class PlannedError(Exception):
 def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
     runs = []
     monkeypatch.setattr(
-        redrawing, "run_jobs", lambda jobs, *_: runs.append([*jobs])
+        map_step, "run_jobs", lambda jobs, *_: runs.append([*jobs])
     )
 
     def stop(jobs, cluster):
@@ -770,7 +770,7 @@ def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
 @pytest.mark.parametrize("given", [[3, 1], 3, [5, 4, 2]])
 def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
     monkeypatch.setattr(
-        redrawing, "run_jobs", lambda jobs, cluster, unit="": None
+        map_step, "run_jobs", lambda jobs, cluster, unit="": None
     )
     wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())

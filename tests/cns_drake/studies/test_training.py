@@ -9,7 +9,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import draw_route
 from cns_drake.studies import training
-from cns_drake.studies.redrawing import to_yaml
+from cns_drake.studies.redrawing import marked_yaml
 from cns_drake.studies.training import (
     MAPS,
     Sampler,
@@ -197,7 +197,7 @@ def test_drawn_streets_are_no_map_and_can_be_driven(tmp_path):
     for number in range(5):
         rng = np.random.default_rng([3, number])
         roads = tmp_path / f"roads_{number}.yaml"
-        roads.write_bytes(to_yaml("streets", draw_streets(rng)))
+        roads.write_bytes(marked_yaml("streets", draw_streets(rng)))
         network = load_road_network(roads)
         assert len(draw_route(network, 1600.0, rng).root) > 3
         found.append(roads.read_bytes())
