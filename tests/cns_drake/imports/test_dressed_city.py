@@ -366,7 +366,8 @@ def test_a_gable_keeps_its_slopes():
     assert gable.outline is not None
     style = make_style({}, None, 60.0, 8.0, False, np.random.default_rng(1))
     style = replace(
-        style, storey=3.2, sill=1.0, height=1.2, width=1.2, pitch=2.0,
+        style, storey=3.2, window_sill=1.0, window_height=1.2,
+        window_width=1.2, window_pitch=2.0,
         balconies=False, shops=False, cornice=0.0, plinth=0.0,
     )  # fmt: skip
     plan = plan_facade(gable, style, 0.0, 0.0, 22.0)
@@ -478,7 +479,7 @@ def test_a_house_with_one_bay_has_a_window_beside_its_door(length, number):
     style = make_style(
         {"building": "house"}, None, 60.0, 5.0, False, np.random.default_rng(1)
     )
-    style = replace(style, pitch=4.0, width=1.3, storey=5.0)
+    style = replace(style, window_pitch=4.0, window_width=1.3, storey=5.0)
     wall = np.array([[0.0, 0.0], [length, 0.0]])
     low, high = np.zeros(2), np.full(2, 4.0)
     corners = [np.column_stack([wall, z]) for z in (low, high)]
