@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
@@ -154,6 +154,24 @@ class _MapPairs:
         return names | {one.name for pair in self.pairs for one in pair}
 
 
+class _ChangedPair(NamedTuple):
+    """A pair of drives as a condition changes it.
+
+    Attributes:
+        names: names of the database and of the query drive, unchanged.
+        query: the query drive, unchanged.
+        compared: the changed drives.
+        condition: the condition.
+        seed: seed of the condition's random choices.
+    """
+
+    names: tuple[str, str]
+    query: Scenario
+    compared: Compared
+    condition: Condition
+    seed: int
+
+
 def run_study(
     experiment: Experiment,
     output: Path,
@@ -255,8 +273,7 @@ class Study:
         doing("looking at all conditions")
         # Errors in the file are found before all slow work.
         for some in drives:
-            for _ in self._simulated_pairs(some, made=False):
-                pass
+            self._request_maps(some)
         for name in (RESULTS, QUERIES, "index.html"):
             is_there(self.output / name)  # Nothing else may have its name.
         self._made.make(self.cluster)
@@ -289,13 +306,12 @@ class Study:
                 raise InputError(
                     f"{self.source}: {some.map_name}: its drives are recorded"
                 )
-            for _ in self._built(some, made=False):
-                pass
+            self._request_maps(some)
         self._made.make(self.cluster)
         drives: dict[str, Scenario] = {}
         for some in found:
-            for _, _, compared, _, _ in self._built(some, made=True):
-                for drive in compared.drives:
+            for one in self._changed_pairs(some, made=True):
+                for drive in one.compared.drives:
                     if drives.setdefault(drive.name, drive) != drive:
                         raise InputError(
                             f"{self.source}: two drives are named {drive.name}"
@@ -525,35 +541,47 @@ class Study:
             )
         return NamedDrive(drive.name, SimulationSource(drive))
 
+    def _request_maps(self, some: _MapPairs) -> None:
+        """Requests the maps that conditions need, which `MadeMaps.make` makes.
+
+        Raises:
+            InputError: a field of a condition cannot be used.
+        """
+        for one in self._changed_pairs(some, made=False):
+            self._protocol_of(one.condition)
+
     def _simulated_pairs(
-        self, some: _MapPairs, *, made: bool = True
+        self, some: _MapPairs
     ) -> Iterator[tuple[Pair, Compared]]:
         """Yields the pairs of a map in all conditions that it allows.
 
-        Each item is a pair and its changed drives. If `made` is false, the maps
-        that conditions need are only noted.
+        Each item is a pair and its changed drives.
         """
-        for names, query, compared, condition, seed in self._built(
-            some, made=made
-        ):
+        for one in self._changed_pairs(some, made=True):
             yield (
                 self._pair(
-                    compared,
-                    query,
+                    one.compared,
+                    one.query,
                     map_name=some.map_name,
-                    names=names,
-                    factors={**some.factors, **condition.factors},
-                    seed=seed,
-                    is_baseline=condition.is_baseline,
-                    stated=self._protocol_of(condition),
+                    names=one.names,
+                    factors={**some.factors, **one.condition.factors},
+                    seed=one.seed,
+                    is_baseline=one.condition.is_baseline,
+                    stated=self._protocol_of(one.condition),
                 ),
-                compared,
+                one.compared,
             )
 
-    def _built(
+    def _changed_pairs(
         self, some: _MapPairs, *, made: bool
-    ) -> Iterator[tuple[tuple[str, str], Scenario, Compared, Condition, int]]:
-        """Yields names, query, changed drives, condition and seed of pairs."""
+    ) -> Iterator[_ChangedPair]:
+        """Yields the pairs of a map in all conditions that it allows.
+
+        Args:
+            some: the pairs of the map.
+            made: whether the maps that conditions need exist; if not, they are
+                requested.
+        """
         noted: dict[str, None] = {}
         age, redraw = self._made.want_age, self._made.want_redrawn
         if made:
@@ -582,7 +610,9 @@ class Study:
                     key = f"{condition.factors} {compared.fingerprint()}"
                     if key not in known:
                         known.add(key)
-                        yield names, query, compared, condition, seed
+                        yield _ChangedPair(
+                            names, query, compared, condition, seed
+                        )
         for text in noted if made else ():
             self.on_note(f"{some.map_name}: {text}")
 

@@ -71,7 +71,7 @@ def planned(wanted, output, **options):
     study = Study(wanted, output, "mine.yaml", Cluster(), **options)
     drives = list(study._map_drives(()))
     for some in drives:
-        list(study._simulated_pairs(some, made=False))
+        study._request_maps(some)
     made = study._plan(drives)
     return made.jobs, made.measured
 
