@@ -205,6 +205,7 @@ RECIPES = {
         changes=(("--quick", "--quick --task change"),),
         after=("repair stages",),
         makes=("town_change/results.csv",),
+        by_night=True,
     ),
     "repair stages": Recipe(
         _CITY + "town --repair-stages",

@@ -149,6 +149,7 @@ def test_it_runs(name, drive, forking, tmp_path):
     assert word in run(forking, tmp_path, FOLDER / name, *words)
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_the_others_are_imported(forking, tmp_path):
     """Whatever they import is still there."""

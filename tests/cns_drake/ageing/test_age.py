@@ -304,6 +304,7 @@ def test_buildings_that_stay_are_known_by_their_kind(
     assert "office_001" in renewed
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_trees_grow_about_their_feet_in_any_frame(town, world, tmp_path):
     """CityJSON has no frames of objects: S is the world's frame W."""
@@ -654,6 +655,7 @@ def test_a_map_of_others_writes_nothing_outside(town, tmp_path, uri):
     assert [path.name for path in output.parent.iterdir()] == ["evil.obj"]
 
 
+@pytest.mark.night
 @pytest.mark.slow
 def test_waypoints_of_any_names_are_kept_apart(town, tmp_path):
     folder = copied(town, tmp_path / "town")

@@ -108,7 +108,9 @@ def exact_hit(p, d, corners):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_moving", [False, True])
+@pytest.mark.parametrize(
+    "is_moving", [pytest.param(False, marks=pytest.mark.night), True]
+)
 def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
     rng = np.random.default_rng(7 + is_moving)
     sure = 0

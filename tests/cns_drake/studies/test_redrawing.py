@@ -142,6 +142,7 @@ def test_the_folder_is_a_map_like_any_other(drawn):
     assert [p.name for p in folder.glob("stage_*.sdf")] == ["stage_02.sdf"]
 
 
+@pytest.mark.night
 def test_drawn_by_processes_or_here_the_bytes_are_the_same(drawn, tmp_path):
     town, cities = drawn
     again = redraw_cities(
