@@ -182,10 +182,8 @@ def compare_with_gates(
     poses = search.poses(query, tested)
     scores = [np.empty(is_known.shape) for _ in gate_radii]
     errors = [PoseErrors.unknown(len(rows)) for _ in gate_radii]
-    distances = np.empty(is_known.shape)
+    distances = _distances(database, query)
     for row, ungated in enumerate(alone):
-        offsets = queries.p_WSs[row] - places.p_WSs
-        distances[row] = np.linalg.norm(offsets, axis=1)
         by_gate = iter(gated_at(ungated, poses[row], radii))
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated if radius is None else next(by_gate)
@@ -197,18 +195,14 @@ def compare_with_gates(
                 error.translation[row], error.rotation_deg[row] = pose_error(
                     X_PQ, places.X_WS[best], queries.X_WS[row]
                 )
-    if protocol.overlap is None:
-        matches = distances <= protocol.radius
-    else:
-        assert overlaps is not None
-        matches = overlaps >= protocol.overlap
+    matches = _near_enough(distances, overlaps, protocol) & is_known
     return [
         Retrieval(
             query_frames=queries.frames,
             database_frames=places.frames,
             scores=kept,
             distances=distances,
-            matches=matches & is_known,
+            matches=matches,
             pose_errors=error,
             is_known=is_known,
             overlaps=overlaps,
@@ -227,12 +221,41 @@ def matches_within_radius(
 
     These are the places within the protocol's radius that the protocol allows.
     """
+    is_near = _distances(database, query) <= protocol.radius
+    return is_near & _known_places(database, query, protocol)
+
+
+def _distances(
+    database: DriveDescriptors, query: DriveDescriptors
+) -> np.ndarray:
+    """Returns the distance of each query from each place, (Q, D) [m]."""
     p_WQs, p_WPs = query.queries.p_WSs, database.places.p_WSs
-    is_near = [
-        np.linalg.norm(p_WQ - p_WPs, axis=1) <= protocol.radius
-        for p_WQ in p_WQs
-    ]
-    return np.array(is_near) & _known_places(database, query, protocol)
+    distances = np.empty((len(p_WQs), len(p_WPs)))
+    # One query at a time: all differences at once take three times the memory.
+    for row, p_WQ in enumerate(p_WQs):
+        distances[row] = np.linalg.norm(p_WQ - p_WPs, axis=1)
+    return distances
+
+
+def _near_enough(
+    distances: np.ndarray,
+    overlaps: np.ndarray | None,
+    protocol: RetrievalProtocol,
+) -> np.ndarray:
+    """Returns which places match each query by the protocol, (Q, D) bool.
+
+    The result includes places that the protocol does not allow as answers.
+
+    Args:
+        distances: (Q, D) distances between query and place [m].
+        overlaps: (Q, D) share of each query's scan that each place's scan
+            shows; needed for matches by overlap.
+        protocol: protocol of the comparison.
+    """
+    if protocol.overlap is None:
+        return distances <= protocol.radius
+    assert overlaps is not None
+    return overlaps >= protocol.overlap
 
 
 def _known_places(
