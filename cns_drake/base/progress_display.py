@@ -187,7 +187,7 @@ class Display(Listener):
             elif self._printed is None or now >= self._printed + self._wait(
                 now
             ):
-                self._print("; ".join(self._lines(now)), now)
+                self._print("; ".join(line for line, _ in self._rows(now)), now)
 
     def print(self, text: str) -> None:
         """Prints a line, unless the stream is a terminal."""
@@ -216,12 +216,13 @@ class Display(Listener):
             return _CHANGE_INTERVAL
         return max(_INTERVAL, _GROWTH * (now - self._start))
 
-    def _lines(self, now: float) -> list[str]:
+    def _rows(self, now: float) -> list[tuple[str, float | None]]:
+        """Returns each line, and the share that is done, if it is known."""
         if self._jobs is not None:
-            return self._jobs.lines(now)
+            return self._jobs.rows(now)
         if not self._own.activity:
             return []
-        return [_shown(self._own, now - self._start)]
+        return [(_shown(self._own, now - self._start), _share(self._own))]
 
     def _print(self, text: str, now: float) -> None:
         if text:
@@ -253,14 +254,9 @@ class Display(Listener):
         self._num_drawn = len(lines)
 
     def _bars(self, now: float) -> list[str]:
-        lines = self._lines(now)
-        if self._jobs is not None:
-            shares = self._jobs.shares()
-        else:
-            shares = [_share(self._own)]
         return [
             line if share is None else f"{line}  {_bar(share)}"
-            for line, share in zip(lines, shares, strict=False)
+            for line, share in self._rows(now)
         ]
 
 
@@ -337,15 +333,18 @@ class _JobsDisplay(JobsListener):
             self._display.print(f"{name}: done, {self._summary()}")
         self._display.refresh()
 
-    def lines(self, now: float) -> list[str]:
-        """Returns a line for all jobs, and one for each running job."""
-        times = shown_times(now - self._start, self._left.seconds(now))
-        tasks = list(self._tasks.values())
-        return [f"{self._summary()}, {times}", *(one.text() for one in tasks)]
+    def rows(self, now: float) -> list[tuple[str, float | None]]:
+        """Returns a line for all jobs, and one for each running job.
 
-    def shares(self) -> list[float | None]:
-        """Returns the share that is done of each line, if it is known."""
-        return [self._left.share(), *map(_share, list(self._tasks.values()))]
+        With each line comes the share that is done, if it is known.
+        """
+        times = shown_times(now - self._start, self._left.seconds(now))
+        # Another thread may start and end jobs meanwhile.
+        tasks = list(self._tasks.values())
+        return [
+            (f"{self._summary()}, {times}", self._left.share()),
+            *((one.text(), _share(one)) for one in tasks),
+        ]
 
     def _summary(self) -> str:
         return f"{self._num_ended} of {self._num_jobs} {self._unit} done"
