@@ -25,6 +25,9 @@ FAULT_KINDS = (
 _WORDS = {"too_far": "near miss", "twin": "perceptual aliasing"}
 # Overlap below which two scans show different surroundings.
 _ENOUGH = 0.5
+# Share of the missing surroundings that must be hidden for the reason
+# `occluded`.
+_MOSTLY_HIDDEN = 0.5
 # Share of the surroundings that must have changed for the reason `changed`.
 MUCH_CHANGED = 0.25
 
@@ -79,7 +82,7 @@ class PairEvidence:
         return 1.0 - self.overlaps
 
     @property
-    def visible_change(self) -> tuple[float, int]:
+    def mean_visible_change(self) -> tuple[float, int]:
         """Mean visible change of queries with a match, and their number.
 
         The visible change of a query is 1 minus the overlap: the share of its
@@ -122,7 +125,7 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
     conditions = [
-        little & (evidence.hidden_shares >= 0.5 * unseen),
+        little & (evidence.hidden_shares >= _MOSTLY_HIDDEN * unseen),
         little,
         evidence.changed >= MUCH_CHANGED,
         evidence.fits[result.method] >= evidence.right_fits,

@@ -149,7 +149,7 @@ def _visible_change(
     known = evidence.get((database, query))
     if known is None:
         return (None,) * 4
-    whole, queries = known.visible_change
+    whole, queries = known.mean_visible_change
     added = known.visible_change_added
     return whole, queries, added, float(kept_share(added, whole))
 
