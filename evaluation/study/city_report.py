@@ -94,15 +94,15 @@ class CityReport:
             ),
         )
         assert isinstance(planned, ExtractionJobs)
+        self._drawing, drawing_job = figures.city_job(city, files, planned)
+        self._changes, change_jobs = self._drawn_changes(planned)
+        evidence_jobs = map(self._evidence_job, self._pairs)
+        # The jobs of `planned` come first: jobs of the page add what they need
+        # to them.
         self.jobs = dict(planned.jobs)
-        self._drawing = self._add_drawing(planned)
-        self._changes = self._add_changes(planned)
-        for pair in self._pairs:
-            self._add(self._evidence_job(pair))
+        for job in (drawing_job, *change_jobs, *evidence_jobs):
+            self.jobs[job.name] = job
         self._repeated = self._add_second_runs(published)
-
-    def _add(self, job: Job) -> None:
-        self.jobs[job.name] = job
 
     def _measured_pairs(self) -> list[Pair]:
         """Returns the pairs that the experiment measures, with controls."""
@@ -120,15 +120,11 @@ class CityReport:
         )
         return [*pairs, *(together for _, together in self._sessions)]
 
-    def _add_drawing(self, planned: ExtractionJobs) -> Part:
-        """Adds the job that draws the city; returns the file it makes."""
-        drawing, job = figures.city_job(self._city, self._files, planned)
-        self._add(job)
-        return drawing
-
-    def _add_changes(self, planned: ExtractionJobs) -> list[Part]:
-        """Adds the jobs that draw changes; returns the files they make."""
-        changes = []
+    def _drawn_changes(
+        self, planned: ExtractionJobs
+    ) -> tuple[list[Part], list[Job]]:
+        """Returns the files of drawn changes, and the jobs that make them."""
+        changes, jobs = [], []
         for pair in self._city.change_pairs():
             parts = tuple(
                 part
@@ -141,8 +137,8 @@ class CityReport:
                 self._city, pair, parts, self._files, planned
             )
             changes.append(change)
-            self._add(job)
-        return changes
+            jobs.append(job)
+        return changes, jobs
 
     def _add_second_runs(
         self, published: Engine
