@@ -208,8 +208,8 @@ def align(
         target = Submaps(first)
         held = 0.0
     else:
-        target, held = make_consistent(first)
-    source, moving = make_consistent(second)
+        target, held = _without_drift(first)
+    source, moving = _without_drift(second)
     swapped = held > moving and not hold_first
     if swapped:
         target, held, source, moving = source, moving, target, held
@@ -387,15 +387,16 @@ def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
     }
 
 
-def make_consistent(drive: Drive) -> tuple[Submaps, float]:
+def _without_drift(drive: Drive) -> tuple[Submaps, float]:
     """Returns a drive's submaps, with poses that are corrected for drift.
 
     The corrected poses of a drive that has drifted agree at places that the
     drive passes more than once.
 
     Returns:
-        The submaps, and the upper quartile of the errors at such places before
-        the correction [m]; 0 without a correction.
+        The submaps, and the upper quartile of the errors at such places [m]:
+        the greatest one before any round of the correction, and 0 without a
+        correction.
 
     Raises:
         InputError: if a scan cannot be read.
