@@ -47,7 +47,7 @@ def reproduce(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies import reproduction
-        from evaluation.results.comparing import suggest_comparison
+        from evaluation.command_line.suggestions import suggest_comparison
 
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
@@ -175,7 +175,7 @@ def study(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.study import run_study
-        from evaluation.results.comparing import suggest_comparison
+        from evaluation.command_line.suggestions import suggest_comparison
 
     with resumable():
         page = run_study(

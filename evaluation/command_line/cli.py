@@ -396,8 +396,8 @@ def report(
         output: Folder for the report; created if it does not exist.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
+    from evaluation.command_line.suggestions import suggest_comparison
     from evaluation.paper import reference_for
-    from evaluation.results.comparing import suggest_comparison
     from evaluation.study import stages_report
 
     cluster = choose_cluster(jobs, scheduler)

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-import contextlib
 from dataclasses import dataclass, replace
 import functools
 import itertools
@@ -16,7 +15,6 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from cns_drake.base.terminal import next_command
 from evaluation.recognition.metrics import (
     Difference,
     Interval,
@@ -302,17 +300,6 @@ def compare(
     return Comparison(
         metric, task, len(common), ranked, differences, alike, notes
     )
-
-
-def suggest_comparison(folder: Path) -> None:
-    """Prints the command that compares a folder's results with those shipped.
-
-    Nothing is printed if that command would refuse the results, such as those
-    of an experiment for which no results are shipped.
-    """
-    with contextlib.suppress(InputError):
-        compare([folder])
-        next_command("cns-eval", "compare", folder)
 
 
 def _table_name(path: Path, paths: Iterable[Path]) -> str:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.command_line.suggestions import suggest_comparison
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.comparing import (
     _BASELINES,
     compare,
-    suggest_comparison,
 )
 from evaluation.results.table import (
     LAST,

@@ -1,0 +1,19 @@
+"""Suggests what to run next."""
+
+import contextlib
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.terminal import next_command
+from evaluation.results.comparing import compare
+
+
+def suggest_comparison(folder: Path) -> None:
+    """Prints the command that compares a folder's results with those shipped.
+
+    Nothing is printed if that command would refuse the results, such as those
+    of an experiment for which no results are shipped.
+    """
+    with contextlib.suppress(InputError):
+        compare([folder])
+        next_command("cns-eval", "compare", folder)
