@@ -481,10 +481,12 @@ class PairMaker:
             factors = _factors_of(place, condition.factors)
             drive = self._with_unique_name("database", drive, factors, seed)
             found.append(((age, natural_key(stage)), place, drive))
-        # While maps are only noted, drives of all ages are in one map.
+        # While maps are only requested, drives of all ages and redraws are in
+        # one map.
         known: dict[object, str] = {}
         for time, place, drive in found:
-            before = known.setdefault((time, drive.name), place)
+            city = time, sessions[place].get("redraw")
+            before = known.setdefault((city, drive.name), place)
             if before != place:
                 raise InputError(
                     f"{self.source}: {place}: the same drive as {before}"

@@ -35,7 +35,11 @@ def not_yet(drive, *given):
     return str(drive.map), str(drive.stage)
 
 
-def compared(town, age=aged, **fields):
+def redrawn(drive, seed):
+    return "/redrawn", str(seed)
+
+
+def compared(town, age=aged, redraw=redrawn, **fields):
     """What is compared in each condition, aged cities being only named."""
     query = load_scenario(town / "sequence_04.yaml")
 
@@ -45,7 +49,7 @@ def compared(town, age=aged, **fields):
         True,
         "mine.yaml",
         age,
-        lambda drive, seed: ("/redrawn", str(seed)),
+        redraw,
         lambda text: None,
     )
     wanted = experiment(**fields)
@@ -331,6 +335,17 @@ def test_drives_differ_before_their_cities_are_aged(town):
     twice = {"sessions": [{"years": 9}, {"years": 4}, {"years": 4}]}
     with pytest.raises(InputError, match=r"3: the same drive as .*2$"):
         compared(town, not_yet, database=twice)
+
+
+def test_drives_differ_before_their_cities_are_redrawn(town):
+    sessions = [{}, {"redraw": 1}, {"redraw": 2}]
+    wanted = {"sessions": sessions}
+    (found,) = compared(town, not_yet, not_yet, database=wanted)
+    assert len(found.drives) == 4
+    twice = {"sessions": [*sessions, {"redraw": 1}]}
+    for redraw in (redrawn, not_yet):
+        with pytest.raises(InputError, match=r"4: the same drive as .*2$"):
+            compared(town, not_yet, redraw, database=twice)
 
 
 @pytest.mark.parametrize("side", ["both", "query"])
