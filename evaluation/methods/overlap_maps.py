@@ -16,7 +16,6 @@ from cns_drake.base.compiled import compiled
 # a uint16.
 GRID = 256
 NUM_LAYERS = 5
-_POLES = 3
 
 # Heights above the ground [m]: the top of the ground, of the low layer and of
 # the middle layer.

@@ -88,7 +88,8 @@ _OTHERS = (
     ("#999933", "-.", "h"),
     ("#6F6F6F", ":", "*"),
 )
-_METRICS = {
+# Metrics and factors in words.
+_IN_WORDS = {
     "auc": "AUC",
     "auc_strict": "AUC strict",
     "r1": "R@1",
@@ -357,7 +358,7 @@ def styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
 
 def in_words(name: str) -> str:
     """Returns the name of a metric or a factor in words."""
-    return _METRICS.get(name, name.rpartition(".")[2].replace("_", " "))
+    return _IN_WORDS.get(name, name.rpartition(".")[2].replace("_", " "))
 
 
 def _dumbbell(chart: _Chart) -> tuple[str, Figure]:

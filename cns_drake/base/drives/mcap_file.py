@@ -88,8 +88,6 @@ LOCATION = np.dtype(
     ]
 )
 _ORDER = ("log_time_ns", "chunk", "offset")
-# Records that hold messages, or define what messages are.
-_HOLDING = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
 _REPAIR = "(cns-drake export --format mcap saves what is whole)"
 
 
