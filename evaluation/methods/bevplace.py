@@ -331,6 +331,7 @@ class BevPlace(Network):
     """
 
     sees_images = True
+    describe_time = 0.85
     shapes = SHAPES
 
     def describe(self, points: np.ndarray) -> np.ndarray:

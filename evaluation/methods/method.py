@@ -91,6 +91,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         divides: whether a database can be searched part by part, because it is
             too large for the memory. If so, the score and the pose of a place
             must not depend on other places, except through `shortlist`.
+        describe_time: typical CPU time to describe a cloud [s], by which a
+            study forecasts how long it takes.
         config: the parameters in use.
 
     Example:
@@ -110,6 +112,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     sees_images: ClassVar[bool] = False
     rerank_best: ClassVar[int] = 0
     divides: ClassVar[bool] = False
+    describe_time: ClassVar[float] = 0.02
     # The Python file of a user's own method.
     _file: ClassVar[Path | None] = None
 
@@ -373,10 +376,10 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
     def enter(method: _MethodClass) -> _MethodClass:
         other = _METHODS.get(name, method)
         # The same class may be registered again, when its file runs again.
-        if (other.__module__, other.__qualname__) != (
-            method.__module__,
-            method.__qualname__,
-        ):
+        if _OPTIONAL.get(name, method.__module__) != method.__module__ or (
+            other.__module__,
+            other.__qualname__,
+        ) != (method.__module__, method.__qualname__):
             raise ValueError(f"there is another method {name!r}")
         method.name = name
         _METHODS[name] = method
@@ -386,17 +389,17 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
 
 def known_methods() -> tuple[str, ...]:
-    """Returns the names of all registered methods.
+    """Returns the names of all methods.
 
-    An optional method, which runs only on request, is registered when it is
-    first made.
+    These are the shipped methods, the optional methods, and methods of your own
+    whose files have been loaded.
 
     Example:
         from evaluation import known_methods
 
         print(known_methods())
     """
-    return tuple(sorted(_METHODS))
+    return tuple(sorted({*_METHODS, *_OPTIONAL}))
 
 
 def optional_methods() -> tuple[str, ...]:
@@ -409,7 +412,7 @@ def shipped_methods() -> tuple[str, ...]:
     package = __name__.rpartition(".")[0]
     return tuple(
         name
-        for name in known_methods()
+        for name in sorted(_METHODS)
         if _METHODS[name].__module__.startswith(f"{package}.")
         and name not in _OPTIONAL
     )
@@ -432,7 +435,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     if name in _OPTIONAL:
         importlib.import_module(_OPTIONAL[name])
     if name not in _METHODS:
-        known = sorted({*_METHODS, *_OPTIONAL})
+        known = known_methods()
         raise InputError(
             f"--method: no method {name!r} (known: {', '.join(known)})"
             f"{did_you_mean(name, known)}"

@@ -34,8 +34,6 @@ USUAL_LENGTH = 1400.0
 OPENING_COST = 8.0
 # Expected time to read a scan [s].
 SCAN_COST = 0.011
-# Expected time of a method to describe a cloud [s].
-_CLOUD_COST = 0.02
 # Expected time to map a drive with each of its scans [s].
 _MAP_COST = 60.0
 # Expected time of other work [s].
@@ -300,7 +298,7 @@ class Jobs:
         """Returns the expected time to describe a drive by all methods [s]."""
         made = [one.make() for one in self.methods]
         scans = max(map(protocol.scans, made), default=1)
-        each = SCAN_COST * scans + _CLOUD_COST * len(made)
+        each = SCAN_COST * scans + sum(one.describe_time for one in made)
         return OPENING_COST + each * num_described(drive, role, protocol)
 
     def mapped(

@@ -16,6 +16,7 @@ from cns_drake.studies.experiment import (
     named_programs,
     shipped_experiments,
 )
+from evaluation.methods import shipped_methods
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
@@ -325,6 +326,13 @@ def test_overrides_replace_single_fields(read):
     assert protocol == RetrievalProtocol(query_spacing=20)
     found = read(text, "tasks=[cost]", ("methods", ["solid"]))
     assert (found.tasks, found.methods) == ({"cost": {}}, {"solid": {}})
+
+
+def test_settings_of_optional_methods_need_no_entry_in_the_file(read):
+    # No file of the experiment names the method: --method chooses it.
+    found = read("maps: suburbia", "bevplace.weights=a.pth.tar")
+    assert found.methods["bevplace"] == {"weights": "a.pth.tar"}
+    assert set(found.methods) == {*shipped_methods(), "bevplace"}
 
 
 def test_a_smaller_experiment(read):

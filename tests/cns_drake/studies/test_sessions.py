@@ -11,6 +11,7 @@ from cns_drake.studies import study as study_module
 from cns_drake.studies.comparisons import PairMaker
 from cns_drake.studies.experiment import Experiment, conditions, load_experiment
 from cns_drake.studies.study import Study, run_study
+from evaluation.methods.solid import SolidMethod
 from evaluation.results.table import Results
 from evaluation.study import engine
 from evaluation.study.tasks.task import OPENING_COST, USUAL_LENGTH
@@ -201,6 +202,25 @@ def test_costs_grow_with_what_is_measured(town, tmp_path):
         assert long[kind] - start == pytest.approx(2.0 * (short[kind] - start))
     assert long["place"] > 2.0 * short["place"] - 2.0
     assert short["cost"] < long["cost"] < 2.0 * short["cost"]
+
+
+def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
+    wanted = experiment(
+        maps=[str(town)],
+        both={"route": {"length": 200.0, "seed": 1}},
+        **SIMULATED,
+    )
+
+    def cost():
+        study = Study(wanted, tmp_path, "mine.yaml", Cluster())
+        jobs = study._plan(study._map_drives(())).jobs
+        return sum(job.cost for job in jobs.values())
+
+    usual = cost()
+    slower = SolidMethod.describe_time + 3.0
+    monkeypatch.setattr(SolidMethod, "describe_time", slower)
+    scans = 200.0 / 2.0 + 200.0 / 5.0
+    assert cost() - usual == pytest.approx(3.0 * scans)
 
 
 FLEET = {"cars": 2, "years": 3, "length": 100.0}

@@ -69,6 +69,11 @@ def test_the_shown_method_finds_turned_places(tmp_path, monkeypatch):
         ),
         (
             "from evaluation.methods import Method, register\n"
+            "register('svt-net')(type('A', (Method,), {}))",
+            "there is another method 'svt-net'",
+        ),
+        (
+            "from evaluation.methods import Method, register\n"
             "register('a\\nb')(type('A', (Method,), {}))",
             "no name of a method",
         ),
