@@ -8,75 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.math import BsplineBasis
-from pydrake.trajectories import BsplineTrajectory
 
 from cns_drake.base.elementary import arctan2
+from cns_drake.motion.splines import SplineDerivatives, make_uniform_spline
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-# Quintic, with four continuous derivatives: the accelerations of steered wheels
-# need them.
-ORDER = 6
-# Number of control points on each side of a knot that affect the value there.
-REACH = ORDER // 2 - 1
 
-
-def make_uniform_spline(
-    control_points: np.ndarray, spacing: float
-) -> BsplineTrajectory:
-    """Returns a quintic B-spline with evenly spaced control points.
-
-    The spline starts at the first control point and ends at the last control
-    point. At the parameter i * spacing, the spline passes near control point i.
-    If all control points lie on a straight line, the spline is this line.
-
-    A bound on all control points is also a bound on the spline. A bound on the
-    difference quotients of the control points is also a bound on the
-    derivatives of the spline.
-
-    Args:
-        control_points: (N, D) points of any dimension D, N >= 3.
-        spacing: difference of the parameter between two control points.
-    """
-    points = np.asarray(control_points, dtype=float)
-    points = np.concatenate(
-        [
-            2 * points[0] - points[REACH:0:-1],
-            points,
-            2 * points[-1] - points[-2 : -REACH - 2 : -1],
-        ]
-    )
-    # The domain begins at the last of the first ORDER knots.
-    knots = spacing * (np.arange(len(points) + ORDER) - (ORDER - 1))
-    basis = BsplineBasis(ORDER, list(knots))
-    return BsplineTrajectory(basis, [point[:, None] for point in points])
-
-
-class SplineDerivatives:
-    """A spline and its lower derivatives, to evaluate at many parameters."""
-
-    def __init__(self, spline: BsplineTrajectory, count: int):
-        """Takes the spline and the number of derivatives to prepare."""
-        self._splines = [spline]
-        self._splines += [spline.MakeDerivative(k) for k in range(1, count + 1)]
-        self.end = spline.end_time()
-
-    def evaluate(self, parameter: ArrayLike) -> list[np.ndarray]:
-        """Returns the value and the derivatives of the spline at N parameters.
-
-        The list contains the values, the first derivatives, the second
-        derivatives, and so on. Each entry has the shape (N, D) for a spline of
-        D dimensions. Parameters beyond an end of the spline give the results at
-        this end.
-        """
-        parameter = np.clip(parameter, 0.0, self.end)
-        return [spline.vector_values(parameter).T for spline in self._splines]
-
-
-# Distance between the places at which bends and functions are evaluated [m]. It
-# is far below the distance of the knots, over which the curvature changes.
+# Distance between the places at which bends and integrands are evaluated [m].
+# It is far below the distance of the knots, over which the curvature changes.
 _STEP = 0.1
 
 
@@ -203,7 +144,7 @@ class SmoothPath:
             The radius [m], and the point (3,) of the path in W at which the
             path has this radius [m].
         """
-        jet = self.evaluate(self._places())
+        jet = self.evaluate(self._dense_parameters())
         curvature = np.abs(jet.turn) / jet.speed
         at = int(curvature.argmax())
         return float(1 / max(curvature[at], 1e-12)), jet.p[at]
@@ -222,10 +163,10 @@ class SmoothPath:
         # This import is slow.
         from scipy.interpolate import CubicSpline
 
-        u = self._places()
+        u = self._dense_parameters()
         return CubicSpline(u, integrand(self.evaluate(u))).antiderivative()
 
-    def _places(self) -> np.ndarray:
+    def _dense_parameters(self) -> np.ndarray:
         steps = int(np.ceil(self.end / _STEP))
         return np.linspace(0.0, self.end, steps + 1)
 

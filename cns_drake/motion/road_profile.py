@@ -25,9 +25,9 @@ _FINEST_SHARE = 4.0 / 3.0
 _NODES = 512
 
 # Integral of sinc(x)^8 from -inf to inf: the B-spline of degree 7 at 0.
-_TRANSVERSE = 151.0 / 315.0
+_SINC8_INTEGRAL = 151.0 / 315.0
 # Integral of x sinc(x)^8 from 0 to inf.
-_OVER_LAYERS = 0.03611499185872766
+_X_SINC8_INTEGRAL = 0.03611499185872766
 
 
 class RoadProfile:
@@ -53,7 +53,9 @@ class RoadProfile:
 
     def __init__(self, roughness: RoughnessClass, seed: int):
         """Draws the coefficients of all layers."""
-        self._level = ROUGHNESS[roughness] * _N0**2 * math.log(2) / _OVER_LAYERS
+        self._level = (
+            ROUGHNESS[roughness] * _N0**2 * math.log(2) / _X_SINC8_INTEGRAL
+        )
         self._seed = seed
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
@@ -65,7 +67,7 @@ class RoadProfile:
         for layer, spacing in enumerate(_SPACINGS):
             rng = np.random.default_rng([self._seed, layer])
             share = _FINEST_SHARE if layer == 0 else 1.0
-            variance = share * self._level * spacing / (2.0 * _TRANSVERSE)
+            variance = share * self._level * spacing / (2.0 * _SINC8_INTEGRAL)
             nodes = rng.normal(0.0, np.sqrt(variance), (_NODES, _NODES))
             angle, *shift = rng.uniform(0.0, 1.0, 3)
             c, s = math.cos(2 * np.pi * angle), math.sin(2 * np.pi * angle)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.trajectories import BsplineTrajectory
 
-from cns_drake.motion import path_geometry
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.splines import REACH, make_uniform_spline
 from cns_drake.roads.lane_path import Speeds
 
 # Distance between the knots of the time scaling [s]. The acceleration changes
@@ -41,11 +42,11 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
             `KNOT_PERIOD` [s]. The first three are equal, and the last three are
             equal, so that the drive starts and ends at rest.
     """
-    return path_geometry.make_uniform_spline(positions[:, None], KNOT_PERIOD)
+    return make_uniform_spline(positions[:, None], KNOT_PERIOD)
 
 
 def find_speed_profile(
-    path: path_geometry.SmoothPath, speed_limits: np.ndarray, speeds: Speeds
+    path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
     """Returns the fastest drive along a path that respects all limits.
 
@@ -80,12 +81,12 @@ def find_speed_profile(
     # Along the path v = |p'| u', and therefore v' = |p'| u'' + |p'|' u'^2. The
     # second term may take up half of the acceleration.
     half = speeds.longitudinal_acceleration / 2.0
-    parametric = np.maximum(np.abs(jet.dspeed), 1e-9)
-    limit = np.minimum(limit, np.sqrt(half / parametric))
+    stretch = np.maximum(np.abs(jet.dspeed), 1e-9)
+    limit = np.minimum(limit, np.sqrt(half / stretch))
     limit = _widened_limits(limit, u[1])
-    parametric = np.max(np.abs(jet.dspeed) * limit**2)
-    acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
-    speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))
+    second_term = np.max(np.abs(jet.dspeed) * limit**2)
+    acceleration = _MARGIN * speeds.longitudinal_acceleration - second_term
+    speed = np.sqrt(_reachable_squares(limit**2, acceleration, u[1]))
     return SpeedProfile(u, speed, acceleration)
 
 
@@ -105,18 +106,19 @@ def drive_positions(profile: SpeedProfile) -> np.ndarray:
         [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
     )
     # With REACH knots of rest at both ends, the spline is at rest there, too.
-    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * path_geometry.REACH
-    drive_times = (np.arange(knots + 1) - path_geometry.REACH) * KNOT_PERIOD
+    knots = int(np.ceil(times[-1] / KNOT_PERIOD)) + 2 * REACH
+    drive_times = (np.arange(knots + 1) - REACH) * KNOT_PERIOD
     return _positions_at(drive_times, times, u, speed)
 
 
 def _widened_limits(limit: np.ndarray, step: float) -> np.ndarray:
-    """Returns limits (N,) that also hold some time before and after each limit.
+    """Returns limits (N,) that also hold some time before and after each place.
 
-    A drive that keeps to the limit v within the distance T * v of a place
-    passes the place with at most v for at least T before and after.
+    If a drive keeps the limit v of a place within the distance T * v of the
+    place, its speed is at most v from the time T before the place until the
+    time T after it.
     """
-    period = (path_geometry.REACH + 1) * KNOT_PERIOD
+    period = (REACH + 1) * KNOT_PERIOD
     reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
     result = limit.copy()
     for shift in range(1, int(reach.max()) + 1):
@@ -126,10 +128,10 @@ def _widened_limits(limit: np.ndarray, step: float) -> np.ndarray:
     return result
 
 
-def _reachable(
+def _reachable_squares(
     squared_limit: np.ndarray, acceleration: float, step: float
 ) -> np.ndarray:
-    """Returns the greatest v^2 under a limit of v^2, from rest to rest."""
+    """Returns the greatest squared speeds within limits, from rest to rest."""
     gain = 2 * acceleration * step
     squared = squared_limit.copy()
     squared[0] = squared[-1] = 0.0

@@ -14,8 +14,9 @@ from pydrake.multibody.tree import PrismaticJoint
 from cns_drake.base.elementary import product, rotated
 from cns_drake.base.errors import validated
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.motion.body_ride import NUM_COORDINATES, BodyRide
 from cns_drake.motion.road_profile import RoadProfile
-from cns_drake.motion.trajectory import NUM_COORDINATES, BodyRide, Trajectory
+from cns_drake.motion.trajectory import Trajectory
 
 # Longest time step [s]: a fifteenth of the period of the wheels on their tyres.
 _STEP = 0.005

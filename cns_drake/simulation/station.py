@@ -14,7 +14,8 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.motion.vehicle_motion import VehicleMotion, VehicleSweep
+from cns_drake.motion.vehicle_motion import VehicleMotion
+from cns_drake.motion.vehicle_sweep import VehicleSweep
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from cns_drake.motion.path_geometry import REACH
 from cns_drake.motion.speed_profile import KNOT_PERIOD
+from cns_drake.motion.splines import REACH
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.traffic import vehicles as motion
 from cns_drake.traffic.lane_graph import LaneGraph

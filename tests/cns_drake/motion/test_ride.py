@@ -14,6 +14,7 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
+from cns_drake.motion.body_ride import BodyRide
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.speed_profile import Speeds
 from cns_drake.motion.suspension import (
@@ -22,12 +23,8 @@ from cns_drake.motion.suspension import (
     load_suspension_rates,
     ride_on_springs,
 )
-from cns_drake.motion.trajectory import (
-    BodyRide,
-    Trajectory,
-    poses_and_motion,
-)
-from cns_drake.motion.vehicle_motion import WheelMotion
+from cns_drake.motion.trajectory import Trajectory, poses_and_motion
+from cns_drake.motion.wheel_motion import WheelMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 

@@ -14,12 +14,10 @@ from helpers.drives import (
 import numpy as np
 import pytest
 
-from cns_drake.motion.path_geometry import (
-    SmoothPath,
-    make_uniform_spline,
-)
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.splines import make_uniform_spline
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.vehicle_motion import WheelMotion
+from cns_drake.motion.wheel_motion import WheelMotion
 from cns_drake.roads.lane_path import LanePath, Speeds
 
 

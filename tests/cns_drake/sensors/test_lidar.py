@@ -15,7 +15,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.perception import PointCloud
 import pytest
 
-from cns_drake.motion.vehicle_motion import Sweep
+from cns_drake.motion.vehicle_sweep import Sweep
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.measurement import MeasurementModel
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
