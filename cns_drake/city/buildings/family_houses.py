@@ -15,14 +15,19 @@ from cns_drake.city.facades import (
     Building,
     Openings,
     Roof,
+    WallFrame,
     Wing,
     add_chimney,
+    balconies,
+    bay_windows,
     bays,
-    details,
-    massing,
+    outlines,
+    porches,
+    solids,
     wing_roofs,
     wing_walls,
 )
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # Windows of the sides are further apart than those of the front [m].
 _SIDE_PITCH_M = 3.8
@@ -224,20 +229,20 @@ def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
         top = min(top, p.main.wall_top + 0.1)
     full = p.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
-    details.add_porch(
+    porches.add_porch(
         p, wall, x0, x1, reach, p.floor, eaves, top,
         roof="shed" if p.porch == "full" else p.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
     )  # fmt: skip
     room = p.ahead - reach - 0.02
-    details.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
+    porches.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
     if full and p.floor > 0.3:
         y = reach - 0.15
         trim = p.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (a, b) in enumerate(runs):
             part = f"railing_{k}"
-            details.add_railing(p, part, wall, (a, y), (b, y), p.floor, trim)
+            balconies.add_railing(p, part, wall, (a, y), (b, y), p.floor, trim)
 
 
 def _add_wing(p: DetachedHouse, wing: Wing) -> None:
@@ -247,7 +252,7 @@ def _add_wing(p: DetachedHouse, wing: Wing) -> None:
     is_front = wing.y0 < p.main.y0
     if p.bay_window and is_front and wing.width > 3.0:
         size = (wing.width / 2, 2.2, 0.4, 0.0, p.floor + 2.3)
-        details.add_bay_window(p, wing.wall(0), *size)
+        bay_windows.add_bay_window(p, wing.wall(0), *size)
 
 
 def _add_chimney(p: DetachedHouse) -> None:
@@ -255,7 +260,7 @@ def _add_chimney(p: DetachedHouse) -> None:
     if p.chimney == "breast":
         wall = main.wall(1 if p.mirrored else 3)
         x = wall.length / 2
-        breast = details.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
+        breast = _chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
         p.add_to("base", breast)
         spot = (*wall.point(x, 0.18), main.top - 0.9)
         add_chimney(p, "chimney", spot, p.colours["base"], yaw=np.pi / 2)
@@ -263,6 +268,33 @@ def _add_chimney(p: DetachedHouse) -> None:
         x = main.x0 + p.chimney_at * main.width
         spot = (x, main.center[1], main.top - 1.2)
         add_chimney(p, "chimney", spot, p.kind.choices["bricks"][0])
+
+
+def _chimney_breast(
+    wall: WallFrame, x: float, width: float, reach: float, top: float
+) -> Mesh:
+    """Returns a chimney in front of a wall, which narrows at its shoulders.
+
+    Args:
+        wall: the wall.
+        x: middle of the chimney along the wall [m].
+        width: width at the foot [m].
+        reach: how far it reaches out of the wall [m].
+        top: height of its top [m].
+    """
+    a, b = x - width / 2, x + width / 2
+    neck = 0.62 * width / 2
+    shoulder = 0.5 * top
+    low = outlines.rectangle(a, -0.05, b, reach)
+    high = outlines.rectangle(x - neck, -0.05, x + neck, reach)
+    head = (x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06)
+    breast = merge_meshes(
+        solids.skirt(low, low, -solids.FOUNDATION_M, shoulder),
+        solids.skirt(low, high, shoulder, shoulder + 0.6),
+        solids.prism(high, shoulder + 0.6, top),
+        solids.box(*head, top - 0.35, top - 0.15),
+    )
+    return wall.place(breast)
 
 
 # Kept free around the walls, for wide eaves [m].
@@ -330,7 +362,7 @@ class Bungalow(_FamilyHouse):
         reach = min(self.reach, 0.3 * depth) if count else 0.0
         front = y0 + max(ahead, _BUNGALOW_MARGIN + reach)
         deep = min(back - front, 8.5)
-        carport: massing.Area | None = None
+        carport: outlines.Area | None = None
         if self.parking == "carport" and width > 13.0:
             carport = (
                 right - 3.4, front + 0.4, right, front + min(6.0, deep)
@@ -378,7 +410,7 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     reach = min(1.6, main.y0 - p.site.bounds[1] - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
         eaves = min(p.floor + 2.25, main.wall_top - 0.35)
-        details.add_porch(
+        porches.add_porch(
             p, wall, a + 0.25, b - 0.25, reach, p.floor, eaves,
             eaves + 0.4, posts=max(3, round((b - a) / 2.4)),
         )  # fmt: skip
@@ -387,16 +419,16 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
         p.add_to("base", wall.standing(*slab, bottom=True))
 
 
-def _add_carport(p: Bungalow, area: massing.Area) -> None:
+def _add_carport(p: Bungalow, area: outlines.Area) -> None:
     """Adds a flat roof on six posts, with a shed at its end."""
     x0, y0, x1, y1 = area
     top = 2.65
-    p.add_to("roof", massing.box(x0, x1, y0, y1, top - 0.25, top))
+    p.add_to("roof", solids.box(x0, x1, y0, y1, top - 0.25, top))
     for x in (x0 + 0.15, x1 - 0.15):
         for y in np.linspace(y0 + 0.3, y1 - 2.0, 3).tolist():
-            p.add_to("trim", massing.post(x, y, 0.08, top - 0.2))
+            p.add_to("trim", solids.post(x, y, 0.08, top - 0.2))
     shed = (x0 + 0.1, x1 - 0.1, y1 - 1.6, y1 - 0.1, top - 0.2)
-    p.add_to("walls", massing.standing(*shed, bottom=True))
+    p.add_to("walls", solids.standing(*shed, bottom=True))
 
 
 class SemiDetached(_FamilyHouse):
@@ -502,16 +534,16 @@ def _add_entrances(
     for x in (half - offset, half + offset):
         openings.add_door(0, x, p.floor)
         if not p.doors_inside:
-            details.add_porch(p, wall, x - 0.85, x + 0.85, *size)
+            porches.add_porch(p, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:
-        details.add_porch(
+        porches.add_porch(
             p, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
         )
     for x in _bay_middles(p, main) if p.bay == "canted" else ():
         width = min(2.4, 0.5 * half)
         ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
         openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
-        details.add_bay_window(
+        bay_windows.add_bay_window(
             p, wall, x, width, min(0.7, room - 0.1), 0.0,
             round(p.floor + 2.3, 2),
         )  # fmt: skip

@@ -17,13 +17,16 @@ from cns_drake.city.facades import (
     Openings,
     Relief,
     Roof,
+    WallFrame,
     Wing,
     add_chimney,
+    balconies,
     bays,
-    details,
     equip_roof,
-    massing,
+    outlines,
+    porches,
     roofs,
+    solids,
     tiers,
     wing_roofs,
     wing_walls,
@@ -61,13 +64,13 @@ class CourtBlock(Building):
 
         The building's site must be a rectangle.
         """
-        form = massing.u_shape if self.shape == "U" else massing.l_shape
+        form = outlines.u_shape if self.shape == "U" else outlines.l_shape
         plan = form(*self.site.bounds, self.wing, self.back)
         if self.mirrored:
-            plan = massing.mirrored(plan)
+            plan = outlines.mirrored(plan)
         bottom = _add_ground(self, plan)
         eaves = self.height - self.mansard_height
-        groups, per_group, storey = tiers.divided(
+        groups, per_group, storey = tiers.storey_groups(
             eaves - bottom, self.storey_height
         )
         size = (self.window_width, 0.8, storey - 0.55, self.recess)
@@ -108,12 +111,12 @@ def _add_oriels(
     floor = Facade(storey, (Band(0.9, storey - 0.5, 0.14),))
     height = count * storey
     oriel = merge_meshes(
-        tiers.block(outline, floor.stacked(count), 0.0),
-        massing.flat(outline, 0.0, up=False),
-        massing.spire(outline, (0.0, 0.0), height, height + 0.6),
+        tiers.lidded_walls(outline, floor.stacked(count), 0.0),
+        solids.flat(outline, 0.0, up=False),
+        solids.spire(outline, (0.0, 0.0), height, height + 0.6),
     )
     shape = MeshShape(p.define("oriel", oriel))
-    wall = details.WallFrame(plan, 0)
+    wall = WallFrame(plan, 0)
     cells = bays.stretches(wall.length, p.pitch, 0.8)[1:-1]
     step = max(p.oriel_every, len(cells) // 5)
     for k, (a, b) in enumerate(cells[::step]):
@@ -124,22 +127,22 @@ def _add_oriels(
 def _mansard(
     p: CourtBlock, plan: np.ndarray, z0: float, rng: np.random.Generator
 ) -> list[Mesh]:
-    eaves = massing.inset(plan, -0.5)
-    knee = massing.inset(plan, p.mansard_inset - 0.6)
+    eaves = outlines.inset(plan, -0.5)
+    knee = outlines.inset(plan, p.mansard_inset - 0.6)
     slope = min(1.6, p.wing / 2 - p.mansard_inset - 0.4)
-    ridge = massing.inset(plan, p.mansard_inset + slope)
+    ridge = outlines.inset(plan, p.mansard_inset + slope)
     z1 = z0 + 0.3
     z2, z3 = p.height - 0.9, p.height
     pieces = [
-        massing.skirt(eaves, eaves, z0, z1),
-        massing.flat(eaves, z0, up=False),
-        massing.skirt(eaves, massing.inset(plan, 0.0), z1, z1),
-        massing.skirt(plan, knee, z1, z2),
-        massing.skirt(knee, ridge, z2, z3),
-        massing.flat(ridge, z3),
+        solids.skirt(eaves, eaves, z0, z1),
+        solids.flat(eaves, z0, up=False),
+        solids.skirt(eaves, outlines.inset(plan, 0.0), z1, z1),
+        solids.skirt(plan, knee, z1, z2),
+        solids.skirt(knee, ridge, z2, z3),
+        solids.flat(ridge, z3),
     ]
     for edge in range(len(plan)):
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         for a, b in bays.stretches(wall.length, p.dormer_pitch, 2.5):
             dormer = _dormer(p, round((a + b) / 2, 2), z1, z2)
             pieces.append(wall.place(dormer))
@@ -148,7 +151,7 @@ def _mansard(
         x = plan[0, 0] + (k + 0.5) / p.chimneys * (plan[1, 0] - plan[0, 0])
         y = middle[1] + p.mansard_inset + 2.4 + float(rng.uniform(0.0, 1.5))
         stack = (x - 0.6, x + 0.6, y - 0.35, y + 0.35)
-        pieces.append(massing.box(*stack, z2, p.height, bottom=False))
+        pieces.append(solids.box(*stack, z2, p.height, bottom=False))
     return pieces
 
 
@@ -162,12 +165,12 @@ def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
         (x + 0.7, -0.1),
         (x - 0.7, -0.1),
     ]
-    walls = massing.skirt(body, body, low, high)
-    lid = massing.box(x - 0.9, x + 0.9, -deep, 0.15, high, high + 0.2)
+    walls = solids.skirt(body, body, low, high)
+    lid = solids.box(x - 0.9, x + 0.9, -deep, 0.15, high, high + 0.2)
     # Left out: the back wall, which is inside the roof. The sill stands in
     # front of the window.
     front = Mesh(walls.vertices, walls.faces[1:])
-    sill = massing.box(x - 0.8, x + 0.8, -0.6, 0.05, low - 0.15, low + 0.1)
+    sill = solids.box(x - 0.8, x + 0.8, -0.6, 0.05, low - 0.15, low + 0.1)
     return merge_meshes(front, lid, sill)
 
 
@@ -218,13 +221,15 @@ class WalkUp(Building):
         x0, y0, x1, y1 = site.bounds
         left = x0 + 0.5 * (3 not in site.blind_edges)
         right = x1 - 0.5 * (1 not in site.blind_edges)
-        body = massing.rectangle(left, y0 + _FRONT_M, right, y1 - _BACK_M)
+        body = outlines.rectangle(left, y0 + _FRONT_M, right, y1 - _BACK_M)
         plan, stairs = _bay_front(self, body)
-        site_outline = massing.rectangle(x0, y0, x1, y1)
-        blind = massing.edges_on(plan, site_outline, site.blind_edges)
+        site_outline = outlines.rectangle(x0, y0, x1, y1)
+        blind = outlines.edges_on(plan, site_outline, site.blind_edges)
         top = _add_walk_up_ground(self, plan, stairs, blind)
         goal = self.height - self.rise - (0.9 if self.roof == "flat" else 0.15)
-        groups, per_group, storey = tiers.divided(goal - top, self.storey, 6)
+        groups, per_group, storey = tiers.storey_groups(
+            goal - top, self.storey, 6
+        )
         window = bays.window(
             self.window_width, 0.8, min(2.3, storey - 0.4), self.recess,
             ledge=self.ledge, hood=self.hood,
@@ -282,19 +287,19 @@ def _add_walk_up_ground(
     pieces: list[Mesh] = []
     room = _FRONT_M - p.bay_reach * (not stairs) - 0.05
     for edge in doors:
-        pieces += _steps(p, details.WallFrame(plan, edge), room)
+        pieces += _steps(p, WallFrame(plan, edge), room)
     p.add("steps", *pieces, finish=p.colours["base"])
     return tiers.add_ground(
         p, plan, Facade(h, bands, layout, (p.recess,), blind)
     )
 
 
-def _steps(p: WalkUp, wall: details.WallFrame, room: float) -> list[Mesh]:
+def _steps(p: WalkUp, wall: WallFrame, room: float) -> list[Mesh]:
     """Returns the steps up to a door, between cheeks and under a hood."""
     x = wall.length / 2
     count = max(2, round(p.floor / 0.17))
     run = min(0.28 * count, room - 0.3)
-    flight = details.steps(x - 0.8, x + 0.8, run, p.floor, count)
+    flight = porches.steps(x - 0.8, x + 0.8, run, p.floor, count)
     slab = (x - 1.1, x + 1.1, -0.05, room - run, p.floor)
     hood = (x - 1.2, x + 1.2, -0.05, 0.9, p.floor + 2.5, p.floor + 2.7)
     cheeks = (
@@ -461,7 +466,7 @@ def _add_verandas(
     pieces, frame = [], []
     for x in (0.9 + width / 2, wall.length - 0.9 - width / 2):
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-        pieces.append(wall.place(details.balcony(a, b, reach, 0.0, 1.0)))
+        pieces.append(wall.place(balconies.balcony(a, b, reach, 0.0, 1.0)))
         for u in (a + 0.1, b - 0.1):
             spot = (u - 0.09, u + 0.09, reach - 0.2, reach - 0.02)
             frame.append(wall.standing(*spot, top - 0.1))

@@ -8,13 +8,17 @@ from cns_drake.city.facades import (
     Building,
     Openings,
     Roof,
+    WallFrame,
     Wing,
     bays,
-    details,
+    boards,
     equip_roof,
     free_stretches,
-    massing,
+    outlines,
+    piers,
+    porches,
     roofs,
+    solids,
     walls,
     wing_roofs,
 )
@@ -137,13 +141,13 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
         b = a + half
         brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
         frame = [
-            details.board(a, a + 0.18, 0.08, height, 0.15),
-            details.board(b - 0.18, b, 0.08, height, 0.15),
-            details.board(a, b, height - 0.18, height, 0.15),
-            details.board(a, b, 0.08, 0.26, 0.15),
-            details.beam(*brace, 0.1),
+            boards.board(a, a + 0.18, 0.08, height, 0.15),
+            boards.board(b - 0.18, b, 0.08, height, 0.15),
+            boards.board(a, b, height - 0.18, height, 0.15),
+            boards.board(a, b, 0.08, 0.26, 0.15),
+            solids.beam(*brace, 0.1),
         ]
-        leaf = details.board(a, b, 0.08, height, 0.1)
+        leaf = boards.board(a, b, 0.08, height, 0.1)
         p.add_to("doors", wall.place(leaf))
         p.add_to("trim", *(wall.place(m) for m in frame))
     rail = (x - width - 0.1, x + width + 0.1, 0.0, 0.18)
@@ -161,7 +165,7 @@ def _add_battens(
             u = a + x
             if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
                 continue
-            strip = details.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
+            strip = boards.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
             p.add_to("walls", wall.place(strip))
 
 
@@ -175,19 +179,19 @@ def _add_ridge(p: Barn, main: Wing) -> None:
             y += 0.8 * share * main.depth
         else:
             x += 0.8 * share * main.width
-        p.add_to("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
-        eaves = massing.square(x, y, 0.65)
-        p.add_to("roof", massing.tent(eaves, (x, y), z + 0.3, z + 0.7))
+        p.add_to("walls", solids.post(x, y, 0.45, z + 0.3, z - 0.6))
+        eaves = outlines.square(x, y, 0.65)
+        p.add_to("roof", solids.tent(eaves, (x, y), z + 0.3, z + 0.7))
 
 
 def _add_jetty(p: Barn, xs: bays.Span, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
     a, b = xs
     y = y0 + 0.1
-    p.add_to("doors", massing.box(a, b, y, front, 0.05, 0.3))
+    p.add_to("doors", solids.box(a, b, y, front, 0.05, 0.3))
     for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
         spot = (x - 0.12, x + 0.12, y + 0.02, y + 0.26)
-        p.add_to("doors", massing.standing(*spot, 1.1))
+        p.add_to("doors", solids.standing(*spot, 1.1))
 
 
 _DEEP = 0.2
@@ -238,7 +242,7 @@ class SportsHall(Building):
             _add_porch(self, halls)
 
 
-def _halls(p: SportsHall, area: massing.Area, along_y: bool) -> list[Wing]:
+def _halls(p: SportsHall, area: outlines.Area, along_y: bool) -> list[Wing]:
     """Returns the one hall, or the two halves under a butterfly roof."""
     x0, y0, x1, y1 = area
     top = p.height - 0.15
@@ -289,9 +293,9 @@ def _add_frames(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
         for a, b in free_stretches(hall, edge, halls, 0.5):
             for u, _ in bays.stretches(b - a, p.bay, 0.5)[1:]:
                 left, right = a + u - 0.2, a + u + 0.2
-                foot = massing.rectangle(left, -0.02, right, reach)
-                head = massing.rectangle(left, -0.02, right, 0.3 * reach)
-                post = massing.frustum(foot, head, 0.0, hall.wall_top)
+                foot = outlines.rectangle(left, -0.02, right, reach)
+                head = outlines.rectangle(left, -0.02, right, 0.3 * reach)
+                post = solids.frustum(foot, head, 0.0, hall.wall_top)
                 root = wall.standing(left, right, -0.02, reach, 0.0)
                 p.add_to("frames", root, wall.place(post))
     line = [(u, z + 0.15) for u, z in hall.roof_line]
@@ -363,12 +367,12 @@ class WaterfrontHall(Building):
         """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.dock_depth
-        plan = massing.rectangle(x0, front, x1, y1)
+        plan = outlines.rectangle(x0, front, x1, y1)
         facade = _walls(self)
         pieces = [
-            massing.foundation(plan),
+            solids.foundation(plan),
             walls.facade_mesh(plan, facade),
-            details.piers(
+            piers.wall_piers(
                 plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
                 self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
             ),
@@ -405,11 +409,11 @@ def _dock(
     """Returns a loading platform under a canopy, with steps at both ends."""
     high = p.dock_height
     a, b = x0 + 2.0, x1 - 2.0
-    platform = massing.standing(a, b, y0 + 0.4, front, high, bottom=True)
-    steps = details.steps(0.0, p.dock_depth - 0.6, 1.6, high, 5)
-    ends = massing.rectangle(a, y0 + 0.4, b, front)
+    platform = solids.standing(a, b, y0 + 0.4, front, high, bottom=True)
+    steps = porches.steps(0.0, p.dock_depth - 0.6, 1.6, high, 5)
+    ends = outlines.rectangle(a, y0 + 0.4, b, front)
     pieces = [platform]
-    pieces += [details.WallFrame(ends, k).place(steps) for k in (1, 3)]
+    pieces += [WallFrame(ends, k).place(steps) for k in (1, 3)]
     eaves = min(p.eaves - 0.8, high + 5.2)
     ya, za = front - p.dock_depth + 0.1, eaves - 0.5
     yb, zb = front, eaves
@@ -420,7 +424,7 @@ def _dock(
     pieces.append(Mesh(vertices, tuple(faces)).turned())
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
-        pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))
+        pieces.append(solids.box(*post, high - 0.1, eaves - 0.2))
     return pieces
 
 
@@ -428,12 +432,12 @@ def _roof(p: WaterfrontHall, plan: np.ndarray) -> Mesh:
     (x0, y0), (x1, y1) = plan[0], plan[2]
     rise = p.height - p.eaves
     if p.roof == "sawtooth":
-        teeth = massing.extruded(_sawtooth(x0, x1, rise), y0, y1)
-        return massing.swapped(teeth).moved((0.0, 0.0, p.eaves))
+        teeth = solids.extruded(_sawtooth(x0, x1, rise), y0, y1)
+        return solids.swapped(teeth).moved((0.0, 0.0, p.eaves))
     pieces = []
     edges = np.linspace(y0, y1, p.spans + 1)
     for a, b in itertools.pairwise(edges):
-        shed = massing.extruded(_profile(p.roof, a, b, rise), x0, x1)
+        shed = solids.extruded(_profile(p.roof, a, b, rise), x0, x1)
         pieces.append(shed.moved((0.0, 0.0, p.eaves)))
         pieces += _ridge(p, x0, x1, (a + b) / 2)
     return merge_meshes(*pieces)
@@ -444,11 +448,11 @@ def _ridge(p: WaterfrontHall, x0: float, x1: float, y: float) -> list[Mesh]:
     top, low = p.height - 0.25, p.height - 1.1
     length = x1 - x0
     a, b = x0 + 0.15 * length, x1 - 0.15 * length
-    pieces = [massing.box(a, b, y - 0.7, y + 0.7, low, top, bottom=False)]
+    pieces = [solids.box(a, b, y - 0.7, y + 0.7, low, top, bottom=False)]
     for k in range(p.ventilators):
         x = a + (k + 0.5) * (b - a) / p.ventilators
         hood = (x - 0.5, x + 0.5, y - 0.9, y + 0.9)
-        pieces.append(massing.box(*hood, low, p.height, bottom=False))
+        pieces.append(solids.box(*hood, low, p.height, bottom=False))
     return pieces
 
 

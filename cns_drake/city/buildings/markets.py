@@ -8,12 +8,16 @@ from cns_drake.city.facades import (
     Openings,
     Patch,
     Roof,
+    WallFrame,
     Wing,
     bays,
-    details,
+    boards,
+    canopies,
     equip_roof,
-    massing,
+    outlines,
+    piers,
     roofs,
+    solids,
     wing_walls,
 )
 
@@ -162,8 +166,8 @@ class KioskRow(Building):
                 _add_lantern(self, wing)
         if self.arcade > 0:
             _add_arcade(self, (boxes[0].x0, boxes[-1].x1), front)
-        slab = massing.box(left - 0.3, right + 0.3, y0 + 0.1, y1 - 0.1,
-                           -massing.FOUNDATION_M, 0.12)  # fmt: skip
+        slab = solids.box(left - 0.3, right + 0.3, y0 + 0.1, y1 - 0.1,
+                           -solids.FOUNDATION_M, 0.12)  # fmt: skip
         self.add_to("timber", slab)
 
 
@@ -202,14 +206,14 @@ def _add_stall(p: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
         shelf = wall.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
         p.add_to("timber", shelf)
         if p.arcade == 0.0:
-            shade = details.awning(a - 0.1, b + 0.1, 1.3, 1.95, head + 0.1)
+            shade = canopies.awning(a - 0.1, b + 0.1, 1.3, 1.95, head + 0.1)
             p.add_to("awning", wall.place(shade))
     else:
         shutter = bays.gate(b - a, head, 0.12)
         openings.add_reliefs(0, shutter(a - 0.3, b + 0.3))
     door = bays.window(0.9, 0.05, 2.0, 0.12)
     openings.add_bays((2,), 0.2, wall.length, [door], 0.3)
-    sign = details.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
+    sign = boards.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
     p.add_to("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
     openings.enclose((0.12,), bands, material)
@@ -219,10 +223,10 @@ def _add_lantern(p: KioskRow, wing: Wing) -> None:
     """Adds a small square lantern with its own roof."""
     low = wing.wall_top
     top = p.height
-    body = massing.square(*wing.center, 0.6)
-    eaves = massing.inset(body, -0.25)
-    p.add_to("others", massing.skirt(body, body, low, top - 0.7))
-    p.add_to("roof", massing.tent(eaves, wing.center, top - 0.72, top))
+    body = outlines.square(*wing.center, 0.6)
+    eaves = outlines.inset(body, -0.25)
+    p.add_to("others", solids.skirt(body, body, low, top - 0.7))
+    p.add_to("roof", solids.tent(eaves, wing.center, top - 0.72, top))
 
 
 def _add_arcade(p: KioskRow, xs: bays.Span, front: float) -> None:
@@ -234,9 +238,9 @@ def _add_arcade(p: KioskRow, xs: bays.Span, front: float) -> None:
     line = [(y - 0.15, low + 0.15), (front + 0.05, top)]
     p.add_to("roof", roofs.shell(line, a, b, 0.12))
     for x in np.linspace(a + 0.15, b - 0.15, max(2, round((b - a) / 3.2))):
-        post = massing.standing(x - 0.08, x + 0.08, y, y + 0.16, low + 0.1)
+        post = solids.standing(x - 0.08, x + 0.08, y, y + 0.16, low + 0.1)
         p.add_to("timber", post)
-    beam = massing.box(a, b, y, y + 0.16, low - 0.15, low + 0.06)
+    beam = solids.box(a, b, y, y + 0.16, low - 0.15, low + 0.06)
     p.add_to("timber", beam)
 
 
@@ -303,10 +307,10 @@ class Supermarket(Building):
             Band(self.eaves - 0.7, self.eaves - 0.2, -0.08),
         )
         openings.enclose((_RECESS,), bands)
-        piers = details.pilasters(
+        strips = piers.pilasters(
             hall.outline, self.pitch, 0.6, 1, 0.5, 0.2, 0.0, self.eaves - 0.5
         )
-        self.add_to("walls", piers)
+        self.add_to("walls", strips)
         _add_canopy(self, hall.wall(0))
         _add_entrance(self, hall)
         if self.dock_depth:
@@ -315,7 +319,7 @@ class Supermarket(Building):
         equip_roof(self, hall.outline, hall.floor, self.roof_items, clear=2.0)
 
 
-def _add_canopy(p: Supermarket, wall: details.WallFrame) -> None:
+def _add_canopy(p: Supermarket, wall: WallFrame) -> None:
     """Adds a flat canopy on posts along the front."""
     z = 3.45
     reach = p.canopy
@@ -382,7 +386,7 @@ def _add_dock(p: Supermarket, hall: Wing) -> None:
         p.add_to("steel", wall.box(u - 1.3, u + 1.3, -0.02, 0.12, 1.1, 3.7))
 
 
-def _add_shelters(p: Supermarket, wall: details.WallFrame) -> None:
+def _add_shelters(p: Supermarket, wall: WallFrame) -> None:
     """Adds curved shelters for trolleys in front of the canopy's ends."""
     y = p.canopy + 0.1
     for k in range(p.shelters):

@@ -10,11 +10,14 @@ from cns_drake.city.facades import (
     Facade,
     Relief,
     Site,
+    WallFrame,
     bays,
-    details,
+    canopies,
     equip_roof,
     facade_mesh,
-    massing,
+    outlines,
+    piers,
+    solids,
     tiers,
 )
 from cns_drake.city.geometry import MeshShape, merge_meshes
@@ -53,21 +56,21 @@ class BandedTower(Building):
         The building's site must be a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
-        base = massing.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
+        base = outlines.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
         step = max(2.8, 0.5 * self.radius)
         outer = np.round(
-            massing.rounded(
+            outlines.rounded(
                 base, dict.fromkeys(self.corners, self.radius), step
             ),
             3,
         )
-        inner = massing.inset(
-            outer, min(self.taper, 0.5 * massing.inset_limit(outer))
+        inner = outlines.inset(
+            outer, min(self.taper, 0.5 * outlines.inset_limit(outer))
         )
         z = _add_banded_tower_lobby(self, inner)
         gap = 3.4
         room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
-        counts = tiers.divided(room, self.storey, 12 // self.stacks)
+        counts = tiers.storey_groups(room, self.storey, 12 // self.stacks)
         plans = {"wide": outer, "slim": inner}
         shapes = [
             (plan, _stack_adder(self, plan, counts, name))
@@ -97,8 +100,8 @@ def _add_banded_tower_lobby(p: BandedTower, plan: np.ndarray) -> float:
     door = bays.entrance(3.4, 3.0, 1.2, surround=0.1)
     layout = bays.with_door(glazing, door, 5.2)
     facade = Facade(h, (Band(h - 0.6, h, -0.15),), layout, (0.3,))
-    half = min(3.5, max(1.2, details.WallFrame(plan, 0).length / 2 - 0.5))
-    lid = details.front_canopy(plan, half, 2.0, 3.5)
+    half = min(3.5, max(1.2, WallFrame(plan, 0).length / 2 - 0.5))
+    lid = canopies.front_canopy(plan, half, 2.0, 3.5)
     return tiers.add_ground(p, plan, facade, [lid])
 
 
@@ -115,20 +118,22 @@ def _add_garden(
     It has columns around a smaller glazed core. Its slab has the outline
     `plan`; `inner` is the smallest outline of the storeys above.
     """
-    limit = massing.inset_limit(inner)
-    core = massing.inset(inner, min(2.8, 0.6 * limit))
-    walls = tiers.block(core, Facade(height, (Band(0.4, 2.9, 0.15),)), z0)
-    ring = massing.inset(inner, min(0.8, 0.2 * limit))
+    limit = outlines.inset_limit(inner)
+    core = outlines.inset(inner, min(2.8, 0.6 * limit))
+    walls = tiers.lidded_walls(
+        core, Facade(height, (Band(0.4, 2.9, 0.15),)), z0
+    )
+    ring = outlines.inset(inner, min(0.8, 0.2 * limit))
     columns = []
     for edge in range(len(ring)):
-        wall = details.WallFrame(ring, edge)
+        wall = WallFrame(ring, edge)
         count = max(1, round(wall.length / 7.0))
         for k in range(count):
             spot = wall.point((k + 0.5) * wall.length / count, 0.0)
-            shaft = massing.regular_polygon(0.3, 8, spot)
-            columns.append(massing.skirt(shaft, shaft, z0, z0 + height))
-    floor = massing.roof_pan(plan, z0, z0 + 1.0, 0.2)
-    rim = massing.skirt(plan, plan, z0, z0 + 1.0)
+            shaft = outlines.regular_polygon(0.3, 8, spot)
+            columns.append(solids.skirt(shaft, shaft, z0, z0 + height))
+    floor = solids.roof_pan(plan, z0, z0 + 1.0, 0.2)
+    rim = solids.skirt(plan, plan, z0, z0 + 1.0)
     p.add(f"garden_{number}", walls, floor, rim, *columns)
     return round(z0 + height, 3)
 
@@ -152,16 +157,16 @@ def _stack_adder(
     pieces = [facade_mesh(plan, facade)]
     if p.fins > 0:
         # The piers cross the sunshades and join the piers above and below.
-        pieces.append(details.piers(
+        pieces.append(piers.wall_piers(
             plan, p.fins, 0.18, p.ledge + 0.1, 0.0, step,
             depth=p.recess + 0.05, margin=0.8,
         ))  # fmt: skip
     height = round(groups * step, 3)
-    pane = massing.inset(plan, p.recess - 0.004)
+    pane = outlines.inset(plan, p.recess - 0.004)
     meshes = {
         name: merge_meshes(*pieces),
-        f"{name}_glass": massing.skirt(pane, pane, 0.0, height),
-        f"{name}_soffit": massing.flat(plan, 0.0, up=False),
+        f"{name}_glass": solids.skirt(pane, pane, 0.0, height),
+        f"{name}_soffit": solids.flat(plan, 0.0, up=False),
     }
     walls, glass, soffit = (
         MeshShape(p.define(part, mesh)) for part, mesh in meshes.items()
@@ -233,16 +238,16 @@ class GridTower(Building):
         roof = tiers.add_crown(
             self, plan, crown, top, rim - 0.6, thickness=0.45
         )
-        free = massing.inset(plan, 0.5)
+        free = outlines.inset(plan, 0.5)
         equip_roof(self, free, roof, self.roof_items, clear=0.8)
 
 
 def _outline(p: GridTower, site: Site) -> np.ndarray:
     """Returns the outline, slightly within the site; the front comes first."""
     x0, y0, x1, y1 = site.bounds
-    base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
+    base = outlines.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
     if p.plan == "notched":
-        return massing.notched(base, p.shift * massing.shortest_side(base))
+        return outlines.notched(base, p.shift * outlines.shortest_side(base))
     if p.plan == "box":
         return base
     (a, c), (b, d) = base[0], base[2]
@@ -261,8 +266,8 @@ def _add_grid_tower_lobby(p: GridTower, plan: np.ndarray) -> float:
     door = bays.entrance(3.6, 3.2, p.recess + 0.6, surround=0.15)
     layout = bays.with_door(glazing, door, 6.4)
     facade = Facade(h, (Band(h - 0.9, h - 0.2, -0.12),), layout, (p.recess,))
-    half = min(4.5, details.WallFrame(plan, 0).length / 2 - 0.6)
-    lid = details.front_canopy(plan, half, 1.6, 3.7)
+    half = min(4.5, WallFrame(plan, 0).length / 2 - 0.6)
+    lid = canopies.front_canopy(plan, half, 1.6, 3.7)
     return tiers.add_ground(p, plan, facade, [lid])
 
 
@@ -271,7 +276,7 @@ def _add_grid(
 ) -> float:
     """Adds storeys behind frames up to about `goal`; returns their top [m]."""
     unit = p.storey * (2 if p.double else 1)
-    groups, per_group, height = tiers.divided(goal - z0, unit, 7)
+    groups, per_group, height = tiers.storey_groups(goal - z0, unit, 7)
     # Part of the beam closes the storey at its top.
     low, high = round(p.beam - 0.25, 2), height - 0.25
     frame = bays.window(
@@ -285,15 +290,15 @@ def _add_grid(
 
 def _add_plant_floor(p: GridTower, plan: np.ndarray, z0: float) -> float:
     """Adds a floor of louvres, set back behind the grid."""
-    inner = massing.inset(plan, p.recess)
+    inner = outlines.inset(plan, p.recess)
     slats = [
         Band(round(0.4 + 0.6 * k, 2), round(0.7 + 0.6 * k, 2), 0.18)
         for k in range(5)
     ]
     facade = Facade(3.9, tuple(slats))
-    ring = tiers.block(inner, facade, z0)
+    ring = tiers.lidded_walls(inner, facade, z0)
     p.add("plant", ring)
     top = round(z0 + 3.9, 3)
     for z, up in ((z0, True), (top, False)):
-        p.add(f"ledge_{int(up)}", massing.flat(plan, z, up=up))
+        p.add(f"ledge_{int(up)}", solids.flat(plan, z, up=up))
     return top

@@ -10,15 +10,17 @@ from cns_drake.city.facades import (
     Building,
     Facade,
     Openings,
+    WallFrame,
     Wing,
     add_railing,
     bays,
-    details,
     equip_roof,
     facade_mesh,
     glass_mesh,
-    massing,
+    outlines,
+    porches,
     roofs,
+    solids,
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -61,7 +63,7 @@ class GasStation(Building):
         middle = y0 + 1.5 + room / 2
         wide = min(x1 - x0 - 3.0, 6.5 * self.pumps + 4.0)
         x = (x0 + x1) / 2
-        canopy = massing.rectangle(
+        canopy = outlines.rectangle(
             x - wide / 2, middle - deep / 2, x + wide / 2, middle + deep / 2
         )
         _add_canopy(self, canopy)
@@ -78,7 +80,7 @@ def _pump_rows(p: GasStation, canopy: np.ndarray) -> list[float]:
 
 def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
     """Adds the roof on its columns, lights on its underside."""
-    x0, y0, x1, y1 = massing.extent(canopy)
+    x0, y0, x1, y1 = outlines.extent(canopy)
     top = p.canopy_top
     low = p.canopy_top - p.fascia
     if p.sloped:
@@ -87,18 +89,18 @@ def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
         p.add_to("brand", roofs.shell(line, x0, x1, 0.35))
         low = top - 1.2
         rim = (x0 + 0.5, x1 - 0.5, middle - 0.4, middle + 0.4, low, top - 0.6)
-        p.add_to("steel", massing.box(*rim))
+        p.add_to("steel", solids.box(*rim))
     else:
         p.add_to(
             "brand",
-            massing.skirt(canopy, canopy, low, top),
-            massing.roof_pan(canopy, top - 0.4, top, 0.25),
+            solids.skirt(canopy, canopy, low, top),
+            solids.roof_pan(canopy, top - 0.4, top, 0.25),
         )
-        p.add_to("steel", massing.flat(canopy, low, up=False))
+        p.add_to("steel", solids.flat(canopy, low, up=False))
     count = max(2, p.pumps)
     for y in _pump_rows(p, canopy):
         for x in np.linspace(x0 + 2.2, x1 - 2.2, count).tolist():
-            p.add_to("steel", massing.post(x, y, 0.22, low + 0.1))
+            p.add_to("steel", solids.post(x, y, 0.22, low + 0.1))
 
 
 def _add_islands(p: GasStation, canopy: np.ndarray) -> None:
@@ -110,13 +112,13 @@ def _add_islands(p: GasStation, canopy: np.ndarray) -> None:
         for k in range(p.pumps):
             x = x0 + 1.5 + (k + 0.5) * step
             kerb = (x - half, x + half, y - 0.55, y + 0.55, 0.18)
-            p.add_to("concrete", massing.standing(*kerb))
+            p.add_to("concrete", solids.standing(*kerb))
             p.add_to("steel", _pump().moved((x, y, 0.15)))
             head = (x - 0.42, x + 0.42, y - 0.27, y + 0.27, 1.75, 2.1)
-            p.add_to("brand", massing.box(*head))
+            p.add_to("brand", solids.box(*head))
             for u in (x - half + 0.15, x + half - 0.15):
-                post = massing.regular_polygon(0.08, 6, (u, y))
-                p.add_to("brand", massing.prism(post, 0.15, 0.95))
+                post = outlines.regular_polygon(0.08, 6, (u, y))
+                p.add_to("brand", solids.prism(post, 0.15, 0.95))
 
 
 def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
@@ -160,22 +162,22 @@ def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:
     y = y0 + 0.9
     top = p.height
     for u in (x - 0.7, x + 0.7):
-        p.add_to("steel", massing.post(u, y, 0.1, top - 0.5))
+        p.add_to("steel", solids.post(u, y, 0.1, top - 0.5))
     for k, z in enumerate(np.arange(top - 1.2, 1.9, -0.75).tolist()):
-        board = massing.box(x - 0.85, x + 0.85, y - 0.16, y + 0.16, z, z + 0.65)
+        board = solids.box(x - 0.85, x + 0.85, y - 0.16, y + 0.16, z, z + 0.65)
         p.add_to("steel" if k % 2 else "brand", board)
-    crown = massing.box(x - 0.95, x + 0.95, y - 0.2, y + 0.2, top - 0.5, top)
+    crown = solids.box(x - 0.95, x + 0.95, y - 0.2, y + 0.2, top - 0.5, top)
     p.add_to("brand", crown)
 
 
 def _pump() -> Mesh:
     """Returns a double-sided pump with screens and nozzles, on z = 0."""
-    pieces = [massing.box(-0.38, 0.38, -0.22, 0.22, 0.0, 1.65, bottom=False)]
+    pieces = [solids.box(-0.38, 0.38, -0.22, 0.22, 0.0, 1.65, bottom=False)]
     for side in (-1.0, 1.0):
         y0, y1 = sorted((side * 0.2, side * 0.3))
-        pieces.append(massing.box(-0.3, 0.3, y0, y1, 1.0, 1.45))
+        pieces.append(solids.box(-0.3, 0.3, y0, y1, 1.0, 1.45))
         for x in (-0.34, 0.26):
-            pieces.append(massing.box(x, x + 0.1, y0, y1, 0.55, 0.95))
+            pieces.append(solids.box(x, x + 0.1, y0, y1, 0.55, 0.95))
     return merge_meshes(*pieces)
 
 
@@ -218,40 +220,40 @@ class ParkPavilion(Building):
             _add_round(self, center, reach)
 
 
-def _add_round(p: ParkPavilion, center: massing.Point, reach: float) -> None:
+def _add_round(p: ParkPavilion, center: outlines.Point, reach: float) -> None:
     """Adds a polygonal deck, posts or glazed walls, and a roof."""
     phase = -math.pi / 2 + math.pi / p.sides
     count = max(2, round(p.floor / 0.17))
     radius = (reach - 0.45 * 0.3 * count) / math.cos(math.pi / p.sides)
     radius = min(radius, reach, 7.0)
-    plan = massing.regular_polygon(radius, p.sides, center, phase)
+    plan = outlines.regular_polygon(radius, p.sides, center, phase)
     # The front edge, which faces -y, ends at the corner of `phase`.
     plan = np.roll(plan, 1, axis=0)
-    p.add_to("stone", massing.prism(plan, -massing.FOUNDATION_M, p.floor))
-    wall = details.WallFrame(plan, 0)
+    p.add_to("stone", solids.prism(plan, -solids.FOUNDATION_M, p.floor))
+    wall = WallFrame(plan, 0)
     x = wall.length / 2
     half = min(0.9, 0.4 * wall.length)
-    flight = details.steps(x - half, x + half, 0.26 * count, p.floor, count)
+    flight = porches.steps(x - half, x + half, 0.26 * count, p.floor, count)
     p.add_to("stone", wall.place(flight))
     z = p.floor + p.eaves
-    posts = massing.inset(plan, 0.25)
+    posts = outlines.inset(plan, 0.25)
     if p.form == "tea_house":
         _add_glazing(p, posts)
     else:
         for spot in posts:
-            shaft = massing.regular_polygon(0.13, 6, spot)
-            p.add_to("timber", massing.skirt(shaft, shaft, p.floor, z))
+            shaft = outlines.regular_polygon(0.13, 6, spot)
+            p.add_to("timber", solids.skirt(shaft, shaft, p.floor, z))
         for edge in range(1, p.sides):
-            side = details.WallFrame(posts, edge)
+            side = WallFrame(posts, edge)
             ends = (0.1, 0.0), (side.length - 0.1, 0.0)
             add_railing(
                 p, f"railing_{edge}", side, *ends, p.floor, p.colours["timber"]
             )
-    beam = massing.inset(posts, -0.12)
+    beam = outlines.inset(posts, -0.12)
     p.add_to(
         "timber",
-        massing.skirt(beam, beam, z - 0.3, z + 0.02),
-        massing.flat(beam, z - 0.3, up=False),
+        solids.skirt(beam, beam, z - 0.3, z + 0.02),
+        solids.flat(beam, z - 0.3, up=False),
     )
     _add_round_roof(p, center, plan, z)
 
@@ -269,10 +271,10 @@ def _add_glazing(p: ParkPavilion, plan: np.ndarray) -> None:
 
 
 def _add_round_roof(
-    p: ParkPavilion, center: massing.Point, plan: np.ndarray, z: float
+    p: ParkPavilion, center: outlines.Point, plan: np.ndarray, z: float
 ) -> None:
     """Adds a conical or bell-shaped roof with its lantern and finial."""
-    eaves = massing.inset(plan, -_EAVES_M * 0.8)
+    eaves = outlines.inset(plan, -_EAVES_M * 0.8)
     top = p.height - 0.5
     head = top - 1.0 if p.lantern else top
 
@@ -280,8 +282,8 @@ def _add_round_roof(
         return np.asarray(center) + share * (eaves - center)
 
     pieces = [
-        massing.flat(eaves, z, up=False),
-        massing.skirt(eaves, eaves, z, z + 0.15),
+        solids.flat(eaves, z, up=False),
+        solids.skirt(eaves, eaves, z, z + 0.15),
     ]
     levels = [(1.0, z + 0.15)]
     if p.bell:
@@ -292,22 +294,22 @@ def _add_round_roof(
     if p.lantern:
         levels.append((neck, head))
     for (a, za), (b, zb) in itertools.pairwise(levels):
-        pieces.append(massing.skirt(ring(a), ring(b), za, zb))
+        pieces.append(solids.skirt(ring(a), ring(b), za, zb))
     hat = ring(levels[-1][0])
     low = levels[-1][1]
     if p.lantern:
         drum = ring(0.8 * neck)
-        pieces.append(massing.flat(hat, head))
-        p.add_to("timber", massing.skirt(drum, drum, head, top - 0.4))
+        pieces.append(solids.flat(hat, head))
+        p.add_to("timber", solids.skirt(drum, drum, head, top - 0.4))
         hat = ring(1.15 * neck)
         low = top - 0.4
-        pieces.append(massing.flat(hat, low, up=False))
-    p.add_to("roof", *pieces, massing.spire(hat, center, low, top))
-    finial = massing.regular_polygon(0.07, 6, center)
-    p.add_to("timber", massing.prism(finial, top - 0.3, p.height))
+        pieces.append(solids.flat(hat, low, up=False))
+    p.add_to("roof", *pieces, solids.spire(hat, center, low, top))
+    finial = outlines.regular_polygon(0.07, 6, center)
+    p.add_to("timber", solids.prism(finial, top - 0.3, p.height))
 
 
-def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
+def _add_shelter(p: ParkPavilion, area: outlines.Area) -> None:
     """Adds a hipped or gabled roof on posts, with tables and a hearth."""
     x0, y0, x1, y1 = area
     a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
@@ -315,8 +317,8 @@ def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
     floor = 0.12
     z = 0.12 + p.eaves
     slab = (a - 0.3, b + 0.3, c - 0.3, d + 0.3, floor)
-    p.add_to("stone", massing.standing(*slab, bottom=True))
-    plan = massing.rectangle(a, c, b, d)
+    p.add_to("stone", solids.standing(*slab, bottom=True))
+    plan = outlines.rectangle(a, c, b, d)
     across = max(2, round((b - a) / 3.5) + 1)
     deep = max(2, round((d - c) / 3.5) + 1)
     places: list[tuple[float, float]] = [
@@ -325,9 +327,9 @@ def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
     ]
     spots = {(round(u, 2), round(v, 2)) for u, v in places}
     for u, v in sorted(spots):
-        p.add_to("timber", massing.post(u, v, 0.11, z, floor))
-    frame = massing.inset(plan, -0.12)
-    ceiling = massing.prism(frame, z - 0.25, z + 0.02, bottom=True)
+        p.add_to("timber", solids.post(u, v, 0.11, z, floor))
+    frame = outlines.inset(plan, -0.12)
+    ceiling = solids.prism(frame, z - 0.25, z + 0.02, bottom=True)
     p.add_to("timber", ceiling)
     if p.bell:
         roof = roofs.hip(plan, z, p.height, 0.55, 0.15)
@@ -342,7 +344,7 @@ def _add_shelter(p: ParkPavilion, area: massing.Area) -> None:
     _add_tables(p, (a, b, c, d), floor)
 
 
-def _add_tables(p: ParkPavilion, area: massing.Area, floor: float) -> None:
+def _add_tables(p: ParkPavilion, area: outlines.Area, floor: float) -> None:
     """Adds tables with benches, and a hearth at one end."""
     a, b, c, d = area
     y, z = (c + d) / 2, floor
@@ -354,7 +356,7 @@ def _add_tables(p: ParkPavilion, area: massing.Area, floor: float) -> None:
             (v - 0.15, v + 0.15, y - 0.9, y + 0.9, z, z + 0.45)
             for v in (u - 0.75, u + 0.75)
         )
-        feet = (massing.box(*spot, bottom=False) for spot in (leg, *seats))
-        p.add_to("timber", massing.box(*top), *feet)
-    hearth = massing.box(a + 0.3, a + 1.0, y - 0.5, y + 0.5, z, z + 1.0)
+        feet = (solids.box(*spot, bottom=False) for spot in (leg, *seats))
+        p.add_to("timber", solids.box(*top), *feet)
+    hearth = solids.box(a + 0.3, a + 1.0, y - 0.5, y + 0.5, z, z + 1.0)
     p.add_to("stone", hearth)

@@ -8,12 +8,13 @@ from cns_drake.city.facades import (
     Facade,
     Openings,
     Roof,
+    WallFrame,
     Wing,
     bays,
-    details,
     free_stretches,
-    massing,
+    outlines,
     roofs,
+    solids,
     tiers,
     wing_roofs,
 )
@@ -69,7 +70,7 @@ class School(Building):
         left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
         gym = self.gym + 1.5 * (self.gym > 0)
         a, b = (left + gym, right) if self.mirrored else (left, right - gym)
-        bar = np.round(massing.rectangle(a, front, b, front + self.depth), 2)
+        bar = np.round(outlines.rectangle(a, front, b, front + self.depth), 2)
         top = _add_classes(self, bar)
         _add_entrance(self, bar, top)
         if self.wing and back - bar[2, 1] > 6.0:
@@ -94,7 +95,7 @@ def _add_classes(p: School, bar: np.ndarray) -> float:
     }
     layout = bays.by_edge(layouts, bays.alone(small, 2.4))
     walls = Facade(storey, (Band(0.0, 0.3, -0.06),), layout, (_RECESS,))
-    p.add("foundation", massing.foundation(bar))
+    p.add("foundation", solids.foundation(bar))
     top = tiers.add_storeys(p, bar, walls, 0.0, p.storeys, 1)
     if p.roof == "hip":
         roof = roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
@@ -108,7 +109,7 @@ def _add_classes(p: School, bar: np.ndarray) -> float:
 
 def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
     """Adds a glazed stair hall with steps and a canopy on posts."""
-    wall = details.WallFrame(bar, 0)
+    wall = WallFrame(bar, 0)
     share = 0.72 if p.mirrored else 0.28
     x = share * wall.length
     half = min(p.entrance, 0.4 * wall.length) / 2
@@ -320,10 +321,10 @@ def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
         for a, b in free_stretches(nave, edge, boxes, 0.5):
             for x, _ in bays.stretches(b - a, p.bay, 1.0)[1:]:
                 left, right = a + x - 0.22, a + x + 0.22
-                plan = massing.rectangle(left, -0.05, right, 0.42)
-                slope = massing.rectangle(left, -0.05, right, 0.05)
-                body = massing.skirt(plan, plan, -massing.FOUNDATION_M, high)
-                cap = massing.frustum(plan, slope, high, high + 0.5)
+                plan = outlines.rectangle(left, -0.05, right, 0.42)
+                slope = outlines.rectangle(left, -0.05, right, 0.05)
+                body = solids.skirt(plan, plan, -solids.FOUNDATION_M, high)
+                cap = solids.frustum(plan, slope, high, high + 0.5)
                 p.add_to("walls", wall.place(body), wall.place(cap))
 
 
@@ -353,27 +354,27 @@ def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
     z = tower.wall_top
     tip = p.height - 1.0
     center = tower.center
-    eaves = massing.inset(tower.outline, -0.3)
+    eaves = outlines.inset(tower.outline, -0.3)
     pieces = [
-        massing.flat(eaves, z - 0.02, up=False),
-        massing.skirt(eaves, eaves, z - 0.02, z + 0.2),
+        solids.flat(eaves, z - 0.02, up=False),
+        solids.skirt(eaves, eaves, z - 0.02, z + 0.2),
     ]
     if p.spire == "cap":
         knee = z + 0.45 * (tip - z)
-        waist = massing.inset(tower.outline, 0.32 * tower.width)
+        waist = outlines.inset(tower.outline, 0.32 * tower.width)
         pieces += [
-            massing.skirt(eaves, waist, z + 0.2, knee),
-            massing.spire(waist, center, knee, tip),
+            solids.skirt(eaves, waist, z + 0.2, knee),
+            solids.spire(waist, center, knee, tip),
         ]
     elif p.spire == "broach":
         # A low octagonal pyramid on the square tower, with a needle through it.
-        ring = massing.regular_polygon(0.5 * tower.width, 8, center, np.pi / 8)
+        ring = outlines.regular_polygon(0.5 * tower.width, 8, center, np.pi / 8)
         pieces += [
-            massing.spire(eaves, center, z + 0.2, z + 0.45 * (tip - z)),
-            massing.spire(ring, center, z + 0.1, tip),
+            solids.spire(eaves, center, z + 0.2, z + 0.45 * (tip - z)),
+            solids.spire(ring, center, z + 0.1, tip),
         ]
     else:
-        pieces.append(massing.spire(eaves, center, z + 0.2, tip))
+        pieces.append(solids.spire(eaves, center, z + 0.2, tip))
     return pieces
 
 
@@ -384,24 +385,24 @@ def _add_cote(p: Chapel, nave: Wing) -> None:
     if high - nave.top < 0.9:
         p.add_to("trim", *_cross(x, nave.y0, nave.top - 0.3, p.height))
         return
-    p.add_to("walls", massing.post(x, y, 0.7, nave.top + 0.3, low))
+    p.add_to("walls", solids.post(x, y, 0.7, nave.top + 0.3, low))
     posts = (
-        massing.post(u, v, 0.1, high, nave.top + 0.2)
+        solids.post(u, v, 0.1, high, nave.top + 0.2)
         for u in (x - 0.55, x + 0.55)
         for v in (y - 0.55, y + 0.55)
     )
     bell = [(0.34, high - 0.75), (0.24, high - 0.45), (0.12, high - 0.2)]
-    rim = massing.regular_polygon(0.34, 8, (x, y))
+    rim = outlines.regular_polygon(0.34, 8, (x, y))
     p.add_to(
         "trim",
         *posts,
-        massing.revolved(bell, 8, (x, y)),
-        massing.flat(rim, high - 0.75, up=False),
+        solids.revolved(bell, 8, (x, y)),
+        solids.flat(rim, high - 0.75, up=False),
         *_cross(x, y, p.height - 1.0, p.height),
     )
-    eaves = massing.square(x, y, 0.95)
+    eaves = outlines.square(x, y, 0.95)
     z = high - 0.02
-    p.add_to("roof", massing.tent(eaves, (x, y), z, p.height - 0.8))
+    p.add_to("roof", solids.tent(eaves, (x, y), z, p.height - 0.8))
 
 
 def _add_porch(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
@@ -454,6 +455,6 @@ def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:
     arm = z1 - 0.4
     ys = (y - 0.06, y + 0.06)
     return [
-        massing.box(x - 0.06, x + 0.06, *ys, z0, z1),
-        massing.box(x - 0.35, x + 0.35, *ys, arm, arm + 0.12),
+        solids.box(x - 0.06, x + 0.06, *ys, z0, z1),
+        solids.box(x - 0.35, x + 0.35, *ys, arm, arm + 0.12),
     ]

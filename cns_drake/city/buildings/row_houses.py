@@ -14,12 +14,15 @@ from cns_drake.city.facades import (
     Openings,
     Patch,
     Roof,
+    WallFrame,
     Wing,
     add_chimney,
+    bay_windows,
     bays,
-    details,
+    boards,
     equip_roof,
-    massing,
+    outlines,
+    porches,
     roofs,
     wing_roofs,
     wing_walls,
@@ -84,7 +87,7 @@ class _HouseInARow(Building):
 
 def _add_unit(
     p: _HouseInARow,
-    area: massing.Area,
+    area: outlines.Area,
     blind: frozenset[int],
     part: str = "",
     door_material: str = "accent",
@@ -126,7 +129,7 @@ def _add_unit(
 
 
 def _wing_and_storeys(
-    p: _HouseInARow, area: massing.Area, blind: frozenset[int]
+    p: _HouseInARow, area: outlines.Area, blind: frozenset[int]
 ) -> tuple[Wing, int]:
     """Returns the wing of a house, and its storeys above `p.floor`."""
     x0, y0, x1, y1 = area
@@ -169,7 +172,7 @@ def _add_entrance(
     if p.floor > 0.05:
         slab = wall.standing(a, b, -0.05, landing, p.floor, bottom=True)
         p.add_to("base", slab)
-        details.add_steps(p, wall, a, b, landing, p.floor, run)
+        porches.add_steps(p, wall, a, b, landing, p.floor, run)
     if p.canopy:
         z = p.floor + 2.4
         p.add_to("trim", wall.box(x - 0.8, x + 0.8, -0.05, 0.8, z, z + 0.14))
@@ -201,7 +204,7 @@ def _add_bay(
     high = min(foot + low + count * step - 0.1, wing.wall_top - 0.6)
     reach = min(0.6, 0.5 * p.stoop)
     openings.clear(0, x - width / 2 - 0.1, x + width / 2 + 0.1, low, high + 0.5)
-    details.add_bay_window(
+    bay_windows.add_bay_window(
         p, wall, x, width, reach, round(low, 2), round(high, 2),
         storeys=count, canted=p.bay != "box",
     )  # fmt: skip
@@ -224,7 +227,7 @@ def _add_roof(p: _HouseInARow, wing: Wing) -> None:
         wing_roofs.add_dormers(p, wing, 0.0, wing.width, p.dormers, p.dormer)
 
 
-def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
+def _stepped_gable(wing: Wing, wall: WallFrame) -> list[Mesh]:
     """Returns the steps that rise to the middle of a gable."""
     middle = wing.width / 2
     rise = wing.top + 0.4 - wing.wall_top
@@ -248,8 +251,8 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
         wall = wing.wall(edge)
         for u in spots:
             pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wing_walls.GLASS_M)
-            frame = details.casings([pane], (pane.depth,), "frame", 0.12)
-            glass = details.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
+            frame = boards.casings([pane], (pane.depth,), "frame", 0.12)
+            glass = boards.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
             out.add_to("glass", wall.place(glass))
 
@@ -502,7 +505,7 @@ def _add_oriels(
         openings.clear(
             0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
         )
-        details.add_bay_window(
+        bay_windows.add_bay_window(
             p, wall, x, width, 0.6, low, high,
             storeys=max(1, upper - 1), canted=p.bay != "box",
         )  # fmt: skip

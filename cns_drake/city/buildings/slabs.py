@@ -13,10 +13,12 @@ from cns_drake.city.facades import (
     Facade,
     Relief,
     Site,
+    WallFrame,
+    balconies,
     bays,
-    details,
     equip_roof,
-    massing,
+    outlines,
+    solids,
     tiers,
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
@@ -58,10 +60,10 @@ class SlabTower(Building):
         stair, ends = (split, x1), (x0, split)
         if self.stair_left:
             stair, ends = ends, stair
-        slab = massing.rectangle(ends[0], front, ends[1], back)
+        slab = outlines.rectangle(ends[0], front, ends[1], back)
         top = _add_hall(self, slab)
         goal = self.height - _STAIR_RISE - _PARAPET
-        groups, per_group, storey = tiers.divided(
+        groups, per_group, storey = tiers.storey_groups(
             goal - top, self.storey_height, 7
         )
         walls = _storey(self, storey)
@@ -69,7 +71,7 @@ class SlabTower(Building):
         bands = (Band(0.0, 0.25, -0.12), Band(1.0, _PARAPET, -0.12))
         crown = Facade(_PARAPET, bands)
         tiers.add_crown(self, slab, crown, top, 0.9, items=_ROOF_ITEMS)
-        shaft = massing.rectangle(stair[0], front + 1.2, stair[1], back - 1.2)
+        shaft = outlines.rectangle(stair[0], front + 1.2, stair[1], back - 1.2)
         _add_stair(self, shaft)
         room = front - y0 if self.at_back else y1 - back
         if room > 9.0:
@@ -80,15 +82,15 @@ class SlabTower(Building):
 def _add_hall(p: SlabTower, slab: np.ndarray) -> float:
     """Adds a glazed hall behind the slab's pillars; returns its top [m]."""
     h = p.ground_height
-    hall = massing.inset(slab, (2.4, 0.4, 2.4, 0.4))
+    hall = outlines.inset(slab, (2.4, 0.4, 2.4, 0.4))
     pane = bays.ribbon(0.5, h - 0.6, 0.25, 0.3)
     glazing = bays.rhythm(p.pitch, [pane], margin=0.6)
     door = bays.with_middle(glazing, bays.entrance(2.2, 2.8, 0.6), 4.0)
     layout = bays.by_edge({0: door, 2: door}, glazing)
     walls = Facade(h, (Band(0.0, 0.5, -0.1),), layout, (0.25,))
-    pieces = [massing.flat(slab, h, up=False)]
+    pieces = [solids.flat(slab, h, up=False)]
     for edge in (0, 2):
-        wall = details.WallFrame(slab, edge)
+        wall = WallFrame(slab, edge)
         for a, b in bays.stretches(wall.length, 1.2 * p.pitch, 0.3):
             x = round((a + b) / 2, 2)
             pieces.append(wall.standing(x - 0.3, x + 0.3, -1.5, -0.2, h))
@@ -113,7 +115,11 @@ def _add_stair(p: SlabTower, shaft: np.ndarray) -> None:
     """Adds a stair tower beside the slab, with a window slit of full height."""
     slit = bays.window(1.2, 1.0, p.height - 2.0, 0.3)
     walls = tiers.shaft_walls(p.height, slit, slit, 2.0, (0.5, 0.15))
-    p.add("stairs", massing.foundation(shaft), tiers.block(shaft, walls, 0.0))
+    p.add(
+        "stairs",
+        solids.foundation(shaft),
+        tiers.lidded_walls(shaft, walls, 0.0),
+    )
 
 
 def _add_pavilion(p: SlabTower, xs: bays.Span, ys: bays.Span) -> None:
@@ -121,7 +127,7 @@ def _add_pavilion(p: SlabTower, xs: bays.Span, ys: bays.Span) -> None:
     width = 0.55 * (xs[1] - xs[0])
     left = xs[0] if p.stair_left else xs[1] - width
     depth = min(ys[1] - ys[0], 14.0)
-    plan = massing.rectangle(left, ys[0], left + width, ys[0] + depth)
+    plan = outlines.rectangle(left, ys[0], left + width, ys[0] + depth)
     h = p.pavilion_height
     pane = bays.ribbon(0.4, h - 1.3, 0.5, 0.35)
     glazing = bays.rhythm(2.8, [pane], margin=0.5)
@@ -129,7 +135,7 @@ def _add_pavilion(p: SlabTower, xs: bays.Span, ys: bays.Span) -> None:
     bands = (Band(h - 0.9, h - 0.4, -0.9), Band(h - 0.4, h, 0.0))
     walls = Facade(h, bands, layout, (0.5,))
     tiers.add_ground(p, plan, walls, part="pavilion")
-    p.add("pavilion_roof", massing.roof_pan(plan, h - 0.4, h, 0.25))
+    p.add("pavilion_roof", solids.roof_pan(plan, h - 0.4, h, 0.25))
 
 
 # Room for balconies in front, and for canopies [m].
@@ -181,7 +187,7 @@ class BalconyFlats(Building):
         walls = [_Front(self, plan, edge) for edge in fronts]
         ground = _facade(self, storey, walls, ground=True)
         top = tiers.add_ground(self, plan, ground)
-        count, per_group, exact = tiers.divided(
+        count, per_group, exact = tiers.storey_groups(
             (storeys - 1 - lower) * storey, storey, 5
         )
         facade = _facade(self, exact, walls)
@@ -217,7 +223,7 @@ def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
     bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
     fronts = [y0 + _FRONT_M + p.stagger * (k % 2) for k in range(p.sections)]
     return [
-        massing.rectangle(a, round(y, 2), b, round(y + p.depth, 2))
+        outlines.rectangle(a, round(y, 2), b, round(y + p.depth, 2))
         for (a, b), y in zip(itertools.pairwise(bounds), fronts, strict=True)
     ]
 
@@ -274,7 +280,7 @@ def _add_balconies(
                 width = min(width, p.balcony_width)
             x = (a + b) / 2
             ends = round(x - width / 2, 2), round(x + width / 2, 2)
-            balcony = details.balcony(*ends, p.balcony_reach, 0.0, p.rail)
+            balcony = balconies.balcony(*ends, p.balcony_reach, 0.0, p.rail)
             pieces += [
                 front.wall.place(balcony, k * storey) for k in range(per_group)
             ]
@@ -331,7 +337,7 @@ class _Front:
 
     def __init__(self, p: BalconyFlats, plan: np.ndarray, edge: int) -> None:
         self.edge = edge
-        self.wall = details.WallFrame(plan, edge)
+        self.wall = WallFrame(plan, edge)
         self.cells = bays.stretches(self.wall.length, p.pitch, 0.5)
         self.middle = len(self.cells) // 2
         free = [k for k in range(len(self.cells)) if k != self.middle]
@@ -401,10 +407,10 @@ class GalleryFlats(Building):
         )
         a = x0 + self.stair_width * self.stair_left
         b = x1 - self.stair_width * (not self.stair_left)
-        slab = massing.rectangle(a, round(front, 2), b, round(back, 2))
+        slab = outlines.rectangle(a, round(front, 2), b, round(back, 2))
         open_edge = 0 if self.gallery_front else 2
         goal = self.height - 2.2 - self.ground
-        groups, per_group, storey = tiers.divided(goal, self.storey, 6)
+        groups, per_group, storey = tiers.storey_groups(goal, self.storey, 6)
         top = _add_ground(self, slab)
         walls = _gallery_flats_storey(self, storey, open_edge)
         top = tiers.add_storeys(self, slab, walls, top, groups, per_group)
@@ -417,7 +423,7 @@ class GalleryFlats(Building):
         left = x0 if self.stair_left else b - 0.05
         right = left + self.stair_width + 0.05
         low, high = slab[0, 1] + 0.8, slab[2, 1] - 0.8
-        shaft = massing.rectangle(left, low, right, high)
+        shaft = outlines.rectangle(left, low, right, high)
         _add_gallery_flats_stair(self, shaft)
 
 
@@ -469,12 +475,14 @@ def _add_galleries(
     p: GalleryFlats, slab: np.ndarray, edge: int, stack: tuple[int, int, float]
 ) -> None:
     """Adds a gallery to each storey, with continuous posts, and screens."""
-    wall = details.WallFrame(slab, edge)
+    wall = WallFrame(slab, edge)
     end = wall.length
     reach = p.gallery - 0.05
     groups, per_group, storey = stack
     storeys, step = groups * per_group, per_group * storey
-    gallery = wall.place(details.balcony(0.02, end - 0.02, reach, 0.0, p.rail))
+    gallery = wall.place(
+        balconies.balcony(0.02, end - 0.02, reach, 0.0, p.rail)
+    )
     group = (gallery.moved((0.0, 0.0, k * storey)) for k in range(per_group))
     p.stack("gallery", merge_meshes(*group), p.ground, step, groups)
     top = p.ground + storeys * storey
@@ -499,5 +507,5 @@ def _add_gallery_flats_stair(p: GalleryFlats, shaft: np.ndarray) -> None:
     slit = bays.window(1.4, 2.8, p.height - 1.0, 0.25)
     entry = bays.window(1.6, 0.0, p.height - 1.0, 0.25)
     walls = tiers.shaft_walls(p.height, entry, slit, 2.4, (0.4, 0.08))
-    body = tiers.block(shaft, walls, 0.0)
-    p.add("stair", massing.foundation(shaft), body, finish=p.colours["panel"])
+    body = tiers.lidded_walls(shaft, walls, 0.0)
+    p.add("stair", solids.foundation(shaft), body, finish=p.colours["panel"])

@@ -9,10 +9,14 @@ from cns_drake.city.facades import (
     Building,
     Facade,
     Relief,
+    WallFrame,
+    balconies,
     bays,
-    details,
+    canopies,
     equip_roof,
-    massing,
+    outlines,
+    piers,
+    solids,
     tiers,
 )
 from cns_drake.city.geometry import Finish
@@ -23,7 +27,9 @@ _MOST_FLIGHTS = 8
 # Numbers of the corners of a rectangle at which a corner building stands.
 _FRONT_LEFT = 0
 _FRONT_RIGHT = 1
-# Of fire stairs.
+# Height of the shared mesh of fire stairs, which is scaled to the storey [m].
+_FIRE_STAIRS_STOREY_M = 3.4
+# Finish of fire stairs.
 _IRON = Finish((0.2, 0.2, 0.22))
 
 
@@ -70,7 +76,9 @@ class BrickBlock(Building):
         outline, blind = self.site.outline, self.site.blind_edges
         bottom = _add_shops(self)
         room = self.height - self.ground_height - (self.parapet + 1.4)
-        groups, per_group, storey = tiers.divided(room, self.storey_height)
+        groups, per_group, storey = tiers.storey_groups(
+            room, self.storey_height
+        )
         sash = bays.window(
             self.window_width, self.sill, min(self.head, storey - 0.5),
             self.recess, mullions=self.mullions, transom=self.transom,
@@ -81,7 +89,7 @@ class BrickBlock(Building):
         walls = Facade(storey, (course,), layout, (self.recess,), blind)
         top = tiers.add_storeys(self, outline, walls, bottom, groups, per_group)
         if self.pilasters:
-            strips = details.pilasters(
+            strips = piers.pilasters(
                 outline, self.pitch, 0.9, 3, 0.5, 0.2, bottom, top, blind
             )
             self.add("pilasters", strips)
@@ -96,13 +104,13 @@ class BrickBlock(Building):
             self, outline, frieze, top, self.parapet, items=self.roof_items
         )
         if self.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
-            wall = details.WallFrame(outline, self.stairs_edge)
+            wall = WallFrame(outline, self.stairs_edge)
             _add_fire_stairs(self, wall, bottom, storey, top)
 
 
 def _add_shops(p: BrickBlock) -> float:
     outline, h = p.site.outline, p.ground_height
-    front = details.WallFrame(outline, 0)
+    front = WallFrame(outline, 0)
     shops = bays.rhythm(2 * p.pitch, [bays.shop_front(h - 1.1)], margin=0.6)
     window = bays.window(p.window_width, 1.4, 2.9, p.recess)
     back = bays.rhythm(p.pitch, [window], margin=0.8)
@@ -118,16 +126,16 @@ def _add_shops(p: BrickBlock) -> float:
         if b < middle - 1.7 or a > middle + 1.7
     ]
     shape = (0.4, 1.2, 2.6, h - 0.9)
-    shades = details.awnings(front, cells, p.rng, 0.6, shape)
-    tiers.add_awnings(p, shades)
-    roof = details.front_canopy(outline, 1.5, 1.3, 3.1)
+    shades = canopies.awnings(front, cells, p.rng, 0.6, shape)
+    canopies.add_awnings(p, shades)
+    roof = canopies.front_canopy(outline, 1.5, 1.3, 3.1)
     ground = Facade(h, bands, layout, glass, blind)
     return tiers.add_ground(p, outline, ground, [roof])
 
 
 def _add_fire_stairs(
     p: BrickBlock,
-    wall: details.WallFrame,
+    wall: WallFrame,
     bottom: float,
     storey: float,
     top: float,
@@ -135,7 +143,7 @@ def _add_fire_stairs(
     if wall.length < 9.0:
         return
     x, y = wall.point(2.8 + p.stairs_at * (wall.length - 5.6), 0.0)
-    scale = (1.0, 1.0, round(storey / details.FIRE_STAIRS_STOREY_M, 3))
+    scale = (1.0, 1.0, round(storey / _FIRE_STAIRS_STOREY_M, 3))
     shape = p.shared("fire_stairs_flight", scale)
     for k in range(round((top - bottom) / storey) - 1):
         spot = (x, y, bottom + k * storey)
@@ -183,12 +191,14 @@ class CornerBuilding(Building):
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)
         rectangle = site.outline
-        plan = massing.rounded(rectangle, {self.corner: self.radius}, 2.8)
-        blind = massing.edges_on(plan, rectangle, site.blind_edges)
+        plan = outlines.rounded(rectangle, {self.corner: self.radius}, 2.8)
+        blind = outlines.edges_on(plan, rectangle, site.blind_edges)
         bottom = _add_corner_building_shops(self, plan, blind)
         top = _add_first_floor(self, plan, blind, bottom)
         room = self.height - self.dome_height - 2.2 - top
-        groups, per_group, storey = tiers.divided(room, self.storey_height)
+        groups, per_group, storey = tiers.storey_groups(
+            room, self.storey_height
+        )
         window = bays.window(
             self.window_width, 0.8, storey - 0.7, self.recess, hood=self.hood
         )
@@ -198,7 +208,7 @@ class CornerBuilding(Building):
         )
         top = tiers.add_storeys(self, plan, walls, top, groups, per_group)
         if self.pilasters:
-            strips = details.pilasters(
+            strips = piers.pilasters(
                 plan, self.pitch, 0.3, 2, 0.5, 0.16, bottom, top, blind
             )
             self.add("pilasters", strips)
@@ -207,7 +217,7 @@ class CornerBuilding(Building):
         self.add("dome", *_dome(self, plan, roof), finish=self.colours["roof"])
         x0, y0, x1, y1 = site.bounds
         if y1 - y0 - 2 * self.radius > 5.0:
-            free = massing.rectangle(x0, y0 + 2 * self.radius, x1, y1)
+            free = outlines.rectangle(x0, y0 + 2 * self.radius, x1, y1)
             equip_roof(self, free, roof, _ROOF_ITEMS)
 
 
@@ -232,10 +242,10 @@ def _add_corner_building_shops(
         return (service if along[0] < -0.1 else shops)(edge, length)
 
     bands = (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15))
-    front = details.WallFrame(plan, 0)
+    front = WallFrame(plan, 0)
     cells = bays.stretches(front.length, 2 * p.pitch, 0.35)
     shape = (0.3, 1.3, 2.7, h - 1.2)
-    tiers.add_awnings(p, details.awnings(front, cells, p.rng, 0.5, shape))
+    canopies.add_awnings(p, canopies.awnings(front, cells, p.rng, 0.5, shape))
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.4,), blind))
 
 
@@ -255,11 +265,11 @@ def _add_first_floor(
     floor = Facade(h, (Band(h - 0.4, h, -0.18),), layout, (p.recess,), blind)
     rails: list[Mesh] = []
     for edge in fronts if p.balcony else ():
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         cells = bays.stretches(wall.length, p.pitch, 0.3)
         for a, b in cells[len(cells) // 3 :: 3] if edge not in blind else ():
             x = round((a + b) / 2, 2)
-            rail = details.balcony(x - 0.9, x + 0.9, 0.8, 0.25, 0.9)
+            rail = balconies.balcony(x - 0.9, x + 0.9, 0.8, 0.25, 0.9)
             rails.append(wall.place(rail))
     return tiers.add_storeys(p, plan, floor, z0, 1, 1, rails, part="main_floor")
 
@@ -280,30 +290,30 @@ def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     drum_top = round(z0 + 0.4 * height, 2)
 
     def ring(radius: float) -> np.ndarray:
-        return massing.regular_polygon(radius, 12, center)
+        return outlines.regular_polygon(radius, 12, center)
 
     wall = drum_top - z0
     bands = (Band(0.9, wall - 0.7, 0.25), Band(wall - 0.35, wall, -0.3))
     posts = bays.rhythm(4.0, [bays.bar(0.4, 0.9, wall - 0.7, 0.0)], 0.1)
-    pieces = [tiers.block(ring(r), Facade(wall, bands, posts), z0)]
+    pieces = [tiers.lidded_walls(ring(r), Facade(wall, bands, posts), z0)]
     rise = top - drum_top
     if p.dome == "cone":
-        return [*pieces, massing.spire(ring(r), center, drum_top, top)]
+        return [*pieces, solids.spire(ring(r), center, drum_top, top)]
     share = 0.85 if p.dome == "dome" else 0.6
     angles = np.linspace(0.0, 0.4 * np.pi, 5)
     radii = r * np.cos(angles)
     heights = drum_top + share * rise * np.sin(angles)
     profile = list(zip(radii, heights, strict=True))
-    pieces.append(massing.revolved(profile, 12, center))
+    pieces.append(solids.revolved(profile, 12, center))
     lid = heights[-1]
     tip = ring(radii[-1])
     if p.dome == "lantern":
         core = ring(0.6 * radii[-1])
         middle = lid + 0.55 * (top - lid)
-        pieces.append(massing.prism(core, lid, middle))
-        pieces.append(massing.flat(tip, middle, up=False))
+        pieces.append(solids.prism(core, lid, middle))
+        pieces.append(solids.flat(tip, middle, up=False))
         lid = middle
-    return [*pieces, massing.spire(tip, center, lid, top)]
+    return [*pieces, solids.spire(tip, center, lid, top)]
 
 
 def _is_front(plan: np.ndarray, edge: int) -> bool:
@@ -367,15 +377,15 @@ class Office(Building):
         edge = Facade(rim, bands, plain=blind)
         roof = tiers.add_crown(self, outline, edge, top, self.parapet)
         if self.penthouse_height > 0:
-            inset = min(self.penthouse_inset, massing.inset_limit(outline))
-            outline = massing.inset(outline, inset)
+            inset = min(self.penthouse_inset, outlines.inset_limit(outline))
+            outline = outlines.inset(outline, inset)
             roof = _add_penthouse(self, outline, roof)
         equip_roof(self, outline, roof, self.roof_items)
 
 
 def _add_ground(p: Office) -> float:
     outline, h = p.site.outline, p.ground_height
-    front = details.WallFrame(outline, 0)
+    front = WallFrame(outline, 0)
     pitch = 1.6 * p.pitch
     shop = bays.shop_front(h - 1.1, 0.5, door=False)
     shops = bays.rhythm(pitch, [shop], margin=0.7)
@@ -387,14 +397,14 @@ def _add_ground(p: Office) -> float:
     ground = Facade(h, bands, layout, (0.5,), p.site.blind_edges)
     cells = bays.stretches(front.length, pitch, 0.7)
     shape = (0.3, 1.3, 2.7, h - 1.1)
-    shades = details.awnings(front, cells, p.rng, p.awnings, shape, 2.6)
-    tiers.add_awnings(p, shades)
-    roof = details.front_canopy(outline, 2.6, 1.45, 3.4)
+    shades = canopies.awnings(front, cells, p.rng, p.awnings, shape, 2.6)
+    canopies.add_awnings(p, shades)
+    roof = canopies.front_canopy(outline, 2.6, 1.45, 3.4)
     return tiers.add_ground(p, outline, ground, [roof])
 
 
 def _add_windows(p: Office, z0: float, goal: float) -> float:
-    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height)
+    groups, per_group, storey = tiers.storey_groups(goal - z0, p.storey_height)
     head = round(storey - 0.4, 2)
     bands: tuple[Band, ...] = ()
     if p.style == "ribbon":
@@ -458,13 +468,15 @@ class CornerStore(Building):
             site = site.detached(self.kind.overhang)
         rectangle = site.outline
         plan, front = _cut_rectangle(self, rectangle)
-        blind = massing.edges_on(plan, rectangle, site.blind_edges)
+        blind = outlines.edges_on(plan, rectangle, site.blind_edges)
         along = -1 if self.corner == _FRONT_LEFT else 1
         side = (front + along) % 5
         top = _add_shop(self, plan, (0, front, side), blind)
         room = self.height - (self.raised + 0.6) - top
         if room > 2.4:
-            groups, per_group, storey = tiers.divided(room, self.storey, 4)
+            groups, per_group, storey = tiers.storey_groups(
+                room, self.storey, 4
+            )
             head = min(2.3, storey - 0.35)
             window = bays.window(
                 self.window_width, 0.85, head, self.recess, ledge=self.ledge
@@ -473,7 +485,7 @@ class CornerStore(Building):
             walls = Facade(storey, (), rows, (self.recess,), blind)
             top = tiers.add_storeys(self, plan, walls, top, groups, per_group)
         _add_parapet(self, plan, front, top, blind)
-        wall = details.WallFrame(plan, front)
+        wall = WallFrame(plan, front)
         self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
 
 
@@ -514,7 +526,7 @@ def _add_shop(
     bands = (Band(0.0, 0.3, -0.05), Band(h - 0.25, h, -0.12))
     shades, boards = [], []
     for edge in streets:
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         if edge == front or edge in blind:
             continue
         cells = bays.stretches(wall.length, pitch, 0.5)
@@ -522,8 +534,8 @@ def _add_shop(
             spot = (a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7)
             boards.append(wall.box(*spot))
         shape = (0.2, 0.95, 2.4, head + 0.05)
-        shades += details.awnings(wall, cells, p.rng, p.awnings, shape)
-    tiers.add_awnings(p, shades)
+        shades += canopies.awnings(wall, cells, p.rng, p.awnings, shape)
+    canopies.add_awnings(p, shades)
     p.add("boards", *boards, finish=p.colours["sign"])
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.3,), blind))
 
@@ -540,13 +552,13 @@ def _add_parapet(
     bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
     crown = Facade(rim, bands, plain=blind)
     roof = tiers.add_crown(p, plan, crown, z0, 0.5, thickness=0.25)
-    wall = details.WallFrame(plan, front)
+    wall = WallFrame(plan, front)
     piece = (0.1, wall.length - 0.1, -0.25, 0.04, z0 + rim - 0.3, p.height)
     p.add("pediment", wall.box(*piece))
     equip_roof(p, plan, roof, p.roof_items)
 
 
-def _corner_sign(p: CornerStore, wall: details.WallFrame) -> list[Mesh]:
+def _corner_sign(p: CornerStore, wall: WallFrame) -> list[Mesh]:
     """Returns a canopy above the door and an upright sign over it."""
     middle, z = wall.length / 2, p.ground - 0.55
     half = 0.5 * wall.length - 0.25

@@ -8,9 +8,13 @@ from cns_drake.city.facades import (
     Band,
     Building,
     Facade,
+    WallFrame,
+    balconies,
     bays,
-    details,
-    massing,
+    canopies,
+    outlines,
+    piers,
+    solids,
     tiers,
 )
 from cns_drake.city.geometry import Finish
@@ -59,7 +63,7 @@ class ArtDecoTower(Building):
         The building's site must be a rectangle.
         """
         base = self.site.outline
-        plan = massing.notched(base, self.notch) if self.notch else base
+        plan = outlines.notched(base, self.notch) if self.notch else base
         top = _add_ground(self, plan)
         crown_height = round(min(0.16 * self.height, 16.0), 1)
         across = along = 0.0
@@ -75,8 +79,8 @@ class ArtDecoTower(Building):
             tiers.add_crown(self, plan, parapet, top, 1.1, part=part)
             across, along = across + a, along + b
             step = (round(across, 1), round(along, 1)) * 2
-            plan = massing.inset(base, step)
-            plan = massing.notched(plan, self.notch) if self.notch else plan
+            plan = outlines.inset(base, step)
+            plan = outlines.notched(plan, self.notch) if self.notch else plan
         goal = round(self.height - crown_height, 1)
         part = f"tier_{k + 1}"
         top = tiers.add_grooved(self, plan, self.grooves, top, goal, part, 1.7)
@@ -90,7 +94,7 @@ def _add_ground(p: ArtDecoTower, plan: np.ndarray) -> float:
     arches = bays.rhythm(1.7 * p.grooves.pitch, [arch], margin=1.4)
     bands = (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3))
     layout = bays.with_door(arches, portal, p.portal_width + 2.0)
-    roof = details.front_canopy(plan, 2.4, 1.4, 3.6)
+    roof = canopies.front_canopy(plan, 2.4, 1.4, 3.6)
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.5,)), [roof])
 
 
@@ -98,13 +102,15 @@ def _add_crown(p: ArtDecoTower, plan: np.ndarray, z0: float) -> None:
     pieces = []
     height = p.height - z0
     step = round((1.0 - p.spire) * height / p.crown_steps, 2)
-    side = massing.shortest_side(plan)
+    side = outlines.shortest_side(plan)
     bands = (Band(0.6, 0.5 * step, 0.25), Band(step - 0.4, step, -0.25))
     for k in range(p.crown_steps):
-        pieces.append(tiers.block(plan, Facade(step, bands), z0 + k * step))
-        plan = massing.inset(plan, 0.28 * side / p.crown_steps)
+        pieces.append(
+            tiers.lidded_walls(plan, Facade(step, bands), z0 + k * step)
+        )
+        plan = outlines.inset(plan, 0.28 * side / p.crown_steps)
     z = z0 + p.crown_steps * step
-    pieces.append(massing.spire(plan, np.mean(plan, axis=0), z, z0 + height))
+    pieces.append(solids.spire(plan, np.mean(plan, axis=0), z, z0 + height))
     p.add("crown", *pieces)
 
 
@@ -160,10 +166,10 @@ class GlassSkyscraper(Building):
         base = self.site.outline
         plan = _shaped(self, base)
         top = _add_lobby(self, plan)
-        reach = massing.shortest_side(base)
+        reach = outlines.shortest_side(base)
         total = np.zeros(len(base))
         if len(base) != 4:
-            reach = min(0.08 * reach, 0.5 * massing.inset_limit(base))
+            reach = min(0.08 * reach, 0.5 * outlines.inset_limit(base))
         for k, (start, share, jitter) in enumerate(self.setbacks):
             goal = round((start + jitter) * self.height, 1)
             part = f"tier_{k}"
@@ -173,7 +179,7 @@ class GlassSkyscraper(Building):
             terrace = Facade(1.1, (Band(0.8, 1.1, -0.1),))
             tiers.add_crown(self, plan, terrace, top, 1.0, part=f"terrace_{k}")
             total = total + np.round(share * reach, 1)
-            plan = _shaped(self, massing.inset(base, total))
+            plan = _shaped(self, outlines.inset(base, total))
         rise = self.crown_height if self.crown == "screen" else 0.0
         goal = self.height - self.crown_height
         part = "tier_top"
@@ -182,20 +188,20 @@ class GlassSkyscraper(Building):
 
 
 def _shaped(p: GlassSkyscraper, outline: np.ndarray) -> np.ndarray:
-    side = massing.shortest_side(p.site.outline)
+    side = outlines.shortest_side(p.site.outline)
     size = round(p.corner_size * side, 1)
     if p.corners == "chamfered":
-        return massing.chamfered(outline, size)
+        return outlines.chamfered(outline, size)
     if p.corners == "notched":
-        return massing.notched(outline, 0.6 * size)
+        return outlines.notched(outline, 0.6 * size)
     if p.corners == "rounded":
         corners = dict.fromkeys(range(len(outline)), size)
-        return massing.rounded(outline, corners, 3.5)
+        return outlines.rounded(outline, corners, 3.5)
     return outline
 
 
 def _add_lobby(p: GlassSkyscraper, plan: np.ndarray) -> float:
-    height, length = p.lobby_height, details.WallFrame(plan, 0).length
+    height, length = p.lobby_height, WallFrame(plan, 0).length
     door = bays.entrance(min(5.0, length / 3), 3.6, 1.6)
     bar = bays.bar(0.12, 0.0, height - 0.8, 0.4)
     mullions = bays.rhythm(2 * p.grooves.pitch, [bar], margin=1.0)
@@ -205,11 +211,11 @@ def _add_lobby(p: GlassSkyscraper, plan: np.ndarray) -> float:
         Band(height - 0.8, height - 0.5, -0.25),
     )
     layout = bays.with_door(mullions, door, 7.0)
-    columns = details.piers(
+    columns = piers.wall_piers(
         plan, 7.0, 0.9, 0.25, 0.0, height - 0.8, depth=0.75, margin=0.55,
         entrance=min(5.8, length / 2),
     )  # fmt: skip
-    roof = details.front_canopy(plan, 4.0, 1.5, 4.2)
+    roof = canopies.front_canopy(plan, 4.0, 1.5, 4.2)
     lobby = Facade(height, bands, layout, (0.7,))
     return tiers.add_ground(p, plan, lobby, [columns, roof])
 
@@ -219,14 +225,14 @@ def _add_glass_skyscraper_crown(
 ) -> None:
     height = round(p.height - z0, 3)
     if p.crown == "wedge":
-        p.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
+        p.add("crown", solids.sloped_prism(plan, z0, height, 0.35))
         return
     if p.crown == "stepped":
         low = round(0.45 * height, 2)
         ledge = Facade(low, (Band(low - 0.5, low, -0.3),))
         tiers.add_crown(p, plan, ledge, z0, 1.0, part="crown_low")
-        reach = 0.12 * massing.shortest_side(plan)
-        plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
+        reach = 0.12 * outlines.shortest_side(plan)
+        plan = outlines.inset(plan, min(reach, outlines.inset_limit(plan)))
         z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
     louvres = tuple(
         Band(z, z + 0.5, 0.2)
@@ -270,16 +276,18 @@ class Hotel(Building):
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + _FORECOURT_M
         if self.round_ends:
-            plan = massing.stadium(x0, front, x1, y1, 3.2)
+            plan = outlines.stadium(x0, front, x1, y1, 3.2)
         else:
-            block = massing.rectangle(x0, front, x1, y1)
-            plan = massing.rounded(block, {0: self.corner, 1: self.corner}, 2.8)
+            block = outlines.rectangle(x0, front, x1, y1)
+            plan = outlines.rounded(
+                block, {0: self.corner, 1: self.corner}, 2.8
+            )
         top = _add_hotel_lobby(self, plan, y0)
         goal = self.height - self.bar_height - 1.2
         top = _add_rooms(self, plan, top, goal)
         edge = Facade(1.2, (Band(0.0, 0.3, -0.15), Band(0.9, 1.2, -0.2)))
         roof = tiers.add_crown(self, plan, edge, top, 1.1)
-        bar = massing.inset(plan, self.bar_inset)
+        bar = outlines.inset(plan, self.bar_inset)
         h = round(self.height - roof, 3)
         bands = (Band(0.4, h - 1.2, 0.3), Band(h - 0.9, h - 0.5, -1.3))
         walls = Facade(h, bands, glass=(0.3,))
@@ -300,13 +308,13 @@ def _add_hotel_lobby(p: Hotel, plan: np.ndarray, y0: float) -> float:
     left = middle - 6.0
     right = middle + 6.0
     z = 4.2
-    roof = massing.box(left, right, y0 + 0.3, front + 0.2, z, z + 0.7)
+    roof = solids.box(left, right, y0 + 0.3, front + 0.2, z, z + 0.7)
     pillars = [
-        massing.standing(x, x + 0.7, y, y + 0.7, z)
+        solids.standing(x, x + 0.7, y, y + 0.7, z)
         for x in (left + 0.6, right - 1.3)
         for y in (y0 + 0.8, front - 2.0)
     ]
-    drive = massing.standing(
+    drive = solids.standing(
         middle - 2.8, middle + 2.8, front - 2.2, front, 0.14
     )
     lobby = Facade(h, bands, layout, (0.4,))
@@ -314,7 +322,9 @@ def _add_hotel_lobby(p: Hotel, plan: np.ndarray, y0: float) -> float:
 
 
 def _add_rooms(p: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
-    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height, 15)
+    groups, per_group, storey = tiers.storey_groups(
+        goal - z0, p.storey_height, 15
+    )
     head = round(storey - 0.45, 2)
     french = bays.window(p.pitch - 1.2, 0.0, head, p.recess, mullions=1)
     plain = bays.window(1.5, 0.8, head, p.recess)
@@ -323,20 +333,20 @@ def _add_rooms(p: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
     layout = bays.by_edge(front_rooms, others)
     band = Band(storey - 0.12, storey, -0.08)
     walls = Facade(storey, (band,), layout, (p.recess,))
-    front = details.WallFrame(plan, 0)
-    balconies = []
+    front = WallFrame(plan, 0)
+    rails = []
     for a, b in bays.stretches(front.length, p.pitch, 0.4):
         half = p.balcony_width / 2
         x = (a + b) / 2
         ends = round(x - half, 2), round(x + half, 2)
-        rail = details.balcony(*ends, p.balcony_reach, 0.0, p.rail)
-        balconies.append(front.place(rail))
-    return tiers.add_storeys(p, plan, walls, z0, groups, per_group, balconies)
+        rail = balconies.balcony(*ends, p.balcony_reach, 0.0, p.rail)
+        rails.append(front.place(rail))
+    return tiers.add_storeys(p, plan, walls, z0, groups, per_group, rails)
 
 
 def _add_sign(p: Hotel, plan: np.ndarray) -> None:
     """Adds an upright sign to the front, at one end of the balconies."""
-    front = details.WallFrame(plan, 0)
+    front = WallFrame(plan, 0)
     x = 0.4 if p.sign_left else front.length - 0.4
     low, high = p.ground_height + 3.0, 0.7 * p.height
     blade = front.box(x - 0.15, x + 0.15, 0.25, 1.3, low, high)
@@ -402,17 +412,17 @@ class PodiumTower(Building):
         left = round(x0 + self.at[0] * (x1 - x0 - width), 2)
         near = round(y0 + self.at[1] * (y1 - y0 - depth), 2)
         right, far = round(left + width, 2), round(near + depth, 2)
-        plan = massing.rectangle(left, near, right, far)
+        plan = outlines.rectangle(left, near, right, far)
         _add_garden(self, plan, roof)
         if self.chamfer:
-            plan = massing.chamfered(plan, self.chamfer)
+            plan = outlines.chamfered(plan, self.chamfer)
         self.walls = self.tower_walls
         _add_tower(self, plan, roof)
 
 
 def _add_shops(p: PodiumTower) -> float:
     outline, h = p.site.outline, p.ground_height
-    front = details.WallFrame(outline, 0)
+    front = WallFrame(outline, 0)
     pitch = p.shop_pitch
     choices = [bays.shop_front(h - 0.6, 0.45, door=d) for d in (True, False)]
     shops = bays.rhythm(pitch, choices, margin=0.8)
@@ -423,9 +433,9 @@ def _add_shops(p: PodiumTower) -> float:
     bands = (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2))
     cells = bays.stretches(front.length, pitch, 0.8)
     shape = (0.4, 1.35, 2.7, h - 1.3)
-    shades = details.awnings(front, cells, p.rng, p.awnings, shape, 3.2)
-    tiers.add_awnings(p, shades)
-    roof = details.front_canopy(outline, 3.2, 1.45, 4.0)
+    shades = canopies.awnings(front, cells, p.rng, p.awnings, shape, 3.2)
+    canopies.add_awnings(p, shades)
+    roof = canopies.front_canopy(outline, 3.2, 1.45, 4.0)
     facade = Facade(h, bands, layout, (0.45,))
     return tiers.add_ground(p, outline, facade, [roof])
 
@@ -439,7 +449,7 @@ def _podium_storey(p: PodiumTower) -> Facade:
 
 def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
     room = p.height - 3.0 - z0
-    groups, per_group, storey = tiers.divided(room, p.storey_height)
+    groups, per_group, storey = tiers.storey_groups(room, p.storey_height)
     # Deep frames, one bay wide, with the glass at their backs.
     frame = bays.window(
         1e3, round(p.frame / 2, 2), round(storey - p.frame / 2, 2), p.recess,
@@ -449,10 +459,10 @@ def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
     walls = Facade(storey, (), layout, (p.recess,))
     extras = []
     for edge in range(len(plan)) if p.balconies else ():
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         if wall.length > 3 * p.pitch:
             x = 0.5 + p.pitch
-            extras.append(wall.place(details.balcony(x - 2.6, x, 1.4, 0.0)))
+            extras.append(wall.place(balconies.balcony(x - 2.6, x, 1.4, 0.0)))
     top = tiers.add_storeys(p, plan, walls, z0, groups, per_group, extras)
     crown = round(p.height - top, 3)
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
@@ -489,14 +499,14 @@ def _garden(length: float, width: float) -> Mesh:
         for u in (0.1, 0.32, 0.54, 0.76)
     )
     places = [round(u * length, 2) for u in np.linspace(0.25, 0.75, 7)]
-    beams = (massing.box(x, x + 0.15, 1.5, width, 2.6, 2.85) for x in places)
+    beams = (solids.box(x, x + 0.15, 1.5, width, 2.6, 2.85) for x in places)
     posts = (
         (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
         for x in (places[0], places[-1])
         for y in (1.6, width - 0.2)
     )
     return merge_meshes(
-        *(massing.box(*spot, bottom=False) for spot in planters),
+        *(solids.box(*spot, bottom=False) for spot in planters),
         *beams,
-        *(massing.box(*spot, bottom=False) for spot in posts),
+        *(solids.box(*spot, bottom=False) for spot in posts),
     )

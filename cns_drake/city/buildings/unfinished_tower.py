@@ -8,11 +8,12 @@ from cns_drake.city.facades import (
     Band,
     Building,
     Facade,
+    WallFrame,
     bays,
-    details,
     facade_mesh,
     glass_mesh,
-    massing,
+    outlines,
+    solids,
 )
 from cns_drake.city.geometry import Finish, Mesh, merge_meshes
 
@@ -63,8 +64,8 @@ class UnfinishedTower(Building):
 
         The building's site must be a rectangle.
         """
-        site = massing.rectangle(*self.site.bounds)
-        plan = np.round(massing.inset(site, _SCAFFOLD_M + 0.2), 2)
+        site = outlines.rectangle(*self.site.bounds)
+        plan = np.round(outlines.inset(site, _SCAFFOLD_M + 0.2), 2)
         _add_frame(self, plan)
         _add_core(self, plan)
         if self.clad:
@@ -76,9 +77,11 @@ class UnfinishedTower(Building):
             _add_hoist(self, plan)
 
 
-def _column_places(p: UnfinishedTower, plan: np.ndarray) -> list[massing.Point]:
+def _column_places(
+    p: UnfinishedTower, plan: np.ndarray
+) -> list[outlines.Point]:
     """Returns the places of the columns."""
-    x0, y0, x1, y1 = massing.extent(plan)
+    x0, y0, x1, y1 = outlines.extent(plan)
     places = []
     for a, b in ((x0, x1), (y0, y1)):
         count = min(6, max(2, round((b - a) / p.pitch) + 1))
@@ -92,17 +95,17 @@ def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
     columns = _column_places(p, plan)
     low = p.storey - _SLAB_M
     top = p.storeys * p.storey
-    pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
-    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
+    pieces = [solids.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
+    pieces.append(solids.prism(plan, low, p.storey, bottom=True))
     # The stubs of the next storey's columns, and their reinforcing bars.
-    stubs = [massing.prism(plan, -massing.FOUNDATION_M, 0.05)]
+    stubs = [solids.prism(plan, -solids.FOUNDATION_M, 0.05)]
     for x, y in columns:
         foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
-        bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
-        stubs.append(massing.box(*foot, top - 0.05, top + 0.5))
-        stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
+        bar = outlines.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(solids.box(*foot, top - 0.05, top + 0.5))
+        stubs.append(solids.prism(bar, top + 0.45, top + 1.5))
     for edge in range(4):
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         for z in (p.storey + 0.5, p.storey + 1.0):
             rail = (0.05, wall.length - 0.05, -0.08, -0.03)
             pieces.append(wall.box(*rail, z, z + 0.06))
@@ -117,10 +120,10 @@ def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
 
 def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the core with its doorways, and the climbing formwork on it."""
-    x0, y0, x1, y1 = massing.extent(plan)
+    x0, y0, x1, y1 = outlines.extent(plan)
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
-    core = np.round(massing.rectangle(x - a, y - b, x + a, y + b), 2)
+    core = np.round(outlines.rectangle(x - a, y - b, x + a, y + b), 2)
     door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
     layout = bays.by_edge({0: door, 2: door}, bays.plain)
     facade = Facade(p.storey, (), layout).stacked(p.storeys)
@@ -129,29 +132,29 @@ def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
     p.add(
         "core",
         facade_mesh(core, facade),
-        massing.skirt(core, core, top, high - 0.4),
-        massing.roof_pan(core, high - 2.0, high - 0.4, 0.3),
+        solids.skirt(core, core, top, high - 0.4),
+        solids.roof_pan(core, high - 2.0, high - 0.4, 0.3),
     )
-    form = massing.inset(core, -0.3)
+    form = outlines.inset(core, -0.3)
     p.add(
         "form",
-        massing.skirt(form, form, high - 2.6, high),
-        massing.flat(form, high - 2.6, up=False),
-        massing.roof_pan(form, high - 0.6, high, 0.3),
+        solids.skirt(form, form, high - 2.6, high),
+        solids.flat(form, high - 2.6, up=False),
+        solids.roof_pan(form, high - 0.6, high, 0.3),
         finish=_TIMBER,
     )
 
 
 def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the finished walls of the lower storeys."""
-    outer = massing.inset(plan, -_CLADDING_M)
+    outer = outlines.inset(plan, -_CLADDING_M)
     head = round(p.storey - 0.5, 2)
     pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
     rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
     facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
     # The backs of the panels, which are seen from within, and their top edges.
-    backs = massing.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
-    rim = massing.skirt(outer, plan, p.storey, p.storey)
+    backs = solids.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
+    rim = solids.skirt(outer, plan, p.storey, p.storey)
     walls = [facade_mesh(outer, facade), backs, rim]
     panes = [glass_mesh(outer, facade)]
     groups, step = p.clad // p.group, p.group * p.storey
@@ -161,19 +164,19 @@ def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
     ):
         mesh = _repeated_meshes(pieces, p.group, p.storey)
         p.stack(part, mesh, 0.0, step, groups, finish)
-    p.add("foot", massing.foundation(outer), finish=p.colours["clad"])
+    p.add("foot", solids.foundation(outer), finish=p.colours["clad"])
 
 
 def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds props below the top slab, along the front and the back."""
-    x0, y0, x1, y1 = massing.extent(plan)
+    x0, y0, x1, y1 = outlines.extent(plan)
     low = (p.storeys - 1) * p.storey
     high = p.storeys * p.storey - _SLAB_M + 0.02
     props = []
     for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
         for y in (y0 + 1.2, y1 - 1.2):
-            shaft = massing.regular_polygon(0.06, 4, (x, y))
-            props.append(massing.skirt(shaft, shaft, low - 0.02, high))
+            shaft = outlines.regular_polygon(0.06, 4, (x, y))
+            props.append(solids.skirt(shaft, shaft, low - 0.02, high))
     p.add("props", *props, finish=_STEEL)
 
 
@@ -185,7 +188,7 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
     lifts = per_group * groups
     levels, standards, nets = [], [], []
     for edge in p.scaffolds:
-        wall = details.WallFrame(plan, edge)
+        wall = WallFrame(plan, edge)
         count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
         xs = np.round(
             np.linspace(0.2, wall.length - 0.2, count + 1), 2
@@ -193,9 +196,9 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
         levels.append(wall.place(_scaffold_level(xs)))
         for x in xs:
             for y in (0.6, 1.45):
-                pole = massing.square(x, y, 0.04)
-                mesh = massing.prism(
-                    pole, -massing.FOUNDATION_M, lifts * _SCAFFOLD_LIFT_M + 0.9
+                pole = outlines.square(x, y, 0.04)
+                mesh = solids.prism(
+                    pole, -solids.FOUNDATION_M, lifts * _SCAFFOLD_LIFT_M + 0.9
                 )
                 standards.append(wall.place(mesh))
         for a, b in itertools.pairwise(xs):
@@ -221,7 +224,7 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
 
 def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds a hoist's mast and cage at the back."""
-    wall = details.WallFrame(plan, 2)
+    wall = WallFrame(plan, 2)
     x = 0.5 * wall.length
     top = p.storeys * p.storey - 1.0
     pieces = [
@@ -248,10 +251,10 @@ def _scaffold_level(xs: list[float]) -> Mesh:
     a = xs[0]
     b = xs[-1]
     top = _SCAFFOLD_LIFT_M
-    pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
+    pieces = [solids.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
     for z in (0.5, 1.0):
-        pieces.append(massing.box(a, b, 1.5, 1.54, z, z + 0.06))
+        pieces.append(solids.box(a, b, 1.5, 1.54, z, z + 0.06))
     for x0, x1 in itertools.pairwise(xs[::3]):
         start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
-        pieces.append(details.beam(start, stop, 0.07))
+        pieces.append(solids.beam(start, stop, 0.07))
     return merge_meshes(*pieces)

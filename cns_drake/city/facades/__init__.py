@@ -1,8 +1,9 @@
 """Parts of facades: walls, windows, doors, balconies and roofs."""
 
 from cns_drake.city.facades.assembly import Assembly, Building, Site
-from cns_drake.city.facades.details import add_railing
-from cns_drake.city.facades.roofs import add_chimney, equip_roof
+from cns_drake.city.facades.balconies import add_railing
+from cns_drake.city.facades.roof_equipment import add_chimney, equip_roof
+from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.facades.walls import (
     Band,
     Facade,
@@ -28,6 +29,7 @@ __all__ = [
     "Relief",
     "Roof",
     "Site",
+    "WallFrame",
     "Wing",
     "add_chimney",
     "add_railing",

@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.dice import Dice
-from cns_drake.city.facades import massing
+from cns_drake.city.facades import outlines
 from cns_drake.city.geometry import (
     Finish,
     Mesh,
@@ -68,7 +68,7 @@ class Site:
             low, high = points[0], points[2]
             low = np.ceil(np.round(100.0 * low, 3)) / 100.0
             high = np.floor(np.round(100.0 * high, 3)) / 100.0
-            points = massing.rectangle(*low, *high)
+            points = outlines.rectangle(*low, *high)
         return points
 
     @property
@@ -127,7 +127,7 @@ class Site:
         """
         outline = self.outline
         gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
-        return Site(Polygon(massing.inset(outline, gaps)), self.name)
+        return Site(Polygon(outlines.inset(outline, gaps)), self.name)
 
     @property
     def is_rectangle(self) -> bool:

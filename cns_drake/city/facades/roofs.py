@@ -11,12 +11,9 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from shapely.geometry import Point, Polygon
 
-from cns_drake.city.facades import bays, massing
-from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades import bays, outlines, solids
 from cns_drake.city.facades.walls import Patch
-from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
@@ -147,7 +144,7 @@ def shell(
     faces.append((0, n, 3 * n, 2 * n))
     faces.append((n - 1, 3 * n - 1, 4 * n - 1, 2 * n - 1))
     mesh = Mesh(vertices, tuple(faces))
-    return massing.swapped(mesh) if along_y else mesh
+    return solids.swapped(mesh) if along_y else mesh
 
 
 def gable_wall(
@@ -165,7 +162,7 @@ def gable_wall(
     """
     bounds = {a, b, *(u for u, _ in line if a < u < b)}
     bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
-    faces = massing.Faces()
+    faces = solids.Faces()
 
     def top(x: float) -> float:
         height = line_height(line, x)
@@ -195,7 +192,7 @@ def gable_glass(holes: Sequence[Patch]) -> Mesh:
     Args:
         holes: openings in the gable, in wall coordinates [m].
     """
-    faces = massing.Faces()
+    faces = solids.Faces()
     for h in holes:
         low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)
         faces.add(low, (h.x0, -h.depth, h.z1), high, (h.x1, -h.depth, h.z0))
@@ -214,15 +211,15 @@ def hip(
         eaves: overhang [m]: one number for all edges, or one number per edge.
         fascia: height of the vertical edge of the eaves [m].
     """
-    outer = massing.inset(outline, -np.asarray(eaves))
-    slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
+    outer = outlines.inset(outline, -np.asarray(eaves))
+    slopes = solids.skirt(outer, _ridge(outer), z + fascia, top)
     return merge_meshes(*_boxed_eaves(outer, z, fascia), slopes)
 
 
 def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
     """Returns the underside of the eaves and their vertical edge."""
-    edge = massing.skirt(outer, outer, z, z + fascia)
-    return [massing.flat(outer, z, up=False), edge]
+    edge = solids.skirt(outer, outer, z, z + fascia)
+    return [solids.flat(outer, z, up=False), edge]
 
 
 def _ridge(rectangle: np.ndarray) -> np.ndarray:
@@ -233,91 +230,4 @@ def _ridge(rectangle: np.ndarray) -> np.ndarray:
     """
     ends = np.roll(rectangle, -1, axis=0)
     sides = np.linalg.norm(ends - rectangle, axis=1)
-    return massing.inset(rectangle, float(sides.min()) / 2)
-
-
-# Radius of the free area that each piece needs [m].
-_RADIUS = {
-    "ac_unit": 1.6,
-    "air_handler": 3.8,
-    "cooling_tower": 2.2,
-    "water_tower": 2.3,
-    "stair_house": 2.1,
-    "lift_house": 3.6,
-    "tank": 1.4,
-    "mast": 0.9,
-    "skylight": 2.4,
-    "vents": 1.3,
-    "dish": 1.1,
-}
-
-
-def add_chimney(
-    out: Assembly,
-    part: str,
-    xyz: tuple[float, float, float],
-    finish: Finish,
-    *,
-    item: str = "chimney",
-    yaw: float = 0.0,
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> None:
-    """Adds a chimney, one of the shared meshes, to a pitched roof.
-
-    Args:
-        out: the building under assembly, which gets the parts.
-        part: name of the part.
-        xyz: position of the chimney's foot, below the roof's surface, in the
-            building's frame [m].
-        finish: colour and material.
-        item: `chimney` or `chimney_row`.
-        yaw: heading of the chimney [rad].
-        scale: scale factors along x, y and z.
-    """
-    out.place(part, out.shared(f"roof_{item}", scale), xyz, yaw, finish=finish)
-
-
-def equip_roof(
-    out: Assembly,
-    roof: np.ndarray,
-    z: float,
-    items: Sequence[str],
-    clear: float = 1.0,
-    prefix: str = "",
-) -> None:
-    """Adds equipment to a flat roof; leaves out pieces that do not fit.
-
-    Pieces do not overlap. Places, headings and sizes are random.
-
-    Args:
-        out: the building under assembly, which gets the parts.
-        roof: (N, 2) outline of the roof in the building's frame [m].
-        z: height of the roof [m].
-        items: names of the equipment, the most important first.
-        clear: least distance to the edge of the roof [m].
-        prefix: beginning of the names of the parts.
-    """
-    room = Polygon(roof)
-    rng = out.rng
-    x0, y0, x1, y1 = room.bounds
-    along = np.subtract(roof[1], roof[0])
-    heading = math.atan2(along[1], along[0])
-    taken: list[tuple[float, float, float]] = []
-    for number, item in enumerate(items):
-        scale = round(float(rng.uniform(0.85, 1.25)), 2)
-        stretch = round(scale * float(rng.uniform(0.9, 1.2)), 2)
-        turn = heading + int(rng.integers(4)) * math.pi / 2
-        radius = _RADIUS[item] * max(scale, stretch)
-        free = room.buffer(-radius - clear)
-        for _ in range(30):
-            x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
-            fits = all(
-                math.hypot(x - a, y - b) > radius + r for a, b, r in taken
-            )
-            if fits and free.contains(Point(x, y)):
-                taken.append((x, y, radius))
-                size = (stretch, scale, scale)
-                shape = out.shared(f"roof_{item}", size)
-                part = f"{prefix}roof_{number:02d}"
-                out.place(part, shape, (x, y, z), turn)
-                break
+    return outlines.inset(rectangle, float(sides.min()) / 2)

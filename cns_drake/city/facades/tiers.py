@@ -7,10 +7,15 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.facades import bays, details, massing
-from cns_drake.city.facades.assembly import Assembly, Building
+from cns_drake.city.facades import (
+    bays,
+    outlines,
+    piers,
+    solids,
+)
+from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.bays import Bay
-from cns_drake.city.facades.roofs import equip_roof
+from cns_drake.city.facades.roof_equipment import equip_roof
 from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -19,18 +24,7 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 _PANE_OVERLAP = 0.004
 
 
-def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
-    """Adds awnings to a building, all in the same random colour.
-
-    `pieces` contains the awnings in the building's frame. Without any, nothing
-    is added.
-    """
-    if pieces:
-        finish = p.pick(p.kind.choices["awnings"])
-        p.add("awnings", *pieces, finish=finish)
-
-
-def divided(
+def storey_groups(
     height: float, storey: float, most: int = 10
 ) -> tuple[int, int, float]:
     """Divides a height into equal storeys, and the storeys into groups.
@@ -67,7 +61,7 @@ def add_ground(
         extras: further meshes of the floor, in the building's frame.
         part: name of the part.
     """
-    base = massing.foundation(outline)
+    base = solids.foundation(outline)
     walls = facade_mesh(outline, facade)
     out.add(part, base, walls, *extras)
     _add_glass(out, outline, facade, 0.0, part)
@@ -121,10 +115,10 @@ def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
     """Returns one pane behind all walls except plain ones."""
     edges = range(len(np.asarray(outline)))
     depth = facade.glass[0] - _PANE_OVERLAP
-    plan = massing.inset(
+    plan = outlines.inset(
         outline, [0.0 if k in facade.plain else depth for k in edges]
     )
-    pane = massing.skirt(plan, plan, z0, z1)
+    pane = solids.skirt(plan, plan, z0, z1)
     faces = tuple(pane.faces[k] for k in edges if k not in facade.plain)
     return Mesh(pane.vertices, faces)
 
@@ -180,7 +174,9 @@ def add_grooved(
         most: greatest number of parts, one above another.
         plain: numbers of the edges whose walls are plain.
     """
-    groups, per_group, storey = divided(goal - z0, grooves.storey_height, most)
+    groups, per_group, storey = storey_groups(
+        goal - z0, grooves.storey_height, most
+    )
     depth = grooves.recess
     bands = [
         Band(0.0, grooves.spandrel, 0.0),
@@ -194,25 +190,23 @@ def add_grooved(
     into = depth + 0.05
     if grooves.solid_corner > 0:
         size = (grooves.solid_corner, grooves.pier_reach, into)
-        pieces.append(
-            details.corner_piers(outline, *size, z0, top + rise, plain)
-        )
+        pieces.append(piers.corner_piers(outline, *size, z0, top + rise, plain))
     if grooves.pier > 0:
         margin = max(
             grooves.solid_corner + grooves.pitch - grooves.pier,
             into + grooves.pier,
         )
-        piers = details.piers(
+        along = piers.wall_piers(
             outline, grooves.pitch, grooves.pier, grooves.pier_reach, z0,
             top + rise, depth=into, margin=margin, skip=plain,
         )  # fmt: skip
-        pieces.append(piers)
+        pieces.append(along)
     if pieces:
         out.add(f"{part}_piers", *pieces)
     return top
 
 
-def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
+def lidded_walls(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
     """Returns one mesh of walls, their glass and a flat lid.
 
     Args:
@@ -222,7 +216,7 @@ def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
     """
     pieces = [
         facade_mesh(outline, facade, z0),
-        massing.flat(outline, z0 + facade.height),
+        solids.flat(outline, z0 + facade.height),
     ]
     if facade.glass:
         pieces.append(glass_mesh(outline, facade, z0))
@@ -279,12 +273,12 @@ def add_crown(
         part: name of the building's part that gets these walls and the roof.
         thickness: thickness of the parapet [m].
         items: names of the equipment on the roof, the most important first (see
-            `cns_drake.city.facades.roofs.equip_roof`).
+            `cns_drake.city.facades.roof_equipment.equip_roof`).
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(
         facade_mesh(outline, facade),
-        massing.roof_pan(outline, roof, facade.height, thickness),
+        solids.roof_pan(outline, roof, facade.height, thickness),
     )
     out.add(part, mesh, z=z0)
     _add_glass(out, outline, facade, z0, part)

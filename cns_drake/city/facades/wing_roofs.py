@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs, walls
+from cns_drake.city.facades import bays, roofs, solids, walls
 from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.facades.wings import SEAT, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -44,8 +45,8 @@ def add_roof(
         floor = round(wing.top - roof.parapet, 3)
         out.add_to(
             material,
-            massing.skirt(outline, outline, wing.wall_top, wing.top),
-            massing.roof_pan(outline, floor, wing.top, 0.25),
+            solids.skirt(outline, outline, wing.wall_top, wing.top),
+            solids.roof_pan(outline, floor, wing.top, 0.25),
         )
         return
     if roof.kind == "hip":
@@ -148,7 +149,7 @@ def ridge_rise(span: float, pitch_deg: float) -> float:
 
 def add_dormer(
     out: Assembly,
-    wall: details.WallFrame,
+    wall: WallFrame,
     x: float,
     width: float,
     *,

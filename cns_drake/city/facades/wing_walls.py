@@ -7,7 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from cns_drake.city.facades import bays, details, massing, walls
+from cns_drake.city.facades import (
+    bays,
+    boards,
+    canopies,
+    solids,
+    walls,
+)
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.wing_roofs import Attic, add_roof
 from cns_drake.city.facades.wings import Wing, free_stretches
@@ -145,7 +151,7 @@ class Openings:
         outline = wing.outline
         self._out.add_to(
             material,
-            massing.foundation(outline),
+            solids.foundation(outline),
             walls.facade_mesh(outline, facade),
         )
         self._out.add_to("glass", walls.glass_mesh(outline, facade))
@@ -261,7 +267,7 @@ class Openings:
         for k in range(count):
             low = round(k * step + 0.02, 2)
             high = round((k + 1) * step - 0.02, 2)
-            panel = details.board(a, b, low, high, 0.06)
+            panel = boards.board(a, b, low, high, 0.06)
             panel = panel.moved((0.0, -DOOR_M, 0.0))
             self._out.add_to("trim", self._wing.wall(edge).place(panel))
 
@@ -274,10 +280,10 @@ class Openings:
         material = "accent" if style == "shutters" else "trim"
         for edge in edges:
             wall = self._wing.wall(edge)
-            boards = details.casings(
+            pieces = boards.casings(
                 self.layout(edge, wall.length), (GLASS_M,), style
             )
-            self._out.add_to(material, *(wall.place(board) for board in boards))
+            self._out.add_to(material, *(wall.place(piece) for piece in pieces))
 
     def add_shops(
         self,
@@ -319,7 +325,7 @@ class Openings:
             fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
             self._out.add_to("sign", fascia)
             if self._out.chance(awnings):
-                shade = details.awning(
+                shade = canopies.awning(
                     x0 + 0.3, x1 - 0.3, reach, max(2.4, head - 0.8), head + 0.05
                 )
                 self._out.add_to("awning", wall.place(shade))
@@ -353,9 +359,9 @@ def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
     """Returns a door leaf with a raised frame, in wall coordinates."""
     shift = (0.0, -DOOR_M, 0.0)
     panels = [
-        details.board(x0, x1, z0, z1, 0.04),
-        details.board(x0 + 0.12, x1 - 0.12, z0 + 0.15, z0 + 0.8, 0.07),
-        details.board(x0 + 0.12, x1 - 0.12, z0 + 0.95, z1 - 0.15, 0.07),
+        boards.board(x0, x1, z0, z1, 0.04),
+        boards.board(x0 + 0.12, x1 - 0.12, z0 + 0.15, z0 + 0.8, 0.07),
+        boards.board(x0 + 0.12, x1 - 0.12, z0 + 0.95, z1 - 0.15, 0.07),
     ]
     return [panel.moved(shift) for panel in panels]
 

@@ -11,7 +11,8 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city.facades import bays, details, massing, roofs
+from cns_drake.city.facades import bays, outlines, roofs
+from cns_drake.city.facades.wall_frames import WallFrame
 
 # Overlap of a roof's underside with the top of the walls [m].
 SEAT = 0.02
@@ -66,7 +67,7 @@ class Wing:
 
     @staticmethod
     def at(
-        area: massing.Area, wall_top: float, top: float, roof: Roof,
+        area: outlines.Area, wall_top: float, top: float, roof: Roof,
         blind: Collection[int] = (),
     ) -> Wing:  # fmt: skip
         """Returns a wing, with lengths rounded to centimetres.
@@ -83,7 +84,7 @@ class Wing:
 
     @staticmethod
     def flat(
-        area: massing.Area, top: float, parapet: float, rim: float = 0.1
+        area: outlines.Area, top: float, parapet: float, rim: float = 0.1
     ) -> Wing:
         """Returns a wing with a flat roof and a parapet.
 
@@ -113,7 +114,7 @@ class Wing:
         return self.y1 - self.y0
 
     @property
-    def center(self) -> massing.Point:
+    def center(self) -> outlines.Point:
         """Middle of the wing in the building's frame [m]."""
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
@@ -130,11 +131,11 @@ class Wing:
 
     @property
     def outline(self) -> np.ndarray:
-        return massing.rectangle(self.x0, self.y0, self.x1, self.y1)
+        return outlines.rectangle(self.x0, self.y0, self.x1, self.y1)
 
-    def wall(self, edge: int) -> details.WallFrame:
+    def wall(self, edge: int) -> WallFrame:
         """Returns the `WallFrame` of the wall at an edge."""
-        return details.WallFrame(self.outline, edge)
+        return WallFrame(self.outline, edge)
 
     @property
     def roof_line(self) -> list[tuple[float, float]]:

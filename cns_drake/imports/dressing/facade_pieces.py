@@ -19,8 +19,10 @@ from shapely.geometry import box
 from cns_drake.city.facades import (
     Assembly,
     Relief,
+    balconies,
     bays,
-    details,
+    boards,
+    canopies,
     lifted,
     single_wall,
 )
@@ -359,7 +361,7 @@ def add_facade(
             reach = _GUTTER_REACH if is_gutter else _CORNICE_REACH
             low = panel.height - style.cornice
             limits = (-reach, panel.length + reach, low, panel.height, reach)
-            _put(out, "trim", panel, details.board(*limits))
+            _put(out, "trim", panel, boards.board(*limits))
             counts["gutters" if is_gutter else "cornices"] = 1
     return counts
 
@@ -501,7 +503,7 @@ def _add_plinth(
     start = -reach
     for x0, x1 in [*sorted(low), (end, end)]:
         if x0 - start > 0.05:
-            board = details.board(start, x0, 0.0, top, reach)
+            board = boards.board(start, x0, 0.0, top, reach)
             _put(out, "trim", panel, board)
         start = max(start, x1)
     return 1
@@ -521,7 +523,7 @@ def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
         x0 = max(0.1, middle - half)
         x1 = min(plan.panel.length - 0.1, middle + half)
         if not plan.is_in_the_way(z, _BALCONY_REACH):
-            mesh = details.balcony(x0, x1, _BALCONY_REACH, z)
+            mesh = balconies.balcony(x0, x1, _BALCONY_REACH, z)
             _put(out, "trim", plan.panel, mesh)
             count += 1
     return count
@@ -540,11 +542,11 @@ def _add_signs(
     if height > 0.15:
         start, end = min(o.x0 for o in shops), max(o.x1 for o in shops)
         limits = (start + _JAMB, end - _JAMB, z, z + height)
-        _put(out, "sign", panel, details.board(*limits, _SIGN_REACH))
+        _put(out, "sign", panel, boards.board(*limits, _SIGN_REACH))
     low, high = z - _AWNING_HEIGHT, z + float(panel.origin[2])
     shape = (_JAMB, _AWNING_REACH, high - _AWNING_HEIGHT, high)
     cells = [(o.x0, o.x1) for o in shops]
-    awnings = details.awnings(panel.frame, cells, rng, 0.4, shape)
+    awnings = canopies.awnings(panel.frame, cells, rng, 0.4, shape)
     if plan.is_in_the_way(low, _AWNING_REACH):
         awnings = []
     out.add_to("sign", *awnings)

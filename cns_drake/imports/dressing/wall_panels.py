@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.facades.details import WallFrame
+from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
 from cns_drake.imports.faces import joined
 

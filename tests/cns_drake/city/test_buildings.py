@@ -19,7 +19,7 @@ from shapely.geometry import MultiPoint, Polygon, box
 from cns_drake.city.buildings import ARCHETYPES, BUILDERS, sample
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.assembly import GROUND_OVERHANG_M, HEAD_ROOM_M, Site
-from cns_drake.city.facades.massing import FOUNDATION_M
+from cns_drake.city.facades.solids import FOUNDATION_M
 from cns_drake.city.geometry.structures import MeshShape
 
 # By day, generated cities are compared with the committed ones byte by byte.

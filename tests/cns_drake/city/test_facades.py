@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon
 
-from cns_drake.city.facades import massing
+from cns_drake.city.facades import outlines, solids
 from cns_drake.city.facades.walls import (
     Arch,
     Band,
@@ -21,7 +21,7 @@ from cns_drake.city.geometry.mesh import merge_meshes
 # A rectangle turned by 30 degrees and moved off the origin.
 _C = math.cos(math.pi / 6)
 _S = math.sin(math.pi / 6)
-TURNED = massing.rectangle(0, 0, 12, 8) @ np.array([[_C, _S], [-_S, _C]]) + (
+TURNED = outlines.rectangle(0, 0, 12, 8) @ np.array([[_C, _S], [-_S, _C]]) + (
     5.0,
     -3.0,
 )
@@ -36,8 +36,8 @@ def closed(points, facade, z0=0.0):
     return merge_meshes(
         facade_mesh(points, facade, z0),
         glass_mesh(points, facade, z0),
-        massing.flat(points, z0, up=False),
-        massing.flat(points, z0 + facade.height),
+        solids.flat(points, z0, up=False),
+        solids.flat(points, z0 + facade.height),
     )
 
 

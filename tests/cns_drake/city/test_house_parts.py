@@ -3,7 +3,7 @@ import pytest
 from shapely.geometry import box
 
 from cns_drake.city.buildings import house_heights
-from cns_drake.city.facades import bays, massing, wing_roofs
+from cns_drake.city.facades import bays, outlines, wing_roofs
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.facades.walls import Arch, Patch
 from cns_drake.city.facades.wing_roofs import add_roof
@@ -149,8 +149,8 @@ def test_corners_without_neighbours_are_free():
 
 
 def test_edges_of_a_plan_on_edges_of_its_site():
-    site = massing.rectangle(0, 0, 10, 8)
+    site = outlines.rectangle(0, 0, 10, 8)
     plan = np.array([(2, 0), (10, 0), (10, 8), (0, 8), (0, 2)])
-    assert massing.edges_on(plan, site, {1, 3}) == {1, 3}
-    assert massing.edges_on(plan, site, {0}) == {0}
-    assert massing.edges_on(massing.inset(plan, 0.1), site, {0, 1}) == set()
+    assert outlines.edges_on(plan, site, {1, 3}) == {1, 3}
+    assert outlines.edges_on(plan, site, {0}) == {0}
+    assert outlines.edges_on(outlines.inset(plan, 0.1), site, {0, 1}) == set()

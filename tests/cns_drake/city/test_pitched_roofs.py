@@ -5,7 +5,7 @@ from helpers.mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 
-from cns_drake.city.facades import massing, roofs
+from cns_drake.city.facades import outlines, roofs
 from cns_drake.city.facades.walls import Patch
 
 LINES = {
@@ -13,7 +13,7 @@ LINES = {
     "gambrel": roofs.gambrel_line(2.0, 10.0, 5.0, 8.0),
     "barrel": roofs.barrel_line(2.0, 10.0, 5.0, 8.0),
 }
-TURNED = massing.rectangle(1, 2, 15, 11) @ np.array([[0.6, 0.8], [-0.8, 0.6]])
+TURNED = outlines.rectangle(1, 2, 15, 11) @ np.array([[0.6, 0.8], [-0.8, 0.6]])
 
 
 def area(mesh) -> float:

@@ -1,0 +1,83 @@
+"""Bay windows in front of walls."""
+
+import numpy as np
+
+from cns_drake.city.facades import bays, outlines, solids, walls
+from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.wall_frames import WallFrame
+
+# Depth of the windows in bay windows [m].
+_RECESS = 0.1
+
+
+def add_bay_window(
+    out: Assembly,
+    wall: WallFrame,
+    x: float,
+    width: float,
+    reach: float,
+    z0: float,
+    z1: float,
+    *,
+    storeys: int = 1,
+    canted: bool = True,
+) -> None:
+    """Adds a bay window that stands on the ground or hangs on the wall.
+
+    The bay window has a row of windows for each storey, and the materials
+    `glass`, `roof` and `walls`.
+
+    Args:
+        out: the building under assembly, which gets the parts.
+        wall: the wall.
+        x: middle of the window along the wall [m].
+        width: width along the wall [m].
+        reach: how far it reaches out of the wall [m].
+        z0: height of the foot of the bay window [m]; at 0 the bay window stands
+            on the ground.
+        z1: height of its top [m].
+        storeys: number of storeys between foot and top.
+        canted: whether the sides are slanted; otherwise the bay window is a
+            box.
+    """
+    a, b = x - width / 2, x + width / 2
+    if canted:
+        slant = min(reach, 0.28 * width)
+        plan = [(a, -0.1), (a, 0.0), (a + slant, reach), (b - slant, reach),
+                (b, 0.0), (b, -0.1)]  # fmt: skip
+        flush = frozenset({0, 4, 5})
+    else:
+        plan = [(a, -0.1), (a, reach), (b, reach), (b, -0.1)]
+        flush = frozenset({3})
+    points = np.array([wall.point(*p) for p in plan])
+    height = round(z1 - z0, 3)
+    step = height / storeys
+
+    def layout(edge: int, length: float) -> list[walls.Relief]:
+        relief: list[walls.Relief] = []
+        for k in range(storeys if edge not in flush and length >= 0.7 else 0):
+            z = k * step
+            pane = bays.window(
+                length - 0.3, round(z + 0.75, 2), round(z + step - 0.45, 2),
+                _RECESS, mullions=1 if length > 1.5 else 0, pier=0.15,
+            )  # fmt: skip
+            relief += pane(0.0, length)
+        return relief
+
+    bands = (walls.Band(height - 0.2, height, -0.08),)
+    facade = walls.Facade(height, bands, layout, (_RECESS,), flush)
+    if z0 == 0.0:
+        under = solids.foundation(points)
+    else:
+        under = solids.flat(points, z0, up=False)
+    out.add_to("walls", walls.facade_mesh(points, facade, z0), under)
+    out.add_to("glass", walls.glass_mesh(points, facade, z0))
+    reaches = [-0.12 * (k not in flush) for k in range(len(points))]
+    outer = outlines.inset(points, reaches)
+    tip = (outer[0] + outer[-1]) / 2
+    out.add_to(
+        "roof",
+        solids.flat(outer, z1, up=False),
+        solids.skirt(outer, outer, z1, z1 + 0.15),
+        solids.spire(outer, tip, z1 + 0.15, z1 + 0.15 + 0.7 * reach),
+    )

@@ -1,0 +1,71 @@
+"""Wall coordinates, in which the details of a wall are described."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cns_drake.city.facades import solids
+from cns_drake.city.geometry.mesh import Mesh
+
+
+class WallFrame:
+    """Converts geometry from wall coordinates to the building's frame [m].
+
+    In wall coordinates, x runs along the wall, y outwards and z up. The origin
+    is on the ground at the start of the wall: at the left, as seen from
+    outside. The wall is the edge number `edge` of `outline` (N, 2), which
+    contains the corners of all walls, counter-clockwise [m].
+    """
+
+    def __init__(self, outline: ArrayLike, edge: int):
+        outline = np.asarray(outline, dtype=float)
+        edge %= len(outline)
+        start, end = outline[edge], outline[(edge + 1) % len(outline)]
+        self.length = float(np.hypot(*(end - start)))
+        self._start = start
+        self._along = (end - start) / self.length
+        self._outward = np.array([self._along[1], -self._along[0]])
+
+    def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
+        """Converts a mesh from wall coordinates to the building's frame [m].
+
+        The mesh is also raised by `z` [m]. As wall coordinates are left-handed,
+        the order of the corners of each face is reversed.
+        """
+        x, y, height = mesh.vertices.T
+        xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
+        vertices = np.column_stack([xy, height + z])
+        return Mesh(vertices, mesh.faces).turned()
+
+    def box(self, *limits: float, bottom: bool = True) -> Mesh:
+        """Returns a box in the building's frame, given in wall coordinates.
+
+        The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m]. The
+        box has a lower side if `bottom` is set.
+        """
+        return self.place(solids.box(*limits, bottom=bottom))
+
+    def standing(self, *limits: float, bottom: bool = False) -> Mesh:
+        """Returns a box that stands on the ground, in the building's frame.
+
+        The limits are x0, x1, y0, y1 and z1 in wall coordinates [m]. The box
+        reaches below the ground, and has a lower side if `bottom` is set.
+        """
+        return self.place(solids.standing(*limits, bottom=bottom))
+
+    @property
+    def heading(self) -> float:
+        """Direction of the wall in the building's frame, left to right [rad].
+
+        Left and right are as seen from outside.
+        """
+        return math.atan2(self._along[1], self._along[0])
+
+    def point(self, x: float, y: float) -> np.ndarray:
+        """Returns a place in the building's frame as x and y [m].
+
+        The place is given in wall coordinates: `x` along the wall, and `y`
+        outwards.
+        """
+        return self._start + x * self._along + y * self._outward
