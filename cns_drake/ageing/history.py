@@ -37,7 +37,7 @@ from cns_drake.city.plants.plant_sizes import scaled_plant
 from cns_drake.city.plants.trees import SPECIES
 from cns_drake.imports.foreign_city import random_generator, random_share
 from cns_drake.scene.materials import MATERIALS
-from cns_drake.transient import world_structures
+from cns_drake.transient.loaded_structures import LoadedStructure
 
 # Share of the demolished buildings that are replaced by others.
 _REPLACED = 0.85
@@ -277,7 +277,7 @@ class AgeingCity:
     def _class(self, name: str) -> str:
         return self._known(name).semantic_class
 
-    def _known(self, name: str) -> Structure | world_structures.LoadedStructure:
+    def _known(self, name: str) -> Structure | LoadedStructure:
         return self.new.get(name) or self._world.things[name]
 
     def _foot(self, name: str) -> BaseGeometry:
@@ -787,9 +787,7 @@ _STONE = (0.8, 0.8, 0.78)
 _PAINT = MATERIALS["markings"]
 
 
-def _renewal(
-    one: world_structures.LoadedStructure, tags: Sequence[str]
-) -> str | None:
+def _renewal(one: LoadedStructure, tags: Sequence[str]) -> str | None:
     """Returns the event that replaces a piece of street furniture, or None."""
     if one.semantic_class == "traffic-sign":
         return "signs"

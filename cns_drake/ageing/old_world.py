@@ -28,8 +28,13 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
-from cns_drake.transient import world_structures
 from cns_drake.transient.ground_surface import GroundSurface
+from cns_drake.transient.loaded_structures import (
+    LoadedPart,
+    LoadedStructure,
+    read_structures,
+    triangle_corners,
+)
 
 # The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
@@ -72,7 +77,7 @@ class OldWorld:
         self._read_table()
         self.visuals = _read_visuals(self.path)
         self._world = load_world(self.path)
-        self._seen = world_structures.read_structures(self._world)
+        self._seen = read_structures(self._world)
         self.built = {
             name: int(row[YEAR_COLUMN])
             for name, row in self.rows.items()
@@ -100,7 +105,7 @@ class OldWorld:
                 number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
-    def of_class(self, *classes: str) -> list[world_structures.LoadedStructure]:
+    def of_class(self, *classes: str) -> list[LoadedStructure]:
         """Returns the structures of some classes, sorted by name."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
@@ -175,9 +180,7 @@ class OldWorld:
             for name, one in self.things.items()
         }
 
-    def _shape(
-        self, part: world_structures.LoadedPart
-    ) -> structures.Shape | None:
+    def _shape(self, part: LoadedPart) -> structures.Shape | None:
         """Returns the shape of a part; None for other kinds of shapes."""
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
@@ -249,10 +252,7 @@ class OldWorld:
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
-        found = [
-            world_structures.triangle_corners(part)
-            for part in self._seen[name].parts
-        ]
+        found = [triangle_corners(part) for part in self._seen[name].parts]
         return np.concatenate([np.zeros((0, 3, 3)), *found])
 
     @cached_property
@@ -274,9 +274,7 @@ class OldWorld:
         """Area of the ground outside streets, parks and water, in W [m]."""
         return self.area(_is_open).difference(self.streets)
 
-    def area(
-        self, wanted: Callable[[world_structures.LoadedStructure], bool]
-    ) -> BaseGeometry:
+    def area(self, wanted: Callable[[LoadedStructure], bool]) -> BaseGeometry:
         """Returns the area that selected structures cover in W [m].
 
         The structures are seen from above.
@@ -285,7 +283,7 @@ class OldWorld:
             wanted: function that returns whether a structure is selected.
         """
         found = [
-            from_above(world_structures.triangle_corners(part))
+            from_above(triangle_corners(part))
             for one in self._seen.values()
             if wanted(one)
             for part in one.parts
@@ -294,7 +292,7 @@ class OldWorld:
         return joined.buffer(0.05).buffer(-0.05)
 
     @staticmethod
-    def _is_street(one: world_structures.LoadedStructure) -> bool:
+    def _is_street(one: LoadedStructure) -> bool:
         is_bay = one.kind == kinds.PARKING_BAYS
         return one.semantic_class == "sidewalk" or is_bay
 
@@ -306,7 +304,7 @@ class OldWorld:
         return dict(sorted(network.junction_areas.items()))
 
 
-def _is_open(one: world_structures.LoadedStructure) -> bool:
+def _is_open(one: LoadedStructure) -> bool:
     is_ground = one.semantic_class in ("terrain", "other-ground", "parking")
     return is_ground and not kinds.is_never_built_on(one.kind)
 

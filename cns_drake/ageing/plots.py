@@ -33,7 +33,7 @@ from cns_drake.city.growth.building_sites import building_site
 from cns_drake.city.growth.lot_uses import lot_objects
 from cns_drake.city.growth.lowering import lowered, top_of
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.transient.putting_up import scaffold
+from cns_drake.transient.scaffolds import scaffold
 
 # Archetypes that are built today -> their weight in the random choice among
 # those that fit.

@@ -40,7 +40,7 @@ from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.traffic.walkway_clearing import kept_clear
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.ground_surface import GROUND_CLASSES
-from cns_drake.transient.world_structures import read_structures
+from cns_drake.transient.loaded_structures import read_structures
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)

@@ -16,7 +16,7 @@ from cns_drake.city.geometry import (
     turned_up,
     unit_normals,
 )
-from cns_drake.transient.world_structures import (
+from cns_drake.transient.loaded_structures import (
     LoadedPart,
     LoadedStructure,
     triangle_corners,
@@ -54,26 +54,27 @@ class GroundSurface:
     """
 
     def __init__(
-        self, things: Mapping[str, LoadedStructure], near: BaseGeometry
+        self, structures: Mapping[str, LoadedStructure], near: BaseGeometry
     ):
         """Collects the ground in an area.
 
         Args:
-            things: name -> structure, for all structures of the world.
+            structures: name -> structure, for all structures of the world.
             near: area in which the ground is known, seen from above [m].
         """
         shapely.prepare(near)
         self.near = near
         corners = {of_road: [np.zeros((0, 3, 3))] for of_road in (False, True)}
-        for thing in things.values():
-            if thing.semantic_class in GROUND_CLASSES:
-                own = corners[thing.semantic_class == "road"]
-                own += map(self._upward, thing.parts)
+        for structure in structures.values():
+            if structure.semantic_class in GROUND_CLASSES:
+                own = corners[structure.semantic_class == "road"]
+                own += map(self._near_triangles, structure.parts)
         triangles = {k: np.concatenate(found) for k, found in corners.items()}
         self._roads = triangles[True]
         self._sides = {k: UpperSides(found) for k, found in triangles.items()}
 
-    def _upward(self, part: LoadedPart) -> np.ndarray:
+    def _near_triangles(self, part: LoadedPart) -> np.ndarray:
+        """Returns the corners (M, 3, 3) of triangles that are not steep [m]."""
         corners = turned_up(triangle_corners(part))
         middles = corners[:, :, :2].mean(axis=1)
         return corners[

@@ -10,13 +10,11 @@ from shapely.geometry import box
 from cns_drake.city.geometry import OBJECT_MESHES, Mesh, MeshShape, Model, Part
 from cns_drake.city.growth.lowering import STOREY, lowered, top_of
 from cns_drake.scene.surfaces import tessellate
-from cns_drake.transient.scene_editing import (
-    SceneEditing,
-    Surroundings,
-    change_rng,
-)
-from cns_drake.transient.world_structures import LoadedPart, LoadedStructure
+from cns_drake.transient.loaded_structures import LoadedPart, LoadedStructure
+from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.surroundings import Surroundings, change_rng
 
+# Cause of these changes in the structure table.
 _CAUSE = "height_limit"
 
 
@@ -76,8 +74,8 @@ def _as_model(
     parts = []
     meshes = {}
     for number, part in enumerate(building.parts):
-        mesh = f"{_file_of(part, editing)}/{number}"
-        meshes[mesh] = _mesh_of(part, p_WS)
+        mesh = f"{_object_mesh(part, editing)}/{number}"
+        meshes[mesh] = _mesh_in_S(part, p_WS)
         parts.append(
             Part(
                 str(number),
@@ -91,10 +89,10 @@ def _as_model(
     return Model(tuple(parts), meshes, box(*low, *high)), RigidTransform(p_WS)
 
 
-def _file_of(part: LoadedPart, editing: SceneEditing) -> str:
-    """Returns the name of an object mesh of the generator, or an empty text.
+def _object_mesh(part: LoadedPart, editing: SceneEditing) -> str:
+    """Returns the name of a part's mesh, such as `roof_vents`.
 
-    It is the mesh of the part, such as `roof_vents`.
+    The result is "" if the mesh is none of the generator's meshes of objects.
     """
     shape = editing.shape(part)
     if isinstance(shape, DrakeMesh) and shape.source().is_path():
@@ -104,7 +102,7 @@ def _file_of(part: LoadedPart, editing: SceneEditing) -> str:
     return ""
 
 
-def _mesh_of(part: LoadedPart, p_WS: np.ndarray) -> Mesh:
+def _mesh_in_S(part: LoadedPart, p_WS: np.ndarray) -> Mesh:
     """Returns the triangles of a part, in S [m]; round shapes become prisms."""
     surface = tessellate(part.geometry.surface)
     R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()

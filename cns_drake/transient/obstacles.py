@@ -1,4 +1,4 @@
-"""Areas, seen from above, where new objects must not stand."""
+"""Free places between the areas where new objects must not stand."""
 
 from collections.abc import Collection, Iterable
 
@@ -30,7 +30,7 @@ class Obstacles:
             area: the area, seen from above [m].
             ignored: names of obstacles that do not count.
         """
-        return not self._met(area, ignored)
+        return not self._touching(area, ignored)
 
     def distance(
         self, area: BaseGeometry, within: BaseGeometry, ignored: Collection[str]
@@ -48,12 +48,12 @@ class Obstacles:
         return min(
             (
                 float(area.distance(shapely.intersection(other, within)))
-                for other in self._met(within, ignored)
+                for other in self._touching(within, ignored)
             ),
             default=np.inf,
         )
 
-    def _met(
+    def _touching(
         self, area: BaseGeometry, ignored: Collection[str]
     ) -> list[BaseGeometry]:
         found = self._tree.query(area, predicate="intersects")

@@ -11,9 +11,9 @@ from cns_drake.base.elementary import product
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.structures import Model, part_triangles
 from cns_drake.transient.ground_surface import GROUND_CLASSES, GroundSurface
+from cns_drake.transient.loaded_structures import LoadedStructure
 from cns_drake.transient.obstacles import Obstacles
-from cns_drake.transient.scene_editing import Surroundings
-from cns_drake.transient.world_structures import LoadedStructure
+from cns_drake.transient.surroundings import Surroundings
 
 # Cause of these changes in the structure table.
 _CAUSE = "parked_cars"
@@ -173,7 +173,7 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
     bays = make_bays(around)
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
-    cars = [around.things[name] for name in bays]
+    cars = [around.structures[name] for name in bays]
     for car, rng in around.chosen(_CAUSE, cars, share):
         bay = bays[car.name]
         fate = rng.uniform()

@@ -13,13 +13,9 @@ from cns_drake.city.geometry.upper_sides import (
     unit_normals,
 )
 from cns_drake.transient.ground_surface import GROUND_CLASSES, GroundSurface
-from cns_drake.transient.scene_editing import (
-    Look,
-    SceneEditing,
-    Surroundings,
-    change_rng,
-)
-from cns_drake.transient.world_structures import LoadedPart, triangle_corners
+from cns_drake.transient.loaded_structures import LoadedPart, triangle_corners
+from cns_drake.transient.scene_editing import Look, SceneEditing
+from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.
 _CAUSE = "snow"
@@ -34,8 +30,7 @@ _BARE = frozenset(
 )
 # Longest side of triangles at the edge of a cleared road [m].
 _FINE = 0.7
-# A bank of snow along a kerb: distance from the kerb of its edge on the road
-# [m].
+# Distance from the kerb of the edge of a snow bank on the road [m].
 _BANK_ON_ROAD = 0.3
 # Distance from the kerb of the bank's crest, beyond the kerb [m].
 _BANK_CREST = 0.3
@@ -45,6 +40,7 @@ _BANK_BEYOND = 1.1
 _BANK_RATIO = 2.5
 # Greatest height of the bank above the snow [m].
 _BANK_ABOVE_SNOW = 0.9
+# Distance between points along a kerb [m].
 _SPACING = 1.5
 # Wavelengths of the bank's height along the street [m].
 _WAVES = (9.0, 3.7)
@@ -61,14 +57,14 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
         depth: depth of the snow [m].
     """
     editing = around.editing
-    for thing in around.things.values():
-        if thing.semantic_class in _BARE:
+    for structure in around.structures.values():
+        if structure.semantic_class in _BARE:
             continue
-        is_ground = thing.semantic_class in GROUND_CLASSES
-        if not is_ground and not thing.outline.intersects(ground.near):
+        is_ground = structure.semantic_class in GROUND_CLASSES
+        if not is_ground and not structure.outline.intersects(ground.near):
             continue
         changed = False
-        for part in thing.parts:
+        for part in structure.parts:
             if is_ground and not _is_below_road(part, ground):
                 editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
                 changed = True
@@ -77,7 +73,7 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
                     editing, part, ground, depth, is_ground
                 )
         if changed:
-            editing.blame(thing.name, _CAUSE)
+            editing.blame(structure.name, _CAUSE)
     if ground.carriageway.is_empty:
         editing.note(
             "snow: no structure of class road along the drive: no road is "
@@ -107,7 +103,8 @@ def _cover_with_snow(
 ) -> bool:
     """Covers the faces of a part that are open to the sky with snow.
 
-    It returns whether there are any.
+    Returns:
+        Whether there are such faces.
     """
     corners = triangle_corners(part)
     if is_ground:
@@ -118,13 +115,21 @@ def _cover_with_snow(
     if len(corners) == 0:
         return False
     vertices, triangles = _merge_corners(corners)
-    triangles = triangles[_is_large(vertices, triangles)]
+    triangles = triangles[_on_large_areas(vertices, triangles)]
     if len(triangles) == 0:
         return False
+    slab = _slab(vertices, triangles, depth)
+    editing.add_triangles(part, f"{part.name}_snow", *slab, _LOOK)
+    return True
+
+
+def _slab(
+    vertices: np.ndarray, triangles: np.ndarray, depth: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns vertices and triangles of a layer: its top and its sides."""
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    keys = np.sort(edges, axis=1)
     _, first, count = np.unique(
-        keys, axis=0, return_index=True, return_counts=True
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
     )
     rim = edges[first[count == 1]]
     up = len(vertices)
@@ -136,9 +141,7 @@ def _cover_with_snow(
         ]
     )
     risen = vertices + np.array([0.0, 0.0, depth])
-    raised = np.concatenate([vertices, risen])
-    editing.add_triangles(part, f"{part.name}_snow", raised, slab, _LOOK)
-    return True
+    return np.concatenate([vertices, risen]), slab
 
 
 def _triangles_beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
@@ -173,7 +176,7 @@ def _merge_corners(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corners.reshape(-1, 3)[first], inverse.reshape(-1, 3)
 
 
-def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _on_large_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Returns which triangles belong to areas large enough to bear snow."""
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix(
@@ -189,6 +192,7 @@ def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def _lay_banks(
     around: Surroundings, ground: GroundSurface, depth: float
 ) -> None:
+    """Adds banks of snow along all kerbs, except where the vehicle drives."""
     phases = change_rng(around.seed, _CAUSE, "banks").uniform(0, 2 * np.pi, 4)
     way = around.drive.buffer(1.4 + _BANK_ON_ROAD)
     shapely.prepare(way)

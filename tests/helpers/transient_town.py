@@ -10,7 +10,7 @@ from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
 from cns_drake.scenarios.scenario import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.world_structures import read_structures
+from cns_drake.transient.loaded_structures import read_structures
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -38,6 +38,16 @@ LANES = shapely.Polygon(
         for x, y in ((-99, -2.7), (99, -2.7), (99, 2.7), (-99, 2.7))
     ]
 )
+
+
+def drive_along_street(x_from, x_to):
+    """The path of a vehicle, from above, between two x of the town [m]."""
+    return shapely.LineString(
+        [(X_WT @ [x, -0.5, 0])[:2] for x in (x_from, x_to)]
+    )
+
+
+DRIVE = drive_along_street(-60, 80)
 COLUMNS = 20
 # The lawn of a sloping town rises along y by this much per metre.
 SLOPE = 0.08
@@ -181,6 +191,11 @@ def change_maker(sdf, drive, lanes):
         return world, read_structures(world)
 
     return make
+
+
+def in_town(points):
+    """Points of the world in the frame of the town, where x is the street."""
+    return (X_WT.inverse() @ points.T).T
 
 
 def new_things(changed, **switches):

@@ -33,7 +33,7 @@ from cns_drake.city.geometry.structures import Structure, assemble, block
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world
-from cns_drake.transient.world_structures import read_structures
+from cns_drake.transient.loaded_structures import read_structures
 
 _DRIVE = """
 map: .

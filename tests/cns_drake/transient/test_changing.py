@@ -1,4 +1,4 @@
-"""Objects that change between drives: parked cars, leaves, poles."""
+"""Changes between drives: parked cars, leaves, poles, and all together."""
 
 from helpers.transient_town import (
     ORIGIN,
@@ -18,9 +18,9 @@ from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
+from cns_drake.transient.loaded_structures import read_structures
 from cns_drake.transient.parked_cars import make_bays
-from cns_drake.transient.scene_editing import Surroundings
-from cns_drake.transient.world_structures import read_structures
+from cns_drake.transient.surroundings import Surroundings
 
 # The drive leads through cars and roads, below z = 2.2 m or so.
 _CORNERS = [
@@ -273,6 +273,7 @@ def test_furniture_goes_at_most_2_m(changed):
     [
         {"parked_cars": 0.5, "leaves": 0.5, "furniture": 0.5},
         {"height_limit": 5.0},
+        {"scaffolds": 0.6, "works": 0.6, "snow": 0.15},
     ],
 )
 def test_points_that_no_changed_thing_could_hide_are_identical(sdf, switches):
@@ -310,12 +311,10 @@ def test_what_a_world_lacks_is_said(tmp_path):
         '<link name="l"><visual name="a"><geometry><box><size>9 9 1</size>'
         "</box></geometry></visual></link></model></sdf>"
     )
-    config = TransientConfig(parked_cars=0.1, leaves=0.9, furniture=0.1)
+    names = ("parked_cars", "leaves", "furniture", "scaffolds", "works", "snow")
+    config = TransientConfig(**dict.fromkeys(names, 0.1))
     world = change_world(
         load_world(tmp_path / "plain.sdf"), config, DRIVE, LANES
     )
     noted = [note.split(":")[:2] for note in world.notes]
-    assert noted == [
-        ["transient", f" {name}"]
-        for name in ("parked_cars", "leaves", "furniture")
-    ]
+    assert noted == [["transient", f" {name}"] for name in names]

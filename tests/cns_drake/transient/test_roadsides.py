@@ -1,10 +1,12 @@
 """What fills the room beside kerbs."""
 
 from helpers.transient_town import (
+    DRIVE,
     LANES,
     X_WT,
     box_shape,
     change_maker,
+    drive_along_street,
     new_things,
     slope_height,
     visual,
@@ -16,24 +18,6 @@ import pytest
 import shapely
 
 from cns_drake.city.geometry.structures import ROOT_DEPTH
-
-
-def drive(x_from, x_to):
-    """The way of a vehicle along the street [m]."""
-    return shapely.LineString(
-        [(X_WT @ [x, -0.5, 0])[:2] for x in (x_from, x_to)]
-    )
-
-
-@pytest.fixture(scope="module")
-def sdf(tmp_path_factory):
-    return write_transient_town(tmp_path_factory.mktemp("town"))
-
-
-@pytest.fixture(scope="module")
-def changed(sdf):
-    """Returns the world after changes and its structures, cached."""
-    return change_maker(sdf, drive(-60, 80), LANES)
 
 
 def kind_of(name):
@@ -101,7 +85,7 @@ def test_a_part_has_some_of_the_things_of_the_whole(changed):
 def test_two_drives_along_a_road_have_the_same_things(sdf, changed):
     """Things that only one of them has are far from the other."""
     mine = new_things(changed, roadsides=1.0)
-    elsewhere = drive(-20, 20)
+    elsewhere = drive_along_street(-20, 20)
     theirs = new_things(change_maker(sdf, elsewhere, LANES), roadsides=1.0)
     assert 20 < len(theirs) < len(mine)
     for name, thing in theirs.items():
@@ -123,7 +107,7 @@ def test_other_switches_change_what_stands_there(changed):
 
 def test_things_stand_on_a_slope(tmp_path):
     sdf = write_transient_town(tmp_path, slopes=True)
-    fresh = new_things(change_maker(sdf, drive(-60, 80), LANES), roadsides=1.0)
+    fresh = new_things(change_maker(sdf, DRIVE, LANES), roadsides=1.0)
     checked = 0
     for name, thing in fresh.items():
         p_TPs = (X_WT.inverse() @ thing.p_WPs.T).T
@@ -164,7 +148,7 @@ def test_without_roads_there_is_a_note(tmp_path, sdf):
         table.replace(",road,road", ",road,terrain")
     )
     (tmp_path / "street.sdf").write_text(sdf.read_text())
-    world, _ = change_maker(tmp_path / "street.sdf", drive(-60, 80), LANES)(
+    world, _ = change_maker(tmp_path / "street.sdf", DRIVE, LANES)(
         roadsides=1.0
     )
     assert [note.split(":")[:2] for note in world.notes] == [

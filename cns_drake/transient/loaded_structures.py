@@ -21,6 +21,7 @@ from cns_drake.scene.perception_geometry import (
     list_geometry,
     structure_name,
 )
+from cns_drake.scene.structure_table import StructureEntry
 from cns_drake.scene.world import World
 
 # Cars and people can pass below parts that are higher than this above a
@@ -82,17 +83,27 @@ class LoadedStructure:
     written.
 
     Attributes:
-        name: name of the structure.
-        semantic_class: class of the structure, a key of
-            `cns_drake.scene.semantics.CLASS_IDS`.
-        kind: what the structure is, such as `row_house` or `bench`.
+        entry: entry of the structure in the world's structure table.
         parts: geometries of the structure.
     """
 
-    name: str
-    semantic_class: str
-    kind: str
+    entry: StructureEntry
     parts: tuple[LoadedPart, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the structure."""
+        return self.entry.name
+
+    @property
+    def semantic_class(self) -> str:
+        """Class of the structure, a key of `semantics.CLASS_IDS`."""
+        return self.entry.semantic_class
+
+    @property
+    def kind(self) -> str:
+        """What the structure is, such as `row_house` or `bench`."""
+        return self.entry.kind
 
     @cached_property
     def p_WPs(self) -> np.ndarray:
@@ -162,11 +173,8 @@ def read_structures(
         part = LoadedPart(geometry, X_WG, entry.material(geometry.part))
         found[geometry.structure].append(part)
     return {
-        name: LoadedStructure(
-            name, entry.semantic_class, entry.kind, tuple(found[name])
-        )
+        name: LoadedStructure(world.structures[name], tuple(found[name]))
         for name in sorted(found)
-        for entry in (world.structures[name],)
     }
 
 

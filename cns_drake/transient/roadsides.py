@@ -1,0 +1,87 @@
+"""Fills free places beside kerbs near a drive, such as with parked cars."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from cns_drake.base.yaml_files import parse_yaml
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.transient.ground_surface import GROUND_CLASSES
+from cns_drake.transient.kerb_stretches import straight_kerbs
+from cns_drake.transient.surroundings import Surroundings, change_rng
+
+# Cell size of the grid, in W, of kerb stretches [m].
+_CELL = 6.5
+# Least length of a stretch [m].
+_SHORTEST = 3.0
+# Distance between the places that are tried, away from the kerb [m].
+_STEP = 0.4
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A row of objects along kerbs; `roadsides.yaml` explains the fields."""
+
+    kinds: list[str]
+    share: float
+    nearest: tuple[float, float]
+    farthest: float
+    sizes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    along: Sequence[float] = (0.0,)
+    turns: Sequence[float] = (0.0,)
+    moves: bool = False
+
+
+_ROWS = {
+    name: _Row(**values)
+    for name, values in parse_yaml(
+        Path(__file__).with_name("roadsides.yaml").read_bytes()
+    ).items()
+}
+
+
+def fill_roadsides(around: Surroundings, share: float) -> None:
+    """Adds objects to a share of the free places beside kerbs near a drive.
+
+    The objects are, for example, parked cars, hedges, trees and garages. The
+    seed of the temporary changes (`around.seed`) decides only where cars are
+    parked; all other objects are the same for every seed.
+
+    Args:
+        around: surroundings of the drive, to which the objects are added.
+        share: share of the free places that get an object, from 0 to 1.
+    """
+    stretches = straight_kerbs(around, "roadsides", _CELL, _SHORTEST)
+    standing = around.obstacles_except(GROUND_CLASSES)
+    areas = [around.ground.carriageway]
+    shapely.prepare(areas[0])
+    for name, row in _ROWS.items():
+        seed = around.seed if row.moves else 0
+        for stretch in stretches:
+            rng = change_rng(seed, f"roadsides {name}", stretch.name)
+            is_put_up = rng.uniform() < share
+            if rng.uniform() >= row.share:
+                continue
+            builder = OBJECTS[str(rng.choice(row.kinds))]
+            sizes = {k: float(rng.uniform(*v)) for k, v in row.sizes.items()}
+            model = builder.build(rng, **sizes)
+            length = sizes.get("length", 0)
+            turn = float(rng.choice(row.turns))
+            first = float(rng.uniform(*row.nearest))
+            places = product(np.arange(first, row.farthest, _STEP), row.along)
+            for y, x in places:
+                area = stretch.footprint(model, x, y, turn)
+                if not standing.is_free(area) or (
+                    shapely.intersects(areas, area).any()
+                ):
+                    continue
+                # Objects that a smaller share leaves out take up room as well.
+                areas.append(area)
+                if is_put_up:
+                    kind = builder.semantic_class
+                    stretch.put(around, name, kind, model, x, y, turn, length)
+                break

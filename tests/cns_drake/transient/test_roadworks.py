@@ -1,0 +1,55 @@
+"""Roadworks along kerbs."""
+
+from helpers.transient_town import DRIVE, LANES, in_town, new_things
+import numpy as np
+import pytest
+
+from cns_drake.scenarios.scenario import TransientConfig
+from cns_drake.scene.world import load_world
+from cns_drake.transient.changing import change_world
+from cns_drake.transient.ground_surface import GroundSurface
+from cns_drake.transient.loaded_structures import read_structures
+
+
+def test_roadworks_leave_the_lanes_free(changed):
+    fresh = new_things(changed, works=1.0)
+    kinds = {name.split("_", 3)[3].rsplit("_", 1)[0] for name in fresh}
+    assert {"fence", "kerb"} <= kinds
+    assert kinds & {"skip", "excavator", "soil_heap", "brick_pallets"}
+    sites = {tuple(name.split("_")[:3]) for name in fresh}
+    # 140 m of kerb on both sides; parked cars take some of the room.
+    assert 5 < len(sites) < 30
+    _, before = changed()
+    cars = [t.footprint for t in before.values() if t.semantic_class == "car"]
+    for name, thing in fresh.items():
+        outline = thing.outline
+        assert outline.distance(DRIVE) > 1.3
+        y = abs(in_town(thing.p_WPs)[:, 1])
+        if name.endswith("kerb"):
+            assert y.min() == pytest.approx(2.7, abs=0.02)
+            assert y.max() == pytest.approx(3.0, abs=0.02)
+        else:
+            assert y.min() > 3.0
+            assert y.max() < 9.0
+        assert not any(thing.footprint.intersects(car) for car in cars)
+
+
+def test_a_part_of_the_works(changed):
+    whole = new_things(changed, works=1.0)
+    some = new_things(changed, works=0.4)
+    assert 0 < len(some) < len(whole)
+    for name, thing in some.items():
+        assert np.array_equal(thing.p_WPs, whole[name].p_WPs)
+
+
+def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
+    """An object at a height of NaN would hide the whole world from rays."""
+
+    def heights(ground, xy, *, of_road=None):
+        return np.full(len(xy), np.nan)
+
+    monkeypatch.setattr(GroundSurface, "heights", heights)
+    config = TransientConfig(works=1.0)
+    before = load_world(sdf)
+    after = change_world(before, config, DRIVE, LANES)
+    assert read_structures(after).keys() == read_structures(before).keys()
