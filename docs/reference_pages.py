@@ -25,10 +25,10 @@ from cns_drake.roads import road
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios.losses import Losses
-from cns_drake.scenarios.scenario import (
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.sections import (
     DriverConfig,
     RideConfig,
-    Scenario,
     TrafficConfig,
     TransientConfig,
 )

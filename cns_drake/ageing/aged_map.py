@@ -33,8 +33,8 @@ from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import (
     describe_scenario,
-    find_files,
     load_scenario,
+    make_paths_absolute,
 )
 from cns_drake.scene import map_folder
 from cns_drake.scene.labels import MAX_INSTANCE
@@ -364,7 +364,7 @@ def _write_drives(
             scenario = load_scenario(path)
             values = describe_scenario(scenario, folder.path)
         # Other files, such as recorded traffic, are not copied.
-        find_files(values, path)
+        make_paths_absolute(values, path)
         kept = {
             key: value
             for key, value in values.items()

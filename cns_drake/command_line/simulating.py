@@ -80,7 +80,7 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
         InputError: the experiment cannot be used.
     """
     from cns_drake.base.yaml_files import read_yaml
-    from cns_drake.scenarios.losses import write_scenarios
+    from cns_drake.scenarios.scenario_files import write_scenarios
     from cns_drake.studies.experiment import (
         load_experiment,
         shipped_experiments,

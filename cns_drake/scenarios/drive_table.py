@@ -5,7 +5,7 @@ of drives. Each row of the table therefore contains a checksum of its input
 files. If a checksum changes, the figures of the row are computed again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import get_type_hints
@@ -65,32 +65,28 @@ def drive_rows(
         InputError: if a drive cannot be read or planned, or its stage cannot
             be parsed.
     """
-    its = MapFolder(folder)
-    known = {row.checksum: row for row in _read(its.drive_table)}
+    map_folder = MapFolder(folder)
+    known = {row.checksum: row for row in _known_rows(map_folder.drive_table)}
     # Names and sizes stand for the meshes: reading them all would take too long
     # for a listing.
     meshes = "".join(
         f"{mesh.name} {mesh.stat().st_size}"
-        for mesh in sorted(its.meshes.glob("*"))
+        for mesh in sorted(map_folder.meshes.glob("*"))
     ).encode()
     rows = []
-    for path in its.drives():
+    for path in map_folder.drives():
         scenario = scenario_files.read_scenario_file(path)
         world = scenario.world_file
         if not is_there(world):
             continue
         # A map whose drives follow waypoints has no roads.
-        roads = [p for p in (its.roads,) if is_there(p)]
-        total = 0
-        for file in (*scenario.files, *roads, world):
-            with user_errors(file):
-                total = zlib.crc32(file.read_bytes(), total)
-        checksum = f"{zlib.crc32(meshes, total):08x}"
+        roads = [p for p in (map_folder.roads,) if is_there(p)]
+        checksum = _checksum([*scenario.files, *roads, world], meshes)
         row = known.get(checksum)
         if row is None:
             doing(f"measuring {drive_name(path)}")
             size = (sizes or {}).get(str(scenario.stage))
-            row = _measure(scenario, checksum, size)
+            row = _measured_row(scenario, checksum, size)
         rows.append(row)
     return rows
 
@@ -114,7 +110,7 @@ def write_table(
     write_csv(MapFolder(folder).drive_table, names, map(astuple, rows))
 
 
-def _read(path: Path) -> list[DriveRow]:
+def _known_rows(path: Path) -> list[DriveRow]:
     """Returns the rows of a table; empty if it is damaged."""
     types = get_type_hints(DriveRow)
     try:
@@ -126,16 +122,29 @@ def _read(path: Path) -> list[DriveRow]:
         return []
 
 
-def _measure(
+def _checksum(files: Sequence[Path], last: bytes) -> str:
+    """Returns the CRC-32 of files and of the bytes `last`, as hexadecimal."""
+    total = 0
+    for file in files:
+        with user_errors(file):
+            total = zlib.crc32(file.read_bytes(), total)
+    return f"{zlib.crc32(last, total):08x}"
+
+
+def _measured_row(
     scenario: Scenario, checksum: str, size: tuple[int, int] | None
 ) -> DriveRow:
+    """Returns a row, for which the drive is planned.
+
+    `size` gives the numbers of structures and triangles in the stage, if known.
+    """
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.planning import plan_drive
 
     scenario_files.check_files(scenario)
     trajectory = plan_drive(scenario)
     frames = frames_within(trajectory.duration, scenario.frame_period)
-    structures, triangles = size or _size(scenario)
+    structures, triangles = size or _stage_size(scenario)
     return DriveRow(
         sequence=scenario.name,
         map=scenario.folder.path.resolve().name,
@@ -150,7 +159,7 @@ def _measure(
     )
 
 
-def _size(scenario: Scenario) -> tuple[int, int]:
+def _stage_size(scenario: Scenario) -> tuple[int, int]:
     """Returns the numbers of structures and triangles of a stage."""
     from cns_drake.scene.perception_geometry import read_perception_geometry
     from cns_drake.scene.surfaces import TriangleSurface

@@ -1,4 +1,4 @@
-"""Structures that are missing from the city of a drive, as experiments say.
+"""Structures that an experiment removes from the city of a drive.
 
 A share of the buildings and plants is missing. The missing structures are those
 nearest to a random place, so a drive with a greater share lacks everything that
@@ -7,18 +7,15 @@ to structures that an earlier stage lacks; the city is then between the two
 stages. In addition, structures of chosen classes can be missing at random.
 """
 
-from collections.abc import Mapping, Sequence, Set
-import os
+from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-import yaml
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, write_text
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import load_world, structures_in
@@ -32,7 +29,7 @@ _FARTHEST = 1e6
 # The key of `scattered` that is no class.
 _SEED = "seed"
 
-_Part = Annotated[float, Field(ge=0.0, le=1.0)]
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Losses(Section):
@@ -53,7 +50,7 @@ class Losses(Section):
             height in that stage.
     """
 
-    missing: _Part = 0.0
+    missing: _Share = 0.0
     scattered: dict[str, float] = Field(default_factory=dict)
     towards: str | None = None
 
@@ -78,54 +75,36 @@ def lost_structures(
             f"{source}: missing: {drive.name} has no map with structures"
         )
     scattered = dict(losses.scattered)
-    drawn_by = scattered.pop(_SEED, seed)
-    if drawn_by < 0 or drawn_by != int(drawn_by):
+    own_seed = scattered.pop(_SEED, seed)
+    if own_seed < 0 or own_seed != int(own_seed):
         raise InputError(
-            f"{source}: scattered.seed: {drawn_by} is no whole number from 0"
+            f"{source}: scattered.seed: {own_seed} is no whole number from 0"
         )
-    for kind, part in scattered.items():
-        if not 0.0 <= part <= 1.0:
+    for kind, share in scattered.items():
+        if not 0.0 <= share <= 1.0:
             raise InputError(
-                f"{source}: scattered.{kind}: {part} is not from 0 to 1"
+                f"{source}: scattered.{kind}: {share} is not from 0 to 1"
             )
     removable = None
     if losses.towards is not None:
         stage = str(drive.stage)
-        removable = _difference(drive, stage, losses.towards, source)
+        removable = _lacking_in(drive, stage, losses.towards, source)
     table = drive.folder.structures
-    order = _decay_order(table, seed, removable)
-    missing = _draw_losses(table, scattered, int(drawn_by), source)
+    order = _removal_order(table, seed, removable)
+    missing = _scattered_losses(table, scattered, int(own_seed), source)
     return tuple(
         sorted(missing.union(order[: round(losses.missing * len(order))]))
     )
 
 
-def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
-    """Writes scenarios as `<folder>/<name>.yaml`.
-
-    If a map lies next to `folder`, its path is written as a relative path, so
-    that map and folder can be moved together.
-
-    Raises:
-        InputError: if a file cannot be written.
-    """
-    make_folder(folder)
-    here = folder.resolve()
-    paths = []
-    for scenario in scenarios:
-        path = folder / f"{scenario.name}.yaml"
-        values = scenario.model_dump(mode="json", exclude_none=True)
-        if Path(values.get("map", "")).is_relative_to(here.parent):
-            values["map"] = os.path.relpath(values["map"], here)
-        write_text(path, yaml.safe_dump(values, sort_keys=False))
-        paths.append(path)
-    return paths
-
-
-def _difference(
+def _lacking_in(
     base: Scenario, stage: str, other: str, source: str
 ) -> frozenset[str]:
-    """Returns the structures of a stage that another one lacks."""
+    """Returns the structures of a stage that another stage lacks.
+
+    Raises:
+        InputError: a stage does not exist, or the other stage lacks nothing.
+    """
     names = []
     for one in (stage, other):
         scenario = base.replaced(stage=one)
@@ -140,7 +119,7 @@ def _difference(
     return frozenset(difference)
 
 
-def _decay_order(
+def _removal_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
     """Returns structures that can be missing, in the order of removal."""
@@ -175,22 +154,22 @@ def _is_on_a_lot(row: Mapping[str, str]) -> bool:
     return "_lot_" in row["name"] and "lot" in tags
 
 
-def _draw_losses(
-    table: Path, parts: Mapping[str, float], seed: int, source: str
+def _scattered_losses(
+    table: Path, shares: Mapping[str, float], seed: int, source: str
 ) -> frozenset[str]:
-    """Draws the missing structures, each class independently.
+    """Returns a random share of the structures of each class.
 
-    `parts` maps classes to shares from 0 to 1. The structures of a smaller
+    `shares` maps classes to shares from 0 to 1. The structures of a smaller
     share are among those of a greater share.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]
     rows = [row for row in records if not _is_on_a_lot(row)]
     missing: set[str] = set()
-    for kind, part in parts.items():
+    for kind, share in shares.items():
         names = sorted(row["name"] for row in rows if row["class"] == kind)
         if not names:
             raise InputError(f"{source}: scattered: no {kind!r} in {table}")
         rng = np.random.default_rng([seed, *kind.encode()])
         order = rng.permutation(len(names))
-        missing.update(names[k] for k in order[: round(part * len(names))])
+        missing.update(names[k] for k in order[: round(share * len(names))])
     return frozenset(missing)

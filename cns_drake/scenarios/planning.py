@@ -2,45 +2,22 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-import math
 
 import numpy as np
-from pydrake.geometry import FrameId
-from pydrake.math import RigidTransform
-import shapely
-from shapely import STRtree
 
 from cns_drake.base.errors import InputError
 from cns_drake.motion import suspension
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.schedule import frames_within
 from cns_drake.roads.driver_offsets import FINE_SPACING, driven_path, kerbs
-from cns_drake.roads.lane_path import POINT_SPACING
+from cns_drake.roads.lane_path import POINT_SPACING, LanePath
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
+from cns_drake.scenarios.path_obstacles import obstacles_beside
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.scene.world import load_world
-
-# Heights above the path at which rays look for obstacles, from below the top of
-# a kerb up to the car's roof [m].
-_HEIGHTS = np.array([(0.0, 0.0, z) for z in (0.1, 0.3, 0.7, 1.2, 1.6)])
-# Directions of these rays, their range [m], and the greatest z component of the
-# normal of an obstacle.
-_AROUND = np.array(
-    [
-        (math.cos(angle), math.sin(angle), 0.0)
-        for angle in np.radians(np.arange(0, 360, 10)).tolist()
-    ]
-)
-# Range of these rays [m].
-_SIGHT = 5.0
-# Greatest z component of the normal of an obstacle.
-_STEEP = 0.7
 
 
 @dataclass(frozen=True)
@@ -95,8 +72,7 @@ class DrivePlan:
     def _rigid_motion(self) -> Trajectory:
         """The motion of a car without springs."""
         scenario = self.scenario
-        driver = scenario.driver
-        spacing = FINE_SPACING if driver.departs else POINT_SPACING
+        spacing = FINE_SPACING if scenario.driver.departs else POINT_SPACING
         if scenario.waypoints is not None:
             path = load_waypoint_path(
                 scenario.waypoints, spacing, u_turns=scenario.u_turns
@@ -116,19 +92,8 @@ class DrivePlan:
             )
             source = f"{scenario.source}: route"
             cure = "give the junction a greater kerb_radius"
-        if driver.departs:
-            path = driven_path(
-                path,
-                POINT_SPACING,
-                _things_beside(scenario, path.points)
-                if scenario.waypoints is not None or self.network is None
-                else kerbs(self.network),
-                source,
-                wander=driver.wander,
-                wander_length=driver.wander_length,
-                lane_changes=driver.lane_changes,
-                rng=driver.rng(scenario.name),
-            )
+        if scenario.driver.departs:
+            path = self._driven_path(path, source)
         trajectory = Trajectory(path, scenario.speeds)
         radius, (x, y, _) = trajectory.path.tightest_bend()
         if radius < TIGHTEST_RADIUS:
@@ -137,6 +102,25 @@ class DrivePlan:
                 f" is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
             )
         return trajectory
+
+    def _driven_path(self, path: LanePath, source: str) -> LanePath:
+        """Returns the path of a driver who leaves the middle of the lane.
+
+        `source` is the file or field of the path, for error messages.
+        """
+        driver = self.scenario.driver
+        return driven_path(
+            path,
+            POINT_SPACING,
+            obstacles_beside(self.scenario, path.points)
+            if self.scenario.waypoints is not None or self.network is None
+            else kerbs(self.network),
+            source,
+            wander=driver.wander,
+            wander_length=driver.wander_length,
+            lane_changes=driver.lane_changes,
+            rng=driver.rng(self.scenario.name),
+        )
 
     def _on_springs(self, trajectory: Trajectory) -> Trajectory:
         ride = self.scenario.ride
@@ -169,42 +153,6 @@ def plan_drive(scenario: Scenario) -> Trajectory:
     return DrivePlan(scenario).trajectory
 
 
-def _things_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
-    """Returns obstacles beside a path in the world, seen from above.
-
-    Rays in all directions, from near the ground to the height of the car, find
-    kerbs and walls. An edge at which the ground only falls is not found. The
-    points (N, 3) of the path [m] must be close together.
-    """
-    world = load_world(scenario.world_file, without=scenario.without)
-    context = world.plant.CreateDefaultContext()
-    inspector = world.scene_graph.model_inspector()
-    bodies = {
-        frame: world.plant.GetBodyFromFrameId(frame)
-        for frame in inspector.GetAllFrameIds()
-        if frame != world.scene_graph.world_frame_id()
-    }
-
-    def X_WF(frame: FrameId) -> RigidTransform:
-        if frame not in bodies:
-            return RigidTransform()
-        return bodies[frame].EvalPoseInWorld(context)
-
-    scene = RayCastingScene(
-        read_perception_geometry(inspector), world.anchored_frames(), X_WF
-    )
-    p_WR = (points + _HEIGHTS[:, None]).reshape(-1, 3)
-    d_W = np.repeat(_AROUND, len(p_WR), axis=0)
-    hits = scene.cast_rays(p_WR, d_W, _SIGHT, with_normals=True)
-    # The ground is no obstacle.
-    steep = np.isfinite(hits.ranges) & (np.abs(hits.normals_W[:, 2]) < _STEEP)
-    p_WQ = np.tile(p_WR, (len(_AROUND), 1))[steep]
-    p_WQ += hits.ranges[steep, None] * d_W[steep]
-    # One point per centimetre is enough.
-    xy = np.unique(np.round(p_WQ[:, :2], 2), axis=0)
-    return STRtree(np.asarray(shapely.points(xy)))
-
-
 def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
     """Returns the number of frames that a scenario's drive records.
 
@@ -219,24 +167,3 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
             f"drive has {available}"
         )
     return scenario.frames or available
-
-
-def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns the other stage that a drive's web page shows for comparison.
-
-    The other stage is the map's last stage or, for a drive in the last stage,
-    the first stage. If the drive leaves out structures (`without`), the other
-    stage is the drive's own stage with these structures.
-
-    Returns:
-        The scenario in the other stage, and the stage's name for the page; None
-        and "" if there is no other stage.
-    """
-    if scenario.without:
-        return scenario.replaced(without=()), "the whole city"
-    stages = list(scenario.folder.stages())
-    others = [stage for stage in stages if stage != scenario.stage]
-    if scenario.stage is None or not others:
-        return None, ""
-    stage = others[-1] if stages[-1] in others else others[0]
-    return scenario.replaced(stage=stage), f"stage {stage}"

@@ -10,7 +10,8 @@ from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__, installed_versions
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene.referenced_files import FileWatch, referenced_files
+from cns_drake.scene.file_watch import FileWatch
+from cns_drake.scene.referenced_files import referenced_files
 from cns_drake.sensors.imu.config import KALIBR_FILE
 
 # Packages that can influence a message's bytes.
@@ -44,6 +45,7 @@ def digest_inputs(
     the files that these meshes and models name.
 
     Args:
+        scenario: the scenario.
         watch: records size and time of each file before the file is read, so
             that a later change can be noticed; None records nothing.
 
@@ -56,6 +58,19 @@ def digest_inputs(
     Raises:
         InputError: a file cannot be read.
     """
+    inputs = _input_files(scenario)
+    digests = {name: digest_file(one, watch) for name, one in inputs.items()}
+    if watch and scenario.imu.kalibr is not None:
+        watch.record(str(scenario.imu.kalibr))
+    kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
+    if kalibr is not None:
+        text = json.dumps(kalibr).encode()
+        digests["kalibr"] = hashlib.sha256(text).hexdigest()
+    return digests
+
+
+def _input_files(scenario: Scenario) -> dict[str, Path]:
+    """Returns kind of file -> file, without the file of the IMU's noise."""
     inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
     folder = scenario.folder
     structures = folder.structures
@@ -75,14 +90,7 @@ def digest_inputs(
         inputs["lanes"] = folder.lanes
     if scenario.traffic.fcd is not None:
         inputs["fcd"] = Path(scenario.traffic.fcd)
-    digests = {name: digest_file(one, watch) for name, one in inputs.items()}
-    if watch and scenario.imu.kalibr is not None:
-        watch.take_down(str(scenario.imu.kalibr))
-    kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)
-    if kalibr is not None:
-        text = json.dumps(kalibr).encode()
-        digests["kalibr"] = hashlib.sha256(text).hexdigest()
-    return digests
+    return inputs
 
 
 def combined_digest(inputs: dict[str, str]) -> str:

@@ -1,10 +1,12 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 import os
 from pathlib import Path
 import re
 from typing import Any
+
+import yaml
 
 from cns_drake.base.errors import (
     InputError,
@@ -12,6 +14,7 @@ from cns_drake.base.errors import (
     validated,
     value_errors,
 )
+from cns_drake.base.files import make_folder, write_text
 from cns_drake.base.terminal import note
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
@@ -54,7 +57,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     if not os.path.isfile(path):
         folder = shipped_maps().get(str(name_or_file), path)
         if os.path.isdir(folder):
-            raise InputError(_name_drives(name_or_file, MapFolder(folder)))
+            raise InputError(_not_a_drive(name_or_file, MapFolder(folder)))
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
                 f"unknown drive '{name_or_file}'; there are: "
@@ -67,7 +70,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     return scenario
 
 
-def _name_drives(given: str | Path, folder: MapFolder) -> str:
+def _not_a_drive(given: str | Path, folder: MapFolder) -> str:
     """Returns the error for a folder that was given in place of a drive."""
     files = folder.drives()
     if not files:
@@ -90,20 +93,7 @@ def read_scenario_file(path: Path) -> Scenario:
     files: dict[Path, dict] = {}
     file: Path | None = path
     while file is not None:
-        values = read_yaml(file)
-        if not isinstance(values, dict):
-            raise InputError(f"{file}: not a mapping of scenario fields")
-        name = values.setdefault("name", drive_name(file))
-        if name == drive_name(file) and not re.fullmatch(
-            r"[A-Za-z0-9]\w*", name, re.ASCII
-        ):
-            raise InputError(
-                f"{file}: name: {name!r}, from its path, has more than letters,"
-                " digits and underscores; give a name"
-            )
-        find_files(values, file)
-        _note_radians(values, file)
-        files[file] = values
+        values = files[file] = _read_fields(file)
         file = _find_base(values.pop("base", None), file, files)
     scenario = None
     for file, values in reversed(files.items()):
@@ -114,6 +104,24 @@ def read_scenario_file(path: Path) -> Scenario:
         scenario._files = (file, *scenario.files)
     assert scenario is not None  # There is at least one file.
     return scenario
+
+
+def _read_fields(file: Path) -> dict:
+    """Returns the fields in a scenario file, with a name and absolute paths."""
+    values = read_yaml(file)
+    if not isinstance(values, dict):
+        raise InputError(f"{file}: not a mapping of scenario fields")
+    name = values.setdefault("name", drive_name(file))
+    if name == drive_name(file) and not re.fullmatch(
+        r"[A-Za-z0-9]\w*", name, re.ASCII
+    ):
+        raise InputError(
+            f"{file}: name: {name!r}, from its path, has more than letters,"
+            " digits and underscores; give a name"
+        )
+    make_paths_absolute(values, file)
+    _note_radians(values, file)
+    return values
 
 
 def _note_radians(values: Mapping[str, Any], file: Path) -> None:
@@ -147,7 +155,7 @@ def _find_base(
     return file
 
 
-def find_files(values: dict, path: Path) -> None:
+def make_paths_absolute(values: dict, path: Path) -> None:
     """Makes the paths in a scenario's fields absolute, in place.
 
     Names of shipped maps stay unchanged.
@@ -161,7 +169,7 @@ def find_files(values: dict, path: Path) -> None:
         InputError: a value cannot be a path.
     """
 
-    def find(fields: dict, field: str) -> dict:
+    def absolute(fields: dict, field: str) -> dict:
         place = fields.get(field)
         if not isinstance(place, str) or place in shipped_maps():
             return fields
@@ -169,10 +177,10 @@ def find_files(values: dict, path: Path) -> None:
             return {**fields, field: str((path.parent / place).resolve())}
 
     for field in ("map", "world", "waypoints"):
-        values |= find(values, field)
+        values |= absolute(values, field)
     for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
         if isinstance(values.get(section), dict):
-            values[section] = find(values[section], field)
+            values[section] = absolute(values[section], field)
 
 
 def check_files(scenario: Scenario, source: object = None) -> None:
@@ -251,3 +259,25 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     if scenario.imu.kalibr is not None:
         values["imu"]["kalibr"] = KALIBR_FILE
     return values
+
+
+def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
+    """Writes scenarios as `<folder>/<name>.yaml`.
+
+    If a map lies next to `folder`, its path is written as a relative path, so
+    that map and folder can be moved together.
+
+    Raises:
+        InputError: if a file cannot be written.
+    """
+    make_folder(folder)
+    here = folder.resolve()
+    paths = []
+    for scenario in scenarios:
+        path = folder / f"{scenario.name}.yaml"
+        values = scenario.model_dump(mode="json", exclude_none=True)
+        if Path(values.get("map", "")).is_relative_to(here.parent):
+            values["map"] = os.path.relpath(values["map"], here)
+        write_text(path, yaml.safe_dump(values, sort_keys=False))
+        paths.append(path)
+    return paths

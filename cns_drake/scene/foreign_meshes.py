@@ -26,6 +26,7 @@ from cns_drake.base.errors import missing_library
 _FAULT = re.compile(
     r"WARNING\] (?:Read \w+ failed|Unable to load file .* with ASSIMP): (.*)"
 )
+# Codes with which a terminal sets the colour of text.
 _COLOUR = re.compile(r"\x1b\[[\d;]*m")
 
 
@@ -102,23 +103,27 @@ def _serve() -> None:
             return
         messages.seek(0)
         messages.truncate()
-        if path.lower().endswith(".dae"):
-            # Only Open3D's reader of models supports the format.
-            parts = open3d.io.read_triangle_model(path).meshes
-            mesh = open3d.geometry.TriangleMesh()
-            for part in parts:
-                mesh += part.mesh
-        else:
-            mesh = open3d.io.read_triangle_mesh(path)
-        triangles = np.asarray(mesh.triangles, np.int32)
-        answer: object = np.asarray(mesh.vertices), triangles
-        if fault := _fault(messages, path):
-            answer = fault
-        pickle.dump(answer, answers)
+        surface = _read_surface(open3d, path)
+        fault = _printed_fault(messages, path)
+        pickle.dump(fault or surface, answers)
         answers.flush()
 
 
-def _fault(messages: IO[bytes], path: str) -> str:
+def _read_surface(
+    open3d: ModuleType, path: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the vertices and triangles of a mesh file."""
+    if path.lower().endswith(".dae"):
+        # Only Open3D's reader of models supports the format.
+        mesh = open3d.geometry.TriangleMesh()
+        for part in open3d.io.read_triangle_model(path).meshes:
+            mesh += part.mesh
+    else:
+        mesh = open3d.io.read_triangle_mesh(path)
+    return np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int32)
+
+
+def _printed_fault(messages: IO[bytes], path: str) -> str:
     """Returns the fault that a parser has printed, or "" without one."""
     ctypes.CDLL(None).fflush(None)  # The parsers print through C.
     messages.seek(0)

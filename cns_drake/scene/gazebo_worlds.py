@@ -2,130 +2,27 @@
 
 Drake rejects many elements of such worlds, and crashes on an infinite collision
 plane if there are many other collision shapes. Only the visuals are kept, at
-their initial places, and nothing in such a world moves. Models and files to
-which a world refers are searched for in the folders in which Gazebo searches.
+their initial places, and nothing in such a world moves.
 """
 
 from collections import Counter
 from collections.abc import Iterable
 import contextlib
 import math
-import os
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.xml_elements import read_elements
-from cns_drake.scene.model_check import SIZES, check_model, lacks_size
+from cns_drake.scene.model_check import SIZES, lacks_size, read_model
+from cns_drake.scene.model_finder import ModelFinder, model_file
 
-# Environment variables of old and new Gazebo and of libsdformat that list
-# folders of models.
-_VARIABLES = (
-    "GZ_SIM_RESOURCE_PATH",
-    "SDF_PATH",
-    "IGN_GAZEBO_RESOURCE_PATH",
-    "GAZEBO_MODEL_PATH",
-)
-_SCHEMES = ("model://", "package://", "file://")
-
-
-class ModelFinder:
-    """Finds the files to which URIs in a world refer."""
-
-    def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
-        """Determines the folders to search.
-
-        These are, in order of precedence: the given ones, those of the
-        environment variables, the world's folder, its parent folder, and the
-        folder `models` in both.
-
-        Args:
-            world: SDF file of the world.
-            model_paths: folders to search first.
-        """
-        folder = world.absolute().parent
-        named = [
-            Path(place)
-            for variable in _VARIABLES
-            for place in os.environ.get(variable, "").split(os.pathsep)
-            if place
-        ]
-        near = [folder, folder / "models"]
-        near += [folder.parent, folder.parent / "models"]
-        self._places = [*map(Path, model_paths), *named, *near]
-
-    def find(self, uri: str, folder: Path) -> Path | None:
-        """Returns the file or folder of a URI, or None if there is none.
-
-        Args:
-            uri: `model://<name>/...`, an absolute path, or a relative path.
-            folder: folder of the file that contains the URI, from which
-                relative paths start.
-        """
-        rest = uri
-        for scheme in _SCHEMES:
-            rest = rest.removeprefix(scheme)
-        if "://" in rest:
-            return None
-        places = self._places
-        if rest == uri:
-            places = [folder, *places]
-        for place in places:
-            path = place / rest
-            if path.exists():
-                return path.resolve()
-            # The folder may contain the model's folder, or be that folder
-            # itself.
-            name, _, within = rest.partition("/")
-            if place.name == name and (place / within).exists():
-                return (place / within).resolve()
-        return None
-
-
-def model_file(path: Path) -> Path:
-    """Returns the SDF file of a model.
-
-    `path` is this file, or the folder of the model.
-
-    Raises:
-        InputError: the folder has no SDF file.
-    """
-    if not path.is_dir():
-        return path
-    for name in ("model.config", "manifest.xml"):
-        if (path / name).is_file():
-            root = read_xml(path / name)
-            versions = sorted(
-                root.iter("sdf"), key=lambda sdf: sdf.get("version", "")
-            )
-            for sdf in reversed(versions):
-                file = path / (sdf.text or "").strip()
-                if file.is_file():
-                    return file
-    found = sorted(path.glob("*.sdf"))
-    if not found:
-        raise InputError(f"{path}: holds no SDF model")
-    preferred = path / "model.sdf"
-    return preferred if preferred in found else found[0]
-
-
-def read_xml(path: Path) -> Element:
-    """Returns the root element of an XML file.
-
-    Raises:
-        InputError: the file cannot be read, or is not the XML of a model.
-    """
-    root = check_model(path)
-    return read_elements(path, encoding="utf-8") if root is None else root
-
-
-# Elements that Drake reads differently from Gazebo.
-_SIGNS = (
+# Elements that Drake does not read, or reads differently from Gazebo.
+_OF_GAZEBO = (
     "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
     "road", "population", "submesh", "transparency", "visibility_flags",
     "cone", "heightmap", "image", "polyline", "initial_position",
 )  # fmt: skip
-_ENDLESS_COLLISION = ".//collision/geometry/plane"
+_PLANE_COLLISION = ".//collision/geometry/plane"
 _SIZED_PLANE = ".//visual/geometry/plane/size"
 # Elements that are left out -> how a note calls them.
 _SKIPPED = {
@@ -185,12 +82,14 @@ _GROUND_PLANE = "model://ground_plane"
 _GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
 <geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
 </model>"""
+# Greatest depth of models within models.
 _DEEPEST = 20
 # Thickness of the box for a plane of finite size, below its surface [m].
 _PLANE_THICKNESS = 1e-4
 # Size of the box for an infinite plane. Larger shapes would show the single
 # precision of rays [m].
 _ENDLESS = 5000.0
+# Visibility flags of a visual that every sensor sees.
 _EVERY_FLAG = 0xFFFFFFFF
 
 
@@ -205,10 +104,10 @@ def is_gazebo_world(path: Path, root: Element) -> bool:
         return False
     return (
         path.suffix.lower() == ".world"
-        or root.find(_ENDLESS_COLLISION) is not None
+        or root.find(_PLANE_COLLISION) is not None
         or root.find(_SIZED_PLANE) is not None
         or root.find("world/joint") is not None
-        or any(next(root.iter(sign), None) is not None for sign in _SIGNS)
+        or any(next(root.iter(tag), None) is not None for tag in _OF_GAZEBO)
         or any(
             lacks_size(shape)
             for geometry in root.iterfind(".//visual/geometry")
@@ -240,7 +139,9 @@ def simplify_world(
     if not worlds:
         world.extend(root)
     made = Element("sdf", version="1.9")
-    target = SubElement(made, "world", name=_legal(world.get("name", "world")))
+    target = SubElement(
+        made, "world", name=_legal_name(world.get("name", "world"))
+    )
     simplifier.skip("further worlds of the file", len(worlds) - 1)
     simplifier.add_world(root, world, target)
     return tostring(made, "unicode"), simplifier.notes()
@@ -284,6 +185,11 @@ class _Simplifier:
     def add_world(self, root: Element, world: Element, target: Element) -> None:
         """Adds the models of a world; `root` is the root of its file."""
         self._note_references(root)
+        self._count_saved(world)
+        self._add_children(world, target, self._path.absolute().parent, 0)
+
+    def _count_saved(self, world: Element) -> None:
+        """Counts what a saved state of the world would change."""
         saved = world.findall("state//model")
         placed = [
             one
@@ -299,9 +205,9 @@ class _Simplifier:
         for tag in ("insertions", "deletions"):
             for _ in world.iterfind(f"state/{tag}/*"):
                 self.skip(f"saved {tag} (state)")
-        self._add_children(world, target, self._path.absolute().parent, 0)
 
     def _note_references(self, root: Element) -> None:
+        """Notes to what a file refers, and counts joints that begin moved."""
         begins = [*root.iterfind(".//joint/axis/initial_position")]
         begins += root.iterfind(".//joint/axis2/initial_position")
         moved = [one for one in begins if float((one.text or "").strip() or 0)]
@@ -321,7 +227,7 @@ class _Simplifier:
         self._count_unknown(source)
         for element in source:
             if element.tag == "include":
-                self._include(element, target, folder, depth)
+                self._add_included(element, target, folder, depth)
             elif element.tag == "model":
                 self._add_model(element, target, folder, depth)
             elif element.tag == "link":
@@ -357,47 +263,43 @@ class _Simplifier:
             ):
                 self.skip(f"attributes {key} of <{element.tag}>")
 
-    def _include(
+    def _add_included(
         self, include: Element, target: Element, folder: Path, depth: int
     ) -> None:
         self._count_unknown(include)
         uri = _local_uri((include.findtext("uri") or "").strip())
         place = self._finder.find(uri, folder)
+        model = None
         if place is not None:
             file = model_file(place)
-            root = read_xml(file)
-            self._note_references(root)
-            models = root.findall("model")
             folder = file.parent
-            lights, actors = root.findall("light"), root.findall("actor")
-            self.skip("lights", len(lights))
-            self.skip("actors", len(actors))
-            self.skip("further models of included files", len(models) - 1)
-            if not (models or lights or actors):
-                self.skip("included files without a model of SDF")
+            model = self._read_included(file)
         elif uri.rstrip("/") == _SUN:
             self.skip("lights")
-            return
         elif uri.rstrip("/") == _GROUND_PLANE:
-            models = [fromstring(_GROUND)]
+            model = fromstring(_GROUND)
         else:
             self._missing["models"][uri] += 1
+        if model is None:
             return
-        for model in models[:1]:
-            name, pose = include.findtext("name"), include.find("pose")
-            if name:
-                model.set("name", name.strip())
-            if pose is not None:
-                for old in model.findall("pose"):
-                    model.remove(old)
-                model.append(pose)
-            placement = include.findtext("placement_frame")
-            if placement:
-                model.set("placement_frame", placement.strip())
-            if include.get("merge", "").strip().lower() in ("true", "1"):
-                self._merge(model, target, folder, depth)
-            else:
-                self._add_model(model, target, folder, depth)
+        _override_model(model, include)
+        if include.get("merge", "").strip().lower() in ("true", "1"):
+            self._merge(model, target, folder, depth)
+        else:
+            self._add_model(model, target, folder, depth)
+
+    def _read_included(self, file: Path) -> Element | None:
+        """Returns the first model in a file, if any; counts all else."""
+        root = read_model(file)
+        self._note_references(root)
+        models = root.findall("model")
+        lights, actors = root.findall("light"), root.findall("actor")
+        self.skip("lights", len(lights))
+        self.skip("actors", len(actors))
+        self.skip("further models of included files", len(models) - 1)
+        if not (models or lights or actors):
+            self.skip("included files without a model of SDF")
+        return models[0] if models else None
 
     def _merge(
         self, model: Element, target: Element, folder: Path, depth: int
@@ -408,7 +310,7 @@ class _Simplifier:
                 f"{self._path}: include of {model.get('name')}: a"
                 " placement_frame together with merge is not read"
             )
-        own = f"_merged_{_name(model, target)}"
+        own = f"_merged_{_free_name(model, target)}"
         self._copy_pose(model, SubElement(target, "frame", name=own))
         for part in model:
             if part.tag not in ("link", "model", "include", "frame", "joint"):
@@ -431,7 +333,7 @@ class _Simplifier:
     def _add_model(
         self, model: Element, target: Element, folder: Path, depth: int
     ) -> None:
-        made = Element("model", name=_name(model, target))
+        made = Element("model", name=_free_name(model, target))
         if model.get("placement_frame"):
             made.set("placement_frame", model.get("placement_frame", ""))
         if target.tag == "world":
@@ -443,7 +345,7 @@ class _Simplifier:
 
     def _add_link(self, link: Element, target: Element, folder: Path) -> None:
         self._count_unknown(link)
-        made = SubElement(target, "link", name=_name(link, target))
+        made = SubElement(target, "link", name=_free_name(link, target))
         self._copy_pose(link, made)
         # An invisible element is kept if others are placed relative to it.
         for visual in link.iterfind("visual"):
@@ -462,23 +364,13 @@ class _Simplifier:
         if self._is_invisible(visual):
             return
         shape = shapes[0]
-        made = Element("visual", name=_name(visual, link))
+        made = Element("visual", name=_free_name(visual, link))
         self._copy_pose(visual, made)
         self._count_unknown(shape)
         if shape.tag == "mesh":
-            uri = (shape.findtext("uri") or "").strip()
-            place = self._finder.find(uri, folder)
-            if place is None or not place.is_file():
-                self._missing["meshes"][uri] += 1
+            mesh = self._located_mesh(shape, folder)
+            if mesh is None:
                 return
-            mesh = Element("mesh")
-            # Drake does not decode percent signs in such a URI.
-            SubElement(mesh, "uri").text = f"file://{place}"
-            scale = shape.find("scale")
-            if scale is not None:
-                mesh.append(scale)
-            if shape.find("submesh") is not None:
-                self.skip("choices of a part of a mesh")
             shape = mesh
         elif shape.tag == "plane" and shape.find("size") is not None:
             sides = map(float, (shape.findtext("size") or "").split())
@@ -500,10 +392,30 @@ class _Simplifier:
         if material is not None:
             self._add_material(material, made)
 
+    def _located_mesh(self, shape: Element, folder: Path) -> Element | None:
+        """Returns a mesh with the path of its file, or None if it is missing.
+
+        `folder` is the folder of the file that contains the mesh's URI.
+        """
+        uri = (shape.findtext("uri") or "").strip()
+        place = self._finder.find(uri, folder)
+        if place is None or not place.is_file():
+            self._missing["meshes"][uri] += 1
+            return None
+        mesh = Element("mesh")
+        # Drake does not decode percent signs in such a URI.
+        SubElement(mesh, "uri").text = f"file://{place}"
+        scale = shape.find("scale")
+        if scale is not None:
+            mesh.append(scale)
+        if shape.find("submesh") is not None:
+            self.skip("choices of a part of a mesh")
+        return mesh
+
     def _is_invisible(self, visual: Element) -> bool:
         """Returns whether Gazebo hides a visual; counts doubtful cases."""
-        transparency = _number(visual.findtext("transparency"), 0.0)
-        flags = _number(visual.findtext("visibility_flags"), _EVERY_FLAG)
+        transparency = _number_in(visual.findtext("transparency"), 0.0)
+        flags = _number_in(visual.findtext("visibility_flags"), _EVERY_FLAG)
         if transparency >= 1.0 or flags == 0:
             self.skip("invisible visuals")
             return True
@@ -545,6 +457,20 @@ class _Simplifier:
             SubElement(target, "pose", relative_to=kept["relative_to"])
 
 
+def _override_model(model: Element, include: Element) -> None:
+    """Gives a model the name, pose and placement frame of its include."""
+    name, pose = include.findtext("name"), include.find("pose")
+    if name:
+        model.set("name", name.strip())
+    if pose is not None:
+        for old in model.findall("pose"):
+            model.remove(old)
+        model.append(pose)
+    placement = include.findtext("placement_frame")
+    if placement:
+        model.set("placement_frame", placement.strip())
+
+
 def _thin_box(
     plane: Element, visual: Element, link: Element, model: Element
 ) -> Element:
@@ -559,7 +485,7 @@ def _thin_box(
     # The pose of the visual becomes a frame, and the box lies below it.
     own = link.get("name", "")
     frame = Element("frame", name=f"_plane_of_{own}", attached_to=own)
-    frame.set("name", _name(frame, model))
+    frame.set("name", _free_name(frame, model))
     model.append(frame)
     frame.extend(visual.findall("pose"))
     for pose in visual.findall("pose"):
@@ -585,7 +511,7 @@ def _local_uri(uri: str) -> str:
     return "model://" + name.split("/")[0].strip().lower().replace(" ", "_")
 
 
-def _number(text: str | None, default: float) -> float:
+def _number_in(text: str | None, default: float) -> float:
     """Returns the number in a text, or the default if it has none."""
     for kind in (float, lambda word: int(word, 16)):
         with contextlib.suppress(ValueError):
@@ -593,9 +519,9 @@ def _number(text: str | None, default: float) -> float:
     return default
 
 
-def _name(element: Element, target: Element) -> str:
+def _free_name(element: Element, target: Element) -> str:
     """Returns an element's name, changed if it is already in use."""
-    wanted = _legal(element.get("name", element.tag))
+    wanted = _legal_name(element.get("name", element.tag))
     taken = {sibling.get("name") for sibling in target}
     name = wanted
     count = 1
@@ -605,7 +531,7 @@ def _name(element: Element, target: Element) -> str:
     return name
 
 
-def _legal(name: str) -> str:
+def _legal_name(name: str) -> str:
     """Returns a name without parts that SDF reserves."""
     legal = name.replace("::", "_").strip() or "unnamed"
     if legal.startswith("__") or legal == "world":

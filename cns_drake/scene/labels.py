@@ -40,13 +40,22 @@ def number_structures(names: Sequence[str]) -> Labels:
         InputError: there are more structures than instance ids.
     """
     unique, place = np.unique(np.array(names, str), return_inverse=True)
-    if len(unique) > MAX_INSTANCE:
-        raise InputError(
-            f"the world has {len(unique)} structures, but an instance id has "
-            f"room for {MAX_INSTANCE}"
-        )
+    check_count(len(unique))
     return Labels(
         np.zeros(len(names), np.uint16),
         np.full(len(names), OTHER_MOVING_ID, np.uint16),
         (place.reshape(-1) + 1).astype(np.uint16),
     )
+
+
+def check_count(num_structures: int) -> None:
+    """Checks that there are instance ids for all structures of a world.
+
+    Raises:
+        InputError: there are more structures than instance ids.
+    """
+    if num_structures > MAX_INSTANCE:
+        raise InputError(
+            f"the world has {num_structures} structures, but an instance id "
+            f"has room for {MAX_INSTANCE}"
+        )

@@ -18,7 +18,8 @@ from pydrake.geometry import (
 from cns_drake.base.errors import InputError
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.mesh_contents import GLTF, check_mesh_file, check_obj
+from cns_drake.scene.mesh_check import GLTF, check_mesh_file
+from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 
 # The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
@@ -38,8 +39,8 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """
     # Drake's reader converts all dialects of VTK to the one that Drake writes.
     words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
-    vertices = _block(words, "POINTS", 3, 3).astype(float)
-    cells = _block(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
+    vertices = _rows_of_numbers(words, "POINTS", 3, 3).astype(float)
+    cells = _rows_of_numbers(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
     faces = cells[:, _FACES].reshape(-1, 3)
     # A face between two tetrahedra occurs twice.
     _, first, count = np.unique(
@@ -48,7 +49,7 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return vertices, faces[np.sort(first[count == 1])]
 
 
-def _block(
+def _rows_of_numbers(
     words: Sequence[str], keyword: str, header: int, columns: int
 ) -> np.ndarray:
     """Returns the rows of numbers behind a keyword and its header."""
@@ -121,24 +122,8 @@ class MeshFiles:
         if source.is_path():
             return self._read_file(Path(source.path()))
         # Open3D can only read files.
-        mesh = source.in_memory()
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, f"mesh{source.extension()}")
-            path.write_bytes(mesh.mesh_file.contents())
-            for uri, file in mesh.supporting_files.items():
-                target = Path(folder, uri)
-                if not target.resolve().is_relative_to(Path(folder).resolve()):
-                    raise ValueError(
-                        f"the file '{uri}', which it names, is not beside the "
-                        "mesh"
-                    )
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(
-                    file.read_bytes()
-                    if isinstance(file, Path)
-                    else file.contents()
-                )
-            return self._read_file(path)
+            return self._read_file(_write_mesh(source, Path(folder)))
 
     def _read_file(self, path: Path) -> TriangleSurface:
         if not path.is_file():
@@ -155,6 +140,31 @@ class MeshFiles:
             x, y, z = p_GVset.T
             p_GVset = np.stack([x, -z, y], axis=1)
         return TriangleSurface(p_GVset, triangles)
+
+
+def _write_mesh(source: MeshSource, folder: Path) -> Path:
+    """Writes a mesh in memory and its supporting files to a folder.
+
+    Returns:
+        The file of the mesh.
+
+    Raises:
+        ValueError: a supporting file would be outside the folder.
+    """
+    mesh = source.in_memory()
+    path = folder / f"mesh{source.extension()}"
+    path.write_bytes(mesh.mesh_file.contents())
+    for uri, file in mesh.supporting_files.items():
+        target = folder / uri
+        if not target.resolve().is_relative_to(folder.resolve()):
+            raise ValueError(
+                f"the file '{uri}', which it names, is not beside the mesh"
+            )
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(
+            file.read_bytes() if isinstance(file, Path) else file.contents()
+        )
+    return path
 
 
 def mesh_shape_key(shape: Mesh | Convex) -> tuple:

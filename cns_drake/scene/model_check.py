@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
-from cns_drake.scene.mesh_contents import check_obj
+from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
 _MODELS = (".sdf", ".world", ".urdf")
@@ -75,6 +75,16 @@ def check_model(path: Path) -> Element | None:
     return roots.get(path.resolve())
 
 
+def read_model(path: Path) -> ElementTree.Element:
+    """Returns the root element of a model's file, after `check_model`.
+
+    Raises:
+        InputError: see `check_model`.
+    """
+    root = check_model(path)
+    return read_elements(path, encoding="utf-8") if root is None else root
+
+
 class _ModelCheck:
     """One pass over the elements of a file."""
 
@@ -91,9 +101,10 @@ class _ModelCheck:
         for child in element:
             self._walk(cast(Element, child), [*parents, element.tag])
         if "plugin" not in parents:
-            self._check(element, parents[-1] if parents else "", parents)
+            self._check_element(element, parents)
 
-    def _check(self, element: Element, parent: str, parents: list[str]) -> None:
+    def _check_element(self, element: Element, parents: list[str]) -> None:
+        parent = parents[-1] if parents else ""
         text = element.text or ""
         if parent == "geometry" and element.tag in SIZES:
             self._check_sizes(element)
@@ -105,19 +116,19 @@ class _ModelCheck:
                 fault = f"two shapes, {found[0]} and {found[1]}"
                 self._refuse(element, fault)
         elif element.tag == "pose":
-            for number in self._numbers(element, text)[:3]:
+            for number in self._finite_numbers(element, text)[:3]:
                 if abs(number) > LARGEST_SIZE:
                     fault = f"{number:g} is beyond {LARGEST_SIZE:g} m"
                     self._refuse(element, fault)
         elif element.tag == "origin":
             for key in ("xyz", "rpy"):
-                self._numbers(element, element.get(key, ""))
+                self._finite_numbers(element, element.get(key, ""))
         elif (parent, element.tag) == ("plane", "normal"):
-            numbers = self._numbers(element, text)
+            numbers = self._finite_numbers(element, text)
             if len(numbers) != 3 or not any(numbers):
                 self._refuse(element, f"{text.strip()} is no direction")
         elif (parent, element.tag) in _OTHER_NUMBERS:
-            self._numbers(element, text)
+            self._finite_numbers(element, text)
         elif element.tag == "uri":
             self._check_uri(text.strip(), parents)
 
@@ -134,7 +145,7 @@ class _ModelCheck:
                 continue
             if len(texts) > 1:
                 self._refuse(shape, f"{name} is there {len(texts)} times")
-            numbers = self._numbers(shape, texts[0], f"{name}: ")
+            numbers = self._finite_numbers(shape, texts[0], f"{name}: ")
             if len(numbers) != count:
                 fault = f"{name}: {len(numbers)} numbers, not {count}"
                 self._refuse(shape, fault)
@@ -142,7 +153,7 @@ class _ModelCheck:
                 size = " ".join(texts[0].split())
                 self._refuse(shape, f"{name}: {size} is not a valid size")
 
-    def _numbers(
+    def _finite_numbers(
         self, element: Element, text: str, where: str = ""
     ) -> list[float]:
         """Returns the numbers in a text; InputError if one is not finite."""

@@ -1,34 +1,28 @@
-"""Reads the geometry with a given Drake role, as a LiDAR sees it."""
+"""Reads the surfaces of a SceneGraph's geometry, as a LiDAR sees them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from pydrake import geometry as shapes
-from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     FrameId,
     GeometryId,
     Role,
-    SceneGraph,
     SceneGraphInspector,
     Shape,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import (
-    AbstractParameterIndex,
-    Context,
-    OutputPort,
-)
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.geometry_list import GeometryRecord, list_geometry
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
+from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
 
 # The corners of a unit cube, and its faces, counter-clockwise from outside.
@@ -70,34 +64,13 @@ class PerceptionGeometry:
 
     @property
     def structure(self) -> str:
+        """Name of the structure."""
         return structure_name(self.name)
 
     @property
     def part(self) -> str:
         """Name of the part of the structure, such as `storey_03`."""
-        visual = self.name.rpartition("::")[2]
-        _, slash, part = visual.partition("/")
-        return part if slash else visual
-
-
-def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
-    """Returns the name of the structure to which a geometry belongs.
-
-    A visual named `tower_017/storey_03` belongs to `tower_017`; a visual
-    without a slash belongs to its model.
-
-    Args:
-        geometry_name: scoped name of the geometry, such as
-            `left::gripper::finger`.
-        is_scoped: whether to return the whole name of a model, such as
-            `left::gripper`. By default, only `gripper` is returned, as in
-            structure tables.
-    """
-    model, _, visual = geometry_name.rpartition("::")
-    structure, slash, _ = visual.partition("/")
-    if slash:
-        return structure
-    return (model if is_scoped else model.rpartition("::")[2]) or visual
+        return part_name(self.name)
 
 
 def check_shape(name: str, shape: Shape) -> None:
@@ -165,75 +138,6 @@ def merge_surfaces(
     return surfaces.merge_triangles(members)[0]
 
 
-class GeometryRecord(NamedTuple):
-    """The data of one geometry in a SceneGraph; mesh files are not read.
-
-    Attributes:
-        geometry_id: id of the geometry.
-        name: scoped name.
-        frame_id: the frame F to which the geometry is fixed.
-        X_FG: pose of the geometry G in F.
-        shape: the shape.
-        is_deformable: whether the geometry is deformable.
-        rgb: diffuse colour; None if the geometry has no colour.
-        reflectivity: the property ("lidar", "reflectivity"); None if the
-            geometry does not have it.
-    """
-
-    geometry_id: GeometryId
-    name: str
-    frame_id: FrameId
-    X_FG: RigidTransform
-    shape: Shape
-    is_deformable: bool
-    rgb: tuple[float, float, float] | None
-    reflectivity: float | None
-
-
-class GeometryList(tuple[GeometryRecord, ...]):
-    """The records of all geometry with a role, in the order of the SceneGraph.
-
-    The order is that of `GetAllGeometryIds`, which Drake documents as stable,
-    so the list depends only on the SceneGraph.
-    """
-
-    def __deepcopy__(self, memo: dict) -> GeometryList:
-        # A Context is cloned together with this value. It never changes, and
-        # ids cannot be copied.
-        return self
-
-
-def list_geometry(inspector: SceneGraphInspector, role: Role) -> GeometryList:
-    """Returns the records of all geometry with a role."""
-    return GeometryList(
-        GeometryRecord(
-            geometry_id,
-            inspector.GetName(geometry_id),
-            inspector.GetFrameId(geometry_id),
-            # Copies, because Drake returns references.
-            RigidTransform(inspector.GetPoseInFrame(geometry_id)),
-            inspector.GetShape(geometry_id).Clone(),
-            inspector.IsDeformableGeometry(geometry_id),
-            *_appearance(inspector, geometry_id, role),
-        )
-        for geometry_id in inspector.GetAllGeometryIds(role)
-    )
-
-
-def _appearance(
-    inspector: SceneGraphInspector, geometry_id: GeometryId, role: Role
-) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Returns colour and reflectivity, each None if the model has none."""
-    properties = inspector.GetProperties(geometry_id, role)
-    rgb = reflectivity = None
-    if properties.HasProperty("lidar", "reflectivity"):
-        reflectivity = float(properties.GetProperty("lidar", "reflectivity"))
-    if properties.HasProperty("phong", "diffuse"):
-        rgba = properties.GetProperty("phong", "diffuse")
-        rgb = rgba.r(), rgba.g(), rgba.b()
-    return rgb, reflectivity
-
-
 class GeometryReader:
     """Reads the shapes of recorded geometry.
 
@@ -266,10 +170,10 @@ class GeometryReader:
             meshes = MeshFiles(foreign)
             for record in records:
                 name, X_FG, shape = record.name, record.X_FG, record.shape
-                look = record.rgb, record.reflectivity
+                appearance = record.rgb, record.reflectivity
                 _check_record(record)
                 pose = X_FG.GetAsMatrix34().tobytes()
-                key = name, record.frame_id, pose, _shape_key(shape), look
+                key = name, record.frame_id, pose, _shape_key(shape), appearance
                 entry = known.get(record.geometry_id)
                 if entry is None or entry[0] != key:
                     surface = _surface(name, shape, meshes)
@@ -281,7 +185,7 @@ class GeometryReader:
                             record.frame_id,
                             X_FG,
                             surface,
-                            *look,
+                            *appearance,
                         ),
                     )
                 self._known[record.geometry_id] = entry
@@ -361,37 +265,4 @@ def _cone(shape: shapes.MeshcatCone) -> TriangleSurface:
                 np.column_stack([middle, first, second]),
             ]
         ).astype(np.int32),
-    )
-
-
-def geometry_port(scene_graph: SceneGraph, role: Role) -> OutputPort:
-    """Returns an output port whose value is a `GeometryList` of a role.
-
-    The value is a function of the Context. The value is computed anew only
-    after geometry has been added, removed, replaced, reshaped, or given another
-    role. A new pose of a frame does not count. Drake's own `geometry_version`
-    cannot replace this port, because some changes of perception geometry do not
-    change `geometry_version`.
-
-    The first call with a role adds the port to the SceneGraph, and must come
-    before a Diagram is built from this SceneGraph.
-
-    Raises:
-        RuntimeError: the SceneGraph is already part of a Diagram.
-    """
-    name = f"{role.name.removeprefix('k').lower()}_geometry"
-    if scene_graph.HasOutputPort(name):
-        return scene_graph.GetOutputPort(name)
-
-    def calc(context: Context, output: AbstractValue) -> None:
-        query_object = scene_graph.get_query_output_port().Eval(context)
-        output.set_value(list_geometry(query_object.inspector(), role))
-
-    return scene_graph.DeclareAbstractOutputPort(
-        name,
-        lambda: Value(object()),
-        calc,
-        # The first parameter is the geometry. The second, the configuration,
-        # concerns only proximity.
-        {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
     )

@@ -1,4 +1,4 @@
-"""Finds the files to which a model refers, and notices their changes."""
+"""Finds the files to which a model refers."""
 
 import contextlib
 import os
@@ -9,7 +9,8 @@ from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
 from cns_drake.base.xml_elements import readable_xml
-from cns_drake.scene.gazebo_worlds import ModelFinder
+from cns_drake.scene.file_watch import FileWatch
+from cns_drake.scene.model_finder import ModelFinder
 
 # File name endings of the files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
@@ -20,53 +21,6 @@ _NAMING = {
     ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
     ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
 }
-
-
-class FileWatch:
-    """Notices whether any of a number of files has changed.
-
-    Contents are not compared: a file counts as changed if its size, its time
-    stamps or its inode have changed.
-    """
-
-    def __init__(self) -> None:
-        self._states: dict[str, tuple[int, ...]] = {}
-
-    def take_down(self, path: str) -> os.stat_result | None:
-        """Records the status of a file, for a later call of `changed`.
-
-        If the function is called again for the same file, the first status is
-        kept.
-
-        Returns:
-            The current status; None if the file does not exist.
-        """
-        status = _status(path)
-        self._states.setdefault(path, _state(status))
-        return status
-
-    def changed(self) -> str | None:
-        """Returns the path of a file that has changed; None if none has.
-
-        Only files count whose status was recorded by `FileWatch.take_down`.
-        """
-        for path, state in self._states.items():
-            if _state(_status(path)) != state:
-                return path
-        return None
-
-
-def _status(path: str) -> os.stat_result | None:
-    try:
-        return os.stat(path)
-    except (OSError, ValueError):  # It may not be a file name.
-        return None
-
-
-def _state(status: os.stat_result | None) -> tuple[int, ...]:
-    if status is None:
-        return ()
-    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def referenced_files(
@@ -88,18 +42,18 @@ def referenced_files(
     finder = ModelFinder(model)
     found: dict[str, tuple[str, int]] = {}
     waiting = [str(model)]
-    watch.take_down(str(model))
+    watch.record(str(model))
     while waiting:
         file = waiting.pop()
         folder = os.path.dirname(file)
         for uri in _references(file):
             place = os.path.join(folder, uri)
             name = os.path.relpath(place, model.parent)
-            status = watch.take_down(place)
+            status = watch.record(place)
             if status is None:
-                place = _find(finder, uri, folder)
+                place = _found_file(finder, uri, folder)
                 name = uri
-                status = watch.take_down(place)
+                status = watch.record(place)
             for one, size in _files_at(place, status, watch):
                 key = name
                 if one != place:  # It is inside a model's folder.
@@ -110,7 +64,7 @@ def referenced_files(
     return found
 
 
-def _find(finder: ModelFinder, uri: str, folder: str) -> str:
+def _found_file(finder: ModelFinder, uri: str, folder: str) -> str:
     """Returns the file of a URI; "" if it does not exist."""
     with contextlib.suppress(OSError, ValueError):  # It may not be a file name.
         return str(finder.find(uri, Path(folder)) or "")
@@ -131,7 +85,7 @@ def _files_at(
         inside = [place]
     found = []
     for path in inside:
-        inner = status if path == place else watch.take_down(path)
+        inner = status if path == place else watch.record(path)
         # Only regular files count, not devices.
         if inner is not None and stat.S_ISREG(inner.st_mode):
             found.append((path, inner.st_size))
@@ -142,10 +96,10 @@ def _references(file: str) -> list[str]:
     """Returns the references in a model or a mesh to other files."""
     ending = os.path.splitext(file)[1].lower()
     if ending in (*_MODEL_ENDINGS, ".dae"):
-        return _xml_references(_read(file))
+        return _xml_references(_contents(file))
     if ending not in _NAMING:
         return []
-    names = _NAMING[ending].findall(_read(file))
+    names = _NAMING[ending].findall(_contents(file))
     return [name.decode(errors="replace").strip() for name in names]
 
 
@@ -173,6 +127,6 @@ def _xml_references(content: bytes) -> list[str]:
     return found
 
 
-def _read(path: str) -> bytes:
+def _contents(path: str) -> bytes:
     with user_errors(path), open(path, "rb") as stream:
         return stream.read()

@@ -5,29 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-import re
 
 import numpy as np
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.number_text import to_number, whole_number
-from cns_drake.scene.labels import MAX_INSTANCE, Labels
+from cns_drake.scene.labels import MAX_INSTANCE, Labels, check_count
 from cns_drake.scene.material_cells import read_materials
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS, Material
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
-
-
-def kind_in_name(name: str) -> str:
-    """Returns the kind with which the name of a structure begins.
-
-    Names are made of a kind and a number, such as `row_house_017` for the kind
-    `row_house`. The name of an object that stands on the lot of a future
-    building begins with the name of the building: `office_003_lot_02_bench`.
-    """
-    own = re.sub(r".*_lot_\d+_", "", name)
-    # OpenStreetMap's numbers have the letter of node, way or relation.
-    return re.sub(r"_[nwr]?-?\d.*", "", own)
+from cns_drake.scene.structure_names import kind_in_name
 
 
 @dataclass(frozen=True)
@@ -101,17 +89,17 @@ class StructureTable:
         return StructureTable([*self, *other])
 
     def completed(self, names: Iterable[str]) -> StructureTable:
-        """Returns the table, with entries added for the names that it lacks."""
+        """Returns the table, with entries added for the names that it lacks.
+
+        Raises:
+            InputError: there are more structures than instance ids.
+        """
         entries = list(self)
         free = self.last_instance + 1
         for name in sorted(set(names) - self._by_name.keys()):
             entries.append(StructureEntry(free, name, "unlabeled"))
             free += 1
-        if free - 1 > MAX_INSTANCE:
-            raise InputError(
-                f"the world has {free - 1} structures, but an instance id "
-                f"has room for {MAX_INSTANCE}"
-            )
+        check_count(free - 1)
         return StructureTable(entries)
 
     def labels(self, names: Sequence[str]) -> Labels:

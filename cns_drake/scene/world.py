@@ -1,10 +1,8 @@
 """Loads an SDF world, and a vehicle in it, into a SceneGraph."""
 
-from collections.abc import Collection, Iterator
-import contextlib
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-import re
 
 from pydrake.geometry import (
     Convex,
@@ -13,159 +11,20 @@ from pydrake.geometry import (
     Mesh,
     Role,
     SceneGraph,
+    SourceId,
 )
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError, errors_at, value_errors
-from cns_drake.base.files import is_there, read_bytes
-from cns_drake.base.progress import doing
-from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
-from cns_drake.scene.gazebo_worlds import (
-    is_gazebo_world,
-    read_xml,
-    simplify_world,
-)
+from cns_drake.base.files import is_there
 from cns_drake.scene.map_folder import MapFolder
-from cns_drake.scene.mesh_contents import check_mesh_file
-from cns_drake.scene.model_check import check_model
-from cns_drake.scene.perception_geometry import (
-    anchored_frames,
-    check_shape,
-    structure_name,
-)
+from cns_drake.scene.mesh_check import check_mesh_file
+from cns_drake.scene.parsing import parse_models, parse_world
+from cns_drake.scene.perception_geometry import anchored_frames, check_shape
+from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
-
-
-def _parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    """Checks and parses a file, and returns its models.
-
-    Raises:
-        InputError: the file is missing, cannot be parsed, or has no models.
-    """
-    _check_file(path)
-    check_model(path)
-    return _add_models(parser, path)
-
-
-def _add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    """Parses a file that was checked, and returns its models."""
-    doing(f"parsing {path.name}")
-    with _parse_faults(path):
-        models = parser.AddModels(str(path))
-    if not models:
-        raise InputError(f"{path}: holds no model")
-    return models
-
-
-@contextlib.contextmanager
-def _parse_faults(path: Path) -> Iterator[None]:
-    """Raises Drake's errors about a file as an InputError."""
-    with collected_errors() as errors:
-        try:
-            yield
-        except PARSER_ERRORS as error:
-            raise _parse_fault(path, str(error), *errors) from error
-        if errors:
-            raise _parse_fault(path, *errors)
-
-
-def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
-    """Returns the name of each geometry."""
-    inspector = scene_graph.model_inspector()
-    names = {}
-    for geometry_id in inspector.GetAllGeometryIds():
-        try:
-            names[geometry_id] = inspector.GetName(geometry_id)
-        except UnicodeDecodeError:
-            raise InputError(f"{sdf}: a name is not UTF-8 text") from None
-    return names
-
-
-def _check_visible(
-    scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
-) -> set[str]:
-    """Checks what a LiDAR can see; returns the names of visible structures."""
-    inspector = scene_graph.model_inspector()
-    structures = set()
-    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
-        name = inspector.GetName(geometry_id)
-        structures.add(structure_name(name))
-        with errors_at(sdf):
-            check_shape(name, inspector.GetShape(geometry_id))
-    if not structures:
-        left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
-        raise InputError(
-            f"{sdf}: the world has no visuals, and so no geometry that a "
-            f"LiDAR can see{left_out and f' ({left_out})'}"
-        )
-    return structures
-
-
-def _parse_world(
-    parser: Parser, path: Path, model_paths: Collection[Path]
-) -> tuple[str, ...]:
-    """Parses a world, and returns notes about omitted parts."""
-    if path.suffix.lower() == ".urdf":
-        _parse_models(parser, path)
-        return ()
-    _check_file(path)
-    root = read_xml(path)
-    if not is_gazebo_world(path, root):
-        _add_models(parser, path)
-        return ()
-    text, notes = simplify_world(path, root, model_paths)
-    doing(f"parsing {path.name}")
-    with _parse_faults(path):
-        parser.AddModelsFromString(text, "sdf")
-    return notes
-
-
-def _check_file(path: Path) -> None:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    # Drake would fail when it quotes other text.
-    content = read_bytes(path)
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not UTF-8 text") from None
-
-
-def _parse_fault(path: Path, *texts: str) -> InputError:
-    """Returns an error that contains the first two of Drake's messages."""
-    # Messages of Drake and libsdformat begin with the path, which Drake makes
-    # absolute, a severity and a code.
-    names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
-    faults = [" ".join(text.split()) for text in texts[:2]]
-    faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
-    faults = [
-        re.sub(
-            rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",
-            lambda match: f"line {match[1]}: " if match[1] else "",
-            fault,
-        )
-        for fault in faults
-    ]
-    return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")
-
-
-def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
-    """Returns notes about content of the visible meshes that is not read.
-
-    Raises:
-        InputError: the shapes of a mesh would be misread.
-    """
-    inspector = scene_graph.model_inspector()
-    ids = inspector.GetAllGeometryIds(Role.kPerception)
-    shapes = [inspector.GetShape(geometry_id) for geometry_id in ids]
-    sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
-    notes = []
-    for path in sorted({str(one.path()) for one in sources if one.is_path()}):
-        with value_errors(path):
-            notes += [f"{path}: {one}" for one in check_mesh_file(Path(path))]
-    return tuple(notes)
 
 
 @dataclass(frozen=True)
@@ -239,30 +98,92 @@ def load_world(
     plant = MultibodyPlant(time_step=0.0)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
-    notes = _parse_world(parser, sdf, [Path(one) for one in model_paths])
-    missing = set(without)
-    for geometry_id, name in _read_names(scene_graph, sdf).items():
-        if structure_name(name) in without:
-            missing.discard(structure_name(name))
-            scene_graph.RemoveGeometry(source, geometry_id)
-    if missing:
-        raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
+    notes = parse_world(parser, sdf, [Path(one) for one in model_paths])
+    _leave_out(scene_graph, source, sdf, without)
     found = _check_visible(scene_graph, sdf, notes)
     notes += _mesh_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
-        vehicle_model = _parse_models(parser, Path(vehicle))[0]
+        vehicle_model = parse_models(parser, Path(vehicle))[0]
     plant.Finalize()
 
-    table = Path(structures or MapFolder(sdf.parent).structures)
-    if structures is not None or is_there(table):
-        entries = load_structure_table(table)
-        notes += _mismatches(table, {entry.name for entry in entries}, found)
-    else:
-        entries = StructureTable(())
+    file = Path(structures or MapFolder(sdf.parent).structures)
+    table = StructureTable(())
+    if structures is not None or is_there(file):
+        table = load_structure_table(file)
+        notes += _mismatches(file, {entry.name for entry in table}, found)
     with errors_at(sdf):
-        entries = entries.completed(found)
-    return World(scene_graph, plant, vehicle_model, entries, notes)
+        table = table.completed(found)
+    return World(scene_graph, plant, vehicle_model, table, notes)
+
+
+def _leave_out(
+    scene_graph: SceneGraph,
+    source: SourceId,
+    sdf: Path,
+    structures: Collection[str],
+) -> None:
+    """Removes the geometry of structures from the SceneGraph of a world.
+
+    Raises:
+        InputError: a structure does not exist.
+    """
+    missing = set(structures)
+    for geometry_id, name in _read_names(scene_graph, sdf).items():
+        if structure_name(name) in structures:
+            missing.discard(structure_name(name))
+            scene_graph.RemoveGeometry(source, geometry_id)
+    if missing:
+        raise InputError(f"{sdf}: no structure {min(missing)} to leave out")
+
+
+def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
+    """Returns the name of each geometry."""
+    inspector = scene_graph.model_inspector()
+    names = {}
+    for geometry_id in inspector.GetAllGeometryIds():
+        try:
+            names[geometry_id] = inspector.GetName(geometry_id)
+        except UnicodeDecodeError:
+            raise InputError(f"{sdf}: a name is not UTF-8 text") from None
+    return names
+
+
+def _check_visible(
+    scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
+) -> set[str]:
+    """Checks what a LiDAR can see; returns the names of visible structures."""
+    inspector = scene_graph.model_inspector()
+    structures = set()
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        name = inspector.GetName(geometry_id)
+        structures.add(structure_name(name))
+        with errors_at(sdf):
+            check_shape(name, inspector.GetShape(geometry_id))
+    if not structures:
+        left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
+        raise InputError(
+            f"{sdf}: the world has no visuals, and so no geometry that a "
+            f"LiDAR can see{left_out and f' ({left_out})'}"
+        )
+    return structures
+
+
+def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
+    """Returns notes about content of the visible meshes that is not read.
+
+    Raises:
+        InputError: the shapes of a mesh would be misread.
+    """
+    inspector = scene_graph.model_inspector()
+    ids = inspector.GetAllGeometryIds(Role.kPerception)
+    shapes = [inspector.GetShape(geometry_id) for geometry_id in ids]
+    sources = [one.source() for one in shapes if isinstance(one, Mesh | Convex)]
+    notes = []
+    for path in sorted({str(one.path()) for one in sources if one.is_path()}):
+        with value_errors(path):
+            notes += [f"{path}: {one}" for one in check_mesh_file(Path(path))]
+    return tuple(notes)
 
 
 def _mismatches(

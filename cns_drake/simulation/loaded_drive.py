@@ -18,8 +18,9 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import DrivePlan, count_frames
-from cns_drake.scenarios.scenario import Scenario, TrafficConfig
+from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
+from cns_drake.scenarios.sections import TrafficConfig
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import World, load_world

@@ -16,6 +16,7 @@ from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
+from cns_drake.pictures.other_stage import other_stage
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import make_calibration
@@ -23,10 +24,10 @@ from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.resuming import take_over_frames
 from cns_drake.recording.schedule import START_NS, frames_within
 from cns_drake.scenarios import provenance
-from cns_drake.scenarios.planning import DrivePlan, shown_beside
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files, describe_scenario
-from cns_drake.scene.referenced_files import FileWatch
+from cns_drake.scene.file_watch import FileWatch
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.carriers import sensor_pose
@@ -292,7 +293,7 @@ def _resume(
 
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     scenario = drive.scenario
-    other, other_name = shown_beside(scenario)
+    other, other_name = other_stage(scenario)
     stage = scenario.stage
     stages = () if stage is None else tuple(scenario.folder.stages())
     return MeshcatRecorder(

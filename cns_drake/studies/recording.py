@@ -14,8 +14,8 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.pictures.other_stage import other_stage
 from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.provenance import (
     digest_file,
     digest_inputs,
@@ -189,7 +189,7 @@ class Record(Step):
 
     def _shown(self) -> dict[str, object]:
         """Returns all inputs of the page."""
-        beside, _ = shown_beside(self.scenario)
+        beside, _ = other_stage(self.scenario)
         return self.made_of(
             {
                 "drive": recording_fingerprint(

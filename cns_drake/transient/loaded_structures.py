@@ -14,13 +14,13 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import product
 from cns_drake.scene import surfaces
+from cns_drake.scene.geometry_list import list_geometry
 from cns_drake.scene.materials import Material
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
-    list_geometry,
-    structure_name,
 )
+from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureEntry
 from cns_drake.scene.world import World
 

@@ -27,10 +27,9 @@ from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.scenarios.drive_table import drive_rows
-from cns_drake.scenarios.losses import write_scenarios
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scenarios.scenario_files import load_scenario, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import make_pattern

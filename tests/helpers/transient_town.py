@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
-from cns_drake.scenarios.scenario import TransientConfig
+from cns_drake.scenarios.sections import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.loaded_structures import read_structures

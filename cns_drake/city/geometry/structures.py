@@ -16,7 +16,7 @@ from cns_drake.city.geometry.mesh import Mesh, box_mesh
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.polygons import hull_of, placed
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS
-from cns_drake.scene.structure_table import kind_in_name
+from cns_drake.scene.structure_names import kind_in_name
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.scene import perception_geometry
+from cns_drake.scene.geometry_list import geometry_port
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.config import (
@@ -382,7 +383,7 @@ def connect_lidar(
     """Connects a LiDAR's inputs to a SceneGraph."""
     query = scene_graph.get_query_output_port()
     builder.Connect(query, lidar.query_object_input_port())
-    listed = perception_geometry.geometry_port(scene_graph, lidar.role)
+    listed = geometry_port(scene_graph, lidar.role)
     builder.Connect(listed, lidar.GetInputPort("geometry"))
 
 

@@ -18,14 +18,13 @@ from cns_drake.base.progress import doing
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
+from cns_drake.scene.geometry_list import GeometryList, list_geometry
 from cns_drake.scene.labels import MAX_INSTANCE, Labels, number_structures
 from cns_drake.scene.perception_geometry import (
-    GeometryList,
     GeometryReader,
     PerceptionGeometry,
-    list_geometry,
-    structure_name,
 )
+from cns_drake.scene.structure_names import structure_name
 
 if TYPE_CHECKING:
     # Slow to import, and ideal returns do without.

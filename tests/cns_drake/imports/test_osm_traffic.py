@@ -15,7 +15,7 @@ from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scene.perception_geometry import structure_name
+from cns_drake.scene.structure_names import structure_name
 from cns_drake.simulation.loaded_drive import (
     EGO_BOX,
     load_drive,

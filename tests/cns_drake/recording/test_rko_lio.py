@@ -14,8 +14,8 @@ import pytest
 from cns_drake.base import poses
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import RideConfig
 from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scenarios.sections import RideConfig
 from cns_drake.simulation.simulation import simulate
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]

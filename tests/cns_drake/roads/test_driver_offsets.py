@@ -19,8 +19,8 @@ from cns_drake.roads.driver_offsets import (
 from cns_drake.roads.lane_path import LanePath
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import REAL_DRIVER, DriverConfig
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
+from cns_drake.scenarios.sections import REAL_DRIVER, DriverConfig
 
 NOTHING = shapely.STRtree([])
 # Absolute lateral offsets of two real drives along one route: the quantiles of

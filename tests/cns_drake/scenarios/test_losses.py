@@ -9,14 +9,8 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError, validated
-from cns_drake.scenarios.losses import (
-    Losses,
-    lost_structures,
-    write_scenarios,
-)
-from cns_drake.scenarios.scenario_files import (
-    load_scenario,
-)
+from cns_drake.scenarios.losses import Losses, lost_structures
+from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.studies.comparisons import PairMaker
@@ -186,37 +180,6 @@ def test_a_city_needs_a_table_with_places(tmp_path):
         table.write_text(text)
         with pytest.raises(InputError, match=r"s\.csv: x, y: every structure"):
             lost(drive, missing=0.5)
-
-
-def test_written_scenarios_are_the_same(tmp_path):
-    scenarios = [
-        load_scenario("metropolis_01").with_lidar_preset("vlp-16"),
-        load_scenario("metropolis_02").replaced(without=("bench_1",)),
-    ]
-    paths = write_scenarios(scenarios, tmp_path / "new" / "members")
-    assert [load_scenario(path) for path in paths] == scenarios
-
-
-def test_a_folder_of_cities_and_scenarios_can_be_moved(tmp_path):
-    output = tmp_path / "out"
-    (output / "cities").mkdir(parents=True)
-    town = write_small_map(output / "cities" / "town")
-    drive = scenario_values(town) | {"name": "town_01"}
-    (tmp_path / "drive.yaml").write_text(yaml.safe_dump(drive))
-    scenario = load_scenario(tmp_path / "drive.yaml")
-    (path,) = write_scenarios([scenario], output / "scenarios")
-    assert load_scenario(path) == scenario
-    assert yaml.safe_load(path.read_text())["map"] == "../cities/town"
-    moved = tmp_path / "far" / "away"
-    moved.parent.mkdir()
-    output.rename(moved)
-    member = load_scenario(moved / path.relative_to(output))
-    assert member.folder.path == moved / "cities" / "town"
-    # A map that lies elsewhere stays where it is.
-    (path,) = write_scenarios(
-        [load_scenario("metropolis_02")], moved / "scenarios"
-    )
-    assert yaml.safe_load(path.read_text())["map"] == "metropolis"
 
 
 @pytest.mark.parametrize("name", ["hard", "hard2"])

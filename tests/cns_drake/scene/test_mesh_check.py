@@ -8,11 +8,8 @@ from helpers.small_map import world_text
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.mesh_contents import (
-    check_gltf,
-    check_mesh_file,
-    check_obj,
-)
+from cns_drake.scene.mesh_check import check_mesh_file
+from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.world import load_world
 
 
@@ -53,7 +50,7 @@ def test_extensions_that_change_shapes_are_refused(
 ):
     path = write(tmp_path, extension(name, required), suffix)
     with pytest.raises(ValueError, match=f"needs the extension {name} of glTF"):
-        check_gltf(path)
+        check_mesh_file(path)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +66,7 @@ def test_extensions_that_change_shapes_are_refused(
     ],
 )
 def test_other_extensions_are_no_matter(tmp_path, name, required):
-    assert check_gltf(write(tmp_path, extension(name, required))) == ()
+    assert check_mesh_file(write(tmp_path, extension(name, required))) == ()
 
 
 def test_numbers_that_are_no_floats_are_refused(tmp_path):
@@ -77,7 +74,7 @@ def test_numbers_that_are_no_floats_are_refused(tmp_path):
         top["accessors"][0] |= {"componentType": 5122, "normalized": True}
 
     with pytest.raises(ValueError, match="no floats"):
-        check_gltf(write(tmp_path, change))
+        check_mesh_file(write(tmp_path, change))
 
 
 @pytest.mark.parametrize(
@@ -119,7 +116,7 @@ def test_files_that_are_no_gltf(tmp_path, text):
     path = tmp_path / "thing.gltf"
     path.write_bytes(text)
     with pytest.raises(ValueError, match=r"\w"):
-        check_gltf(path)
+        check_mesh_file(path)
 
 
 def test_a_world_names_the_file_and_the_extension(tmp_path):
@@ -314,7 +311,7 @@ def test_a_mode_that_is_none_of_gltf_is_refused(tmp_path):
         )
 
     with pytest.raises(ValueError, match="mode is none of glTF"):
-        check_gltf(write(tmp_path, change))
+        check_mesh_file(write(tmp_path, change))
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from pydrake.geometry import ReadObjToTriangleSurfaceMesh
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.mesh_contents import check_obj
 from cns_drake.scene.model_check import check_model
+from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 

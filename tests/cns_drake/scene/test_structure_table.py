@@ -6,7 +6,6 @@ from cns_drake.base.errors import InputError
 from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
-    kind_in_name,
     load_structure_table,
 )
 
@@ -36,23 +35,6 @@ def test_reflectivities_are_optional(tmp_path):
     )
     table = load_structure_table(path)
     assert [table[name].reflectivity for name in "ab"] == [0.8, None]
-
-
-@pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        ("row_house_017", "row_house"),
-        ("carriageway", "carriageway"),
-        ("office_003_lot_02_bench", "bench"),
-        ("market_hall_001_lot_11_city_car", "city_car"),
-        ("tree_001_012y", "tree"),
-        ("tree_n-12", "tree"),
-        ("land_w25_2", "land"),
-    ],
-)
-def test_a_name_begins_with_a_kind(name, kind):
-    assert kind_in_name(name) == kind
-    assert StructureEntry(1, name, "building").kind == kind
 
 
 def test_a_table_may_say_the_kind(tmp_path):

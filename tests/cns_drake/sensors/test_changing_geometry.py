@@ -23,7 +23,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting import embree_hierarchy
-from cns_drake.scene.perception_geometry import geometry_port
+from cns_drake.scene.geometry_list import geometry_port
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 

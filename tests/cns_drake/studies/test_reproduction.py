@@ -12,8 +12,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import DriverConfig
 from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scenarios.sections import DriverConfig
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction

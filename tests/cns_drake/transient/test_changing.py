@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 import shapely
 
-from cns_drake.scenarios.scenario import TransientConfig
+from cns_drake.scenarios.sections import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world

@@ -4,7 +4,7 @@ from helpers.transient_town import DRIVE, LANES, in_town, new_things
 import numpy as np
 import pytest
 
-from cns_drake.scenarios.scenario import TransientConfig
+from cns_drake.scenarios.sections import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.ground_surface import GroundSurface

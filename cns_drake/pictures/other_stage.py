@@ -1,0 +1,24 @@
+"""The other stage that a drive's web page shows for comparison."""
+
+from cns_drake.scenarios.scenario import Scenario
+
+
+def other_stage(scenario: Scenario) -> tuple[Scenario | None, str]:
+    """Returns a drive's scenario in another stage, and that stage's name.
+
+    The other stage is the map's last stage or, for a drive in the last stage,
+    the first stage. If the drive leaves out structures (`without`), the other
+    stage is the drive's own stage with these structures.
+
+    Returns:
+        The scenario in the other stage, and the stage's name for the page; None
+        and "" if there is no other stage.
+    """
+    if scenario.without:
+        return scenario.replaced(without=()), "the whole city"
+    stages = list(scenario.folder.stages())
+    others = [stage for stage in stages if stage != scenario.stage]
+    if scenario.stage is None or not others:
+        return None, ""
+    stage = others[-1] if stages[-1] in others else others[0]
+    return scenario.replaced(stage=stage), f"stage {stage}"

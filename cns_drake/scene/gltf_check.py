@@ -1,0 +1,124 @@
+"""Checks glTF files for contents that Open3D reads wrongly or not at all.
+
+Specification: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+"""
+
+from collections import Counter
+import struct
+from typing import Any
+
+from cns_drake.base.json_text import parse_json
+
+# Prefixes of glTF extensions that do not change shapes.
+_HARMLESS = (
+    "KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
+    "ADOBE_materials_", "KHR_lights_", "EXT_lights_", "KHR_techniques_",
+    "KHR_xmp", "KHR_audio", "KHR_animation_pointer", "MSFT_packing_",
+    "EXT_mesh_features", "EXT_structural_metadata", "EXT_feature_metadata",
+    "EXT_mesh_manifold", "KHR_physics", "KHR_implicit_shapes",
+)  # fmt: skip
+# glTF extensions that change shapes even where they are not required.
+_CHANGING = (
+    "EXT_mesh_gpu_instancing", "EXT_instance_features", "KHR_node_visibility",
+    "KHR_mesh_quantization",
+)  # fmt: skip
+# Type of an accessor with floats.
+_FLOAT = 5126
+# Modes of primitives below this number (points and lines) have no triangles.
+_FIRST_TRIANGLES = 4
+# Greatest mode of a primitive.
+_LAST_TRIANGLES = 6
+# Type of a chunk of JSON.
+_JSON = 0x4E4F534A
+
+
+def check_gltf(content: bytes) -> tuple[str, ...]:
+    """Returns notes on ignored content of a glTF file, one for each kind.
+
+    Args:
+        content: the file, as text (`.gltf`) or binary (`.glb`).
+
+    Raises:
+        ValueError: the file is not glTF, or its shapes would be misread; the
+            message names the required features.
+    """
+    try:
+        top = parse_json(_json_chunk(content))
+        unread = _unread_extensions(top)
+        primitives = [p for m in top.get("meshes", []) for p in m["primitives"]]
+        has_floats = _has_float_positions(top, primitives)
+        modes = [p.get("mode", _FIRST_TRIANGLES) for p in primitives]
+        has_other_mode = any(not 0 <= m <= _LAST_TRIANGLES for m in modes)
+        counts = _ignored_contents(top, primitives)
+    except (
+        AttributeError, LookupError, RecursionError, TypeError, struct.error
+    ) as error:  # fmt: skip
+        raise ValueError(f"no valid glTF ({type(error).__name__})") from error
+    if unread:
+        raise ValueError(
+            f"needs the extension {unread[0]} of glTF, which is not read;"
+            " export it without"
+        )
+    if has_other_mode:
+        raise ValueError("has a primitive whose mode is none of glTF")
+    if not has_floats:
+        raise ValueError(
+            "has vertices that are no floats (KHR_mesh_quantization), which"
+            " are not read; export it without"
+        )
+    return tuple(f"{number} {what}" for what, number in counts.items())
+
+
+def _json_chunk(content: bytes) -> bytes:
+    """Returns the JSON of a text or of a binary file."""
+    if content[:4] != b"glTF":
+        return content
+    length, kind = struct.unpack_from("<II", content, 12)
+    if kind != _JSON:
+        raise ValueError("no JSON at its beginning")
+    return content[20 : 20 + length]
+
+
+def _unread_extensions(top: Any) -> list[str]:
+    """Returns the names of extensions that change shapes."""
+    required = [str(name) for name in top.get("extensionsRequired", [])]
+    used = [str(name) for name in top.get("extensionsUsed", [])]
+    return [
+        *(name for name in required if not name.startswith(_HARMLESS)),
+        *(name for name in used if name in _CHANGING),
+    ]
+
+
+def _has_float_positions(top: Any, primitives: list[Any]) -> bool:
+    """Returns whether all vertices of the primitives are floats."""
+    accessors = top.get("accessors", [])
+    positions = [
+        accessors[p["attributes"]["POSITION"]]
+        for p in primitives
+        if "POSITION" in p["attributes"]
+    ]
+    return all(one["componentType"] == _FLOAT for one in positions)
+
+
+def _ignored_contents(top: Any, primitives: list[Any]) -> Counter[str]:
+    """Counts what would move or add shapes, but is not read."""
+    nodes, meshes = top.get("nodes", []), top.get("meshes", [])
+    counts = Counter(
+        {
+            "skins of glTF ignored": sum("skin" in one for one in nodes),
+            "weights of morph targets in glTF ignored": sum(
+                any(one.get("weights", [])) for one in [*nodes, *meshes]
+            ),
+            "animations of glTF ignored": len(top.get("animations", [])),
+            "points or lines of glTF ignored": sum(
+                p.get("mode", _FIRST_TRIANGLES) < _FIRST_TRIANGLES
+                for p in primitives
+            ),
+            "see-through materials of glTF taken as solid": sum(
+                one.get("alphaMode", "OPAQUE") != "OPAQUE"
+                for one in top.get("materials", [])
+            ),
+            "further scenes of glTF ignored": len(top.get("scenes", [0])) - 1,
+        }
+    )
+    return +counts

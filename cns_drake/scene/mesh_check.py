@@ -1,0 +1,94 @@
+"""Checks mesh files for contents that their readers misread or leave out.
+
+Open3D reads glTF, COLLADA, STL and PLY. Some files are read only in part,
+without a warning. This module refuses such a file if surfaces would be missing.
+"""
+
+from collections import Counter
+from pathlib import Path
+import re
+import struct
+
+from cns_drake.base.files import read_bytes
+from cns_drake.scene.gltf_check import check_gltf
+from cns_drake.scene.obj_check import LARGEST_FILE
+from cns_drake.scene.ply_check import check_ply
+
+# File name extensions of glTF.
+GLTF = (".gltf", ".glb")
+# Elements of COLLADA that would move or add shapes, and are not read.
+_COLLADA = {
+    re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
+    re.compile(rb"<animation\b"): "animations of COLLADA",
+    re.compile(rb"<(?:lines|linestrips|spline)\b"): "lines of COLLADA",
+}
+# Elements of COLLADA with surfaces that are not read.
+_COLLADA_SURFACES = re.compile(rb"<(brep|convex_mesh)\b")
+_STL_HEADER_BYTES = 84
+_STL_FACET_BYTES = 50
+_STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
+
+
+def check_mesh_file(path: Path) -> tuple[str, ...]:
+    """Checks a mesh file; returns notes on what is not read, such as lines.
+
+    There is one note for each kind of content that is not read. The tuple is
+    empty if everything is read. OBJ files, which `check_obj` checks, and files
+    of other formats have no notes.
+
+    Raises:
+        ValueError: the shapes in the file would be misread.
+        InputError: the file cannot be read.
+    """
+    check = _CHECKS.get(path.suffix.lower())
+    return () if check is None else check(read_bytes(path, LARGEST_FILE))
+
+
+def _check_collada(content: bytes) -> tuple[str, ...]:
+    """Returns notes on ignored elements of a COLLADA file, one for each kind.
+
+    Raises:
+        ValueError: the file has surfaces that would not be read.
+    """
+    if found := _COLLADA_SURFACES.search(content):
+        raise ValueError(
+            f"has <{found[1].decode()}> of COLLADA, which is not read; export"
+            " it with triangles"
+        )
+    counts = {what: len(one.findall(content)) for one, what in _COLLADA.items()}
+    return tuple(f"{n} {what} ignored" for what, n in counts.items() if n)
+
+
+def _check_stl(content: bytes) -> tuple[()]:
+    """Checks that a text in STL is whole, and that all facets are triangles.
+
+    A binary file has its length in its header, which its reader checks.
+
+    Raises:
+        ValueError: it ends within a solid, or a facet has more corners.
+    """
+    if len(content) >= _STL_HEADER_BYTES:
+        (number,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)
+        if len(content) == _STL_HEADER_BYTES + _STL_FACET_BYTES * number:
+            return ()
+    if content[:5].lower() != b"solid":
+        return ()
+    words = [word.lower() for word in _STL_WORDS.findall(content)]
+    counts = Counter(words)
+    if words[-1:] != [b"endsolid"]:
+        raise ValueError("ends within a solid of STL; the file is not complete")
+    if counts[b"vertex"] != 3 * counts[b"endfacet"]:
+        raise ValueError(
+            f"has {counts[b'vertex']} vertices in {counts[b'endfacet']} facets"
+            " of STL; all facets must be triangles"
+        )
+    return ()
+
+
+# File name extension -> function that checks the contents of a file.
+_CHECKS = {
+    **dict.fromkeys(GLTF, check_gltf),
+    ".ply": check_ply,
+    ".stl": _check_stl,
+    ".dae": _check_collada,
+}

@@ -1,0 +1,80 @@
+"""Checks OBJ files that Drake would misread, or that end its process."""
+
+from pathlib import Path
+import re
+
+import numpy as np
+
+from cns_drake.base.files import read_bytes
+
+# Larger mesh files are refused [bytes].
+LARGEST_FILE = 1 << 28
+# Statements of OBJ with surfaces that are not read.
+_OBJ_SURFACES = re.compile(
+    rb"^[ \t]*(fo|surf|call|bsp|bzp|cdc|cdp|res)[ \t]", re.MULTILINE
+)
+# If a face refers to a missing vertex, Drake's reader reads outside its memory
+# and may end the process.
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+# Drake's reader takes what it cannot read in a vertex for 0.
+_NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NO_VERTEX = re.compile(
+    rb"^[ \t]*v[ \t](?![ \t]*(?:" + _NUMBER + rb"(?:[ \t]+|(?=[\n#]|\Z))){3,8}"
+    rb"(?:[\n#]|\Z))",
+    re.MULTILINE,
+)
+_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+# A ray caster needs neither texture coordinates nor normals, but Drake checks
+# them.
+_OTHER_INDICES = re.compile(rb"/[^\s]*")
+_NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
+
+
+def check_obj(path: Path) -> None:
+    """Checks that the faces of an OBJ file only use vertices that exist.
+
+    Raises:
+        ValueError: a vertex does not exist, or is not made of numbers; or there
+            are surfaces other than faces. The message names the line or the
+            statement.
+        InputError: the file cannot be read.
+    """
+    # Drake accepts both as line ends.
+    content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
+    if found := _OBJ_SURFACES.search(content):
+        raise ValueError(
+            f"has the statement '{found[1].decode()}' of OBJ, which is not"
+            " read; export it with faces"
+        )
+    if found := _NO_VERTEX.search(content):
+        number = content.count(b"\n", 0, found.start()) + 1
+        raise ValueError(f"line {number}: a vertex that is not three numbers")
+    num_vertices = len(_VERTEX.findall(content))
+    faces = b" \n".join(_FACE.findall(content))
+    if b"/" in faces:
+        faces = _OTHER_INDICES.sub(b"", faces)
+    if _are_indices(faces, num_vertices):
+        return
+    for number, line in enumerate(content.split(b"\n"), start=1):
+        face = _FACE.match(line)
+        indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
+        if indices.rstrip().endswith(b"\\"):
+            raise ValueError(
+                f"line {number}: a face that goes on in the next line, which is"
+                " not read; write it in one line"
+            )
+        if not _are_indices(indices, num_vertices):
+            raise ValueError(
+                f"line {number}: a face has a vertex that is not there (of"
+                f" {num_vertices})"
+            )
+
+
+def _are_indices(text: bytes, num_vertices: int) -> bool:
+    """Returns whether a text has valid vertex indices, from 1 or from -1."""
+    if not text.strip():
+        return True
+    if _NO_INDICES.search(text):
+        return False
+    values = np.fromstring(text, dtype=np.int64, sep=" ")
+    return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())

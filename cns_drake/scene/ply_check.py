@@ -1,0 +1,155 @@
+"""Checks PLY files for contents that Open3D reads wrongly or not at all."""
+
+from collections.abc import Sequence
+import contextlib
+from dataclasses import dataclass
+import struct
+
+import numpy as np
+
+from cns_drake.base.repetitions import repeated
+
+# Elements of PLY that are no shapes.
+_NO_SHAPES = ("vertex", "face", "camera", "material")
+# Open3D reports a longer header itself [bytes].
+_LONGEST_HEADER = 1 << 16
+# Least number of corners of a face.
+_CORNERS = 3
+# Type of a number in PLY -> its type in NumPy.
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2",
+    "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+_BYTE_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class _Element:
+    """An element of a PLY header.
+
+    Attributes:
+        name: name of the element.
+        count: number of its rows.
+        properties: name and type of each value of a row. A list has two types,
+            those of its length and of its values.
+    """
+
+    name: str
+    count: int
+    properties: list[tuple[str, tuple[str, ...]]]
+
+    @property
+    def faces(self) -> list[str]:
+        """Names of the lists of vertices."""
+        return [
+            name
+            for name, types in self.properties
+            if len(types) > 1 and name.startswith("vert")
+        ]
+
+
+def check_ply(content: bytes) -> tuple[str, ...]:
+    """Returns notes on ignored elements of a PLY file, one for each kind.
+
+    Raises:
+        ValueError: surfaces in the file would not be read, such as triangle
+            strips, or be wrong.
+    """
+    head, found, body = content.partition(b"end_header")
+    if not found or len(head) > _LONGEST_HEADER:
+        return ()  # Open3D says what is wrong.
+    encoding, elements = _parse_header(head.decode("ascii", "replace"))
+    for name in repeated(one.name for one in elements):
+        raise ValueError(f"has the element {name} of PLY twice; export it once")
+    notes = _ignored_elements(elements)
+    # A row ends the header, by either line end.
+    _, _, body = body.partition(b"\n")
+    least = _CORNERS
+    # Open3D refuses damaged files itself.
+    with contextlib.suppress(
+        LookupError, OverflowError, ValueError, struct.error
+    ):
+        least = _least_corners(elements, encoding, body)
+    if least < _CORNERS:
+        # Open3D would read its corners from beyond the list.
+        raise ValueError(f"has a face of PLY with {least} corners")
+    return notes
+
+
+def _parse_header(head: str) -> tuple[str, list[_Element]]:
+    """Returns the encoding and the elements of a PLY file, from its header."""
+    elements: list[_Element] = []
+    encoding = ""
+    for line in head.splitlines():
+        match line.split():
+            case ["format", encoding, *_]:
+                pass
+            case ["element", name, count] if count.isdecimal():
+                elements.append(_Element(name, int(count), []))
+            case ["property", "list", *types, name] if elements:
+                elements[-1].properties.append((name, tuple(types)))
+            case ["property", kind, name] if elements:
+                elements[-1].properties.append((name, (kind,)))
+    return encoding, elements
+
+
+def _ignored_elements(elements: Sequence[_Element]) -> tuple[str, ...]:
+    """Returns a note for each element that is not read.
+
+    Raises:
+        ValueError: an element has surfaces that would not be read.
+    """
+    notes = []
+    for one in elements:
+        faces = one.faces
+        if one.name == "face" and len(faces) > 1:
+            raise ValueError(
+                f"has two lists of vertices in each face, {' and '.join(faces)}"
+            )
+        if one.name in _NO_SHAPES or one.count == 0:
+            continue
+        if faces:
+            raise ValueError(
+                f"has surfaces in the element {one.name} of PLY, which is not"
+                " read; export it with faces"
+            )
+        notes.append(f"{one.count} elements {one.name} of PLY ignored")
+    return tuple(notes)
+
+
+def _least_corners(
+    elements: Sequence[_Element], encoding: str, body: bytes
+) -> int:
+    """Returns the least number of corners of a face in a PLY file.
+
+    Raises:
+        LookupError, OverflowError, ValueError, struct.error: the faces are
+            behind other lists, or the file is damaged.
+    """
+    index = [one.name for one in elements].index("face")
+    face, before = elements[index], elements[:index]
+    kinds = [types for _, types in face.properties]
+    (column,) = [k for k, types in enumerate(kinds) if len(types) > 1]
+    if encoding == "ascii":
+        first = sum(one.count for one in before)
+        rows = body.split(b"\n", first + face.count)[first:]
+        rows = rows[: face.count]
+        return min(int(row.split(None, column + 1)[column]) for row in rows)
+    sizes = [np.dtype(_TYPES[types[0]]).itemsize for types in kinds]
+    corner_size = np.dtype(_TYPES[kinds[column][1]]).itemsize
+    length = struct.Struct(
+        _BYTE_ORDERS[encoding] + np.dtype(_TYPES[kinds[column][0]]).char
+    )
+    offset = sum(
+        one.count * np.dtype(_TYPES[kind]).itemsize
+        for one in before
+        for _, (kind,) in one.properties
+    )
+    least = _CORNERS
+    for _ in range(face.count):
+        (corners,) = length.unpack_from(body, offset + sum(sizes[:column]))
+        least = min(least, corners)
+        offset += sum(sizes) + corner_size * corners
+    return least
