@@ -1,5 +1,7 @@
 """Rigid poses as homogeneous 4 x 4 matrices, many at a time."""
 
+import math
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -81,3 +83,12 @@ def interpolate(
 def transform(X: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Returns the points p (N, 3), transformed by one pose X (4, 4)."""
     return p @ X[:3, :3].T + X[:3, 3]
+
+
+def yaw_pose(
+    yaw: float, x: float = 0.0, y: float = 0.0, z: float = 0.0
+) -> np.ndarray:
+    """Returns a pose (4, 4) from a yaw [rad] and a translation [m]."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return make_pose(R, np.array([x, y, z]))

@@ -35,11 +35,11 @@ from evaluation.methods.learned import (
     FREQUENCIES,
     HEADINGS,
     LAYERS,
-    SECTORS,
-    SEEN,
+    SEEN_SHARES,
     TURNS,
     WEIGHTS_VERSION,
 )
+from evaluation.methods.polar_images import SECTORS
 from evaluation.study.parts import MakePart, Part
 
 # Number of cities in a batch.
@@ -93,7 +93,7 @@ class TrainingScans:
 
     Attributes:
         images: (N, RINGS, SECTORS, CHANNELS) uint8 polar images, see
-            `evaluation.methods.learned.polar_image`.
+            `evaluation.methods.polar_images.polar_image`.
         xy: (N, 2) positions of the sensors [m].
         cities: (N,) number of the city.
         drives: (N,) number of the drive in its city.
@@ -500,7 +500,7 @@ def write_weights(
     arrays: dict[str, Any] = {
         "version": np.int64(WEIGHTS_VERSION),
         "made_by": json.dumps(made_by),
-        SEEN: np.array(seen, np.float32),
+        SEEN_SHARES: np.array(seen, np.float32),
         **{name: np.asarray(one) for name, one in values.items()},
     }
     with completing(path) as part_file, open(part_file, "wb") as stream:

@@ -38,7 +38,7 @@ from cns_drake.studies.redrawing import (
     turned_content,
 )
 from evaluation.drives.sampling import gather, sample_frames
-from evaluation.methods.learned import polar_image
+from evaluation.methods.polar_images import polar_image
 
 # First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000

@@ -26,6 +26,7 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive, check_same_map
 from cns_drake.base.errors import InputError
+from cns_drake.base.poses import yaw_pose
 from evaluation.alignment.anchor_search import find_candidates, find_guesses
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
@@ -42,7 +43,6 @@ from evaluation.alignment.pose_graph import (
 )
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.drive_views import MovedDrive
-from evaluation.methods.method import yaw_pose
 
 When = Literal["auto", "always", "never"]
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.angles import wrapped
+from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.sampling import gather
-from evaluation.methods.method import yaw_pose
 from evaluation.methods.scan_context import ScanContext
 
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.

@@ -537,7 +537,7 @@ def _write_scores(
 
 def _choice_of(name: str, assignments: list[str] | None) -> MethodChoice:
     """Returns a method with its settings."""
-    from evaluation.methods.method import load_method
+    from evaluation.methods.own_files import load_method
     from evaluation.study.chosen_methods import MethodChoice, method_settings
 
     file = Path(name) if name.endswith(".py") else None

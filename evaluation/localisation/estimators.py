@@ -35,7 +35,7 @@ from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import sample_frames, within_range
 from evaluation.localisation.robust import MAX_RANGE, align_robustly
 from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.methods.method import run_module, with_named_faults
+from evaluation.methods.own_files import run_module, with_named_faults
 from evaluation.recognition.keeping import kept_places
 
 # Distance between the scans of a drive that enter the map [m].

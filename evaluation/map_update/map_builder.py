@@ -4,6 +4,7 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.points import xyz
+from evaluation.maps.grid_cells import CELLS_PER_AXIS, cell_keys
 
 # Side of the cells of which each keeps one point [m].
 THINNED = 0.1
@@ -18,26 +19,6 @@ _MAP_DTYPE = np.dtype(
 )
 # Greatest number of arrays of cells to search; more are merged.
 _MOST_PARTS = 8
-# Cells are numbered by 21 bits for each axis.
-_BITS = 21
-
-
-def cell_keys(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns a number for each cell of a grid.
-
-    Args:
-        cells: (N, 3) numbers of cells along x, y and z.
-
-    Returns:
-        (M,) int64 numbers, which sort like the cells; and (N,) bool, which
-        cells have a number. Cells that are not finite, or beyond the range of
-        21 bits for each axis, have no number.
-    """
-    with np.errstate(invalid="ignore"):
-        is_near = (cells >= 0) & (cells < 1 << _BITS)
-    inside = np.asarray(is_near.all(axis=1))
-    x, y, z = cells[inside].astype(np.int64).T
-    return (x << (2 * _BITS) | y << _BITS) | z, inside
 
 
 class MapBuilder:
@@ -49,7 +30,7 @@ class MapBuilder:
 
     def __init__(self, origin: np.ndarray):
         """Starts an empty map; its origin (3,) must be near all points [m]."""
-        self._origin = np.floor(origin / THINNED) - (1 << (_BITS - 1))
+        self._origin = np.floor(origin / THINNED) - CELLS_PER_AXIS // 2
         self._parts: list[np.ndarray] = []
         self._points: list[np.ndarray] = []
 

@@ -25,9 +25,10 @@ from cns_drake.base.points import xyz
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.map_update.baselines import BASELINES
 from evaluation.map_update.labels import Label
-from evaluation.map_update.map_builder import THINNED, cell_keys
+from evaluation.map_update.map_builder import THINNED
 from evaluation.map_update.scores import Labels
 from evaluation.map_update.sessions import Pair, Session
+from evaluation.maps.grid_cells import cell_keys
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 
 # No map is updated: all drives are merged.

@@ -8,9 +8,8 @@ from evaluation.methods import (  # noqa: F401  (register themselves)
     scan_context,
     solid,
 )
-from evaluation.methods.method import (
-    Method,
-    MethodConfig,
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.registry import (
     known_methods,
     make_method,
     optional_methods,

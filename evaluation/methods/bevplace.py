@@ -29,8 +29,9 @@ from scipy.ndimage import correlate1d
 from scipy.special import softmax
 
 from evaluation.clouds.count_images import count_image
-from evaluation.methods.method import register
-from evaluation.methods.published_networks import Network, Weights
+from evaluation.methods.network_layers import Weights
+from evaluation.methods.published_networks import Network
+from evaluation.methods.registry import register
 
 _SCALES = 5
 # Turns of the image [deg].

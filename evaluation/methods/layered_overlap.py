@@ -19,14 +19,15 @@ import numpy as np
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from cns_drake.base.poses import make_pose
-from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.overlap_layers import layer_cells
 from evaluation.methods.overlap_maps import (
     best_overlaps,
     climb,
     coarse_maps,
-    layer_cells,
     turns,
 )
+from evaluation.methods.registry import register
 
 
 def _moves(turn: int, shift: int) -> np.ndarray:

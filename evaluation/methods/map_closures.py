@@ -18,7 +18,8 @@ from pydantic import PositiveFloat, PositiveInt
 
 from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import Method, MethodConfig, PlaceScan, register
+from evaluation.methods.method import Method, MethodConfig, PlaceScan
+from evaluation.methods.registry import register
 
 # The package offers a single operation: it stores a local map under a number,
 # and aligns it with all stored maps of lower numbers. Queries are therefore

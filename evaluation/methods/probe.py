@@ -29,8 +29,10 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 from scipy.ndimage import gaussian_filter1d
 
-from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
-from evaluation.methods.sparse_convolution import PACKED
+from cns_drake.base.poses import yaw_pose
+from evaluation.maps.grid_cells import packed_cells
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.registry import register
 
 # Probabilities stay this far from 0 and 1.
 _EPSILON = 1e-6
@@ -125,7 +127,7 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
         config = self.config
         shape = config.rings, config.sectors
         voxels = np.floor(points / config.voxel_size).astype(np.int64)
-        _, first = np.unique(voxels @ PACKED, return_index=True)
+        _, first = np.unique(packed_cells(voxels), return_index=True)
         x, y, z = points[first].T
         ring = np.hypot(x, y) * (config.rings / config.max_range)
         turn = np.arctan2(y, x) / (2.0 * math.pi) + 0.5

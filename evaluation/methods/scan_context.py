@@ -34,8 +34,10 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
+from cns_drake.base.poses import yaw_pose
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.registry import register
 
 # Number of contexts compared at a time; it limits the memory of an exhaustive
 # comparison.

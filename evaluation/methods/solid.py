@@ -17,8 +17,10 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from cns_drake.base.drives.lidar_fields import LidarField
+from cns_drake.base.poses import yaw_pose
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
-from evaluation.methods.method import Method, MethodConfig, register, yaw_pose
+from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.registry import register
 
 # Field of view of the `cns` preset's LiDAR [S].
 _CNS = LidarField(32, -22.5, 22.5)

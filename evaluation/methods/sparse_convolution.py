@@ -8,8 +8,7 @@ odd size is centred at its cell; a kernel of even size begins at its cell.
 
 import numpy as np
 
-# Base for encoding the three indices of a cell in one number.
-PACKED = np.array([1 << 42, 1 << 21, 1])
+from evaluation.maps.grid_cells import packed_cells
 
 
 def convolve(
@@ -32,14 +31,14 @@ def convolve(
     """
     at = cells if at is None else at
     size = round(len(kernel) ** (1 / 3))
-    keys = cells @ PACKED
+    keys = packed_cells(cells)
     order = np.argsort(keys)
     keys = keys[order]
     result = np.zeros((len(at), kernel.shape[2]), features.dtype)
     for number, weights in enumerate(kernel):
         offset = np.unravel_index(number, (size, size, size), "F")
         offset = step * (np.array(offset) - size // 2 * (size % 2))
-        wanted = (at + offset) @ PACKED
+        wanted = packed_cells(at + offset)
         place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         known = keys[place] == wanted
         result[known] += features[order[place[known]]] @ weights

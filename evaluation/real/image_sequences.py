@@ -24,6 +24,7 @@ from cns_drake.base.files import draft_folder, user_errors
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
 from cns_drake.base.points import from_xyz, xyz
+from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track
 from evaluation.clouds.count_images import (
     check_image,
@@ -34,7 +35,6 @@ from evaluation.clouds.count_images import (
 from evaluation.clouds.notes import OnNote
 from evaluation.drives.scan_files import FileDrive
 from evaluation.drives.text_tables import read_poses
-from evaluation.methods.method import yaw_pose
 from evaluation.recognition.description import Role
 from evaluation.study.tasks.task import NamedDrive
 

@@ -22,7 +22,7 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.clouds.notes import OnNote
 from evaluation.localisation import estimators
 from evaluation.methods import MethodConfig, shipped_methods
-from evaluation.methods.method import run_module
+from evaluation.methods.own_files import run_module
 from evaluation.real.data_sets import (
     RealScans,
     open_data_sets,

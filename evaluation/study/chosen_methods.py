@@ -19,7 +19,7 @@ from evaluation.methods import (
     optional_methods,
     shipped_methods,
 )
-from evaluation.methods.method import load_method
+from evaluation.methods.own_files import load_method
 from evaluation.results.table import SETTINGS
 
 # The value of a parameter, as text.

@@ -11,8 +11,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.scene import foreign_meshes
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.methods import method
-from evaluation.methods.method import load_method
+from evaluation.methods import registry
+from evaluation.methods.own_files import load_method
 
 
 def rows():
@@ -73,7 +73,7 @@ def test_a_mesh_reader_that_crashes_is_a_fault(tmp_path, monkeypatch):
 
 
 def test_a_method_file_is_a_program(tmp_path, monkeypatch):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     path = tmp_path / "program.py"
     path.write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
     with pytest.raises(InputError, match="registers 0 methods"):

@@ -19,7 +19,7 @@ from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
 from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import control_drives, recording_info
-from evaluation.methods import method
+from evaluation.methods import registry
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.study.collection import drives_by_map, find_recordings
 
@@ -166,7 +166,7 @@ class Counting(Method):
 def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     """The tables include controls, and come from simulation alone."""
     # Other tests do not find the method registered.
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
     studies.run_here(monkeypatch, reproduction)

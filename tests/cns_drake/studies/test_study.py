@@ -571,10 +571,10 @@ def test_costs_follow_the_number_of_places(town, tmp_path, jobs_done):
 
 
 def test_an_own_method(town, tmp_path, jobs_done, monkeypatch):
-    from evaluation.methods import method
+    from evaluation.methods import registry
 
     # Other tests do not find the method registered.
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     own = tmp_path / "counting.py"
     own.write_text(
         """

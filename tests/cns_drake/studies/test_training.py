@@ -20,14 +20,8 @@ from cns_drake.studies.training import (
     write_weights,
 )
 from cns_drake.studies.training_drives import draw_streets
-from evaluation.methods.learned import (
-    CHANNELS,
-    RINGS,
-    SECTORS,
-    Learned,
-    LearnedConfig,
-    LearnedScan,
-)
+from evaluation.methods.learned import Learned, LearnedConfig, LearnedScan
+from evaluation.methods.polar_images import CHANNELS, RINGS, SECTORS
 
 
 def toy_scans(num_cities=2, num_drives=2, length=60):

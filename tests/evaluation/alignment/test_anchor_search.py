@@ -2,8 +2,8 @@ from helpers.towns import rigid
 import numpy as np
 import pytest
 
+from cns_drake.base.poses import yaw_pose
 from evaluation.alignment.anchor_search import Candidates, find_guesses
-from evaluation.methods.method import yaw_pose
 
 
 def make_candidates(X_TS, right, wrong, seed=1, drift=0.0):

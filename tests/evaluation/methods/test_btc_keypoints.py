@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.methods.btc_triangles import (
+from evaluation.methods.btc_keypoints import (
     Keypoints,
     count_bits,
     find_keypoints,

@@ -4,8 +4,8 @@ import math
 import numpy as np
 import pytest
 
+from evaluation.methods.btc_keypoints import Keypoints
 from evaluation.methods.btc_triangles import (
-    Keypoints,
     Triangles,
     make_table,
     make_triangles,

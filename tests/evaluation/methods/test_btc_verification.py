@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from evaluation.methods.btc import align, find_motion, plane_overlap
 from evaluation.methods.btc_planes import Planes
+from evaluation.methods.btc_verification import (
+    align,
+    find_motion,
+    plane_overlap,
+)
 
 
 def random_motion(rng, reach=20.0):

@@ -9,7 +9,8 @@ import pytest
 
 from evaluation.methods import make_method
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.methods.overlap_maps import climb, layer_cells, turns
+from evaluation.methods.overlap_layers import layer_cells
+from evaluation.methods.overlap_maps import climb, turns
 
 
 def method(**parameters) -> LayeredOverlap:

@@ -10,16 +10,8 @@ from scipy import ndimage
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.learned import (
-    FEATURES,
-    LAYERS,
-    RINGS,
-    SECTORS,
-    SHIPPED,
-    TURNS,
-    _infer,
-    polar_image,
-)
+from evaluation.methods.learned import FEATURES, LAYERS, SHIPPED, TURNS, _infer
+from evaluation.methods.polar_images import RINGS, SECTORS, polar_image
 
 RNG = np.random.default_rng(7)
 

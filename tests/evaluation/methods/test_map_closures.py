@@ -11,8 +11,12 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.methods import known_methods, make_method, shipped_methods
-from evaluation.methods import method as registry
+from evaluation.methods import (
+    known_methods,
+    make_method,
+    registry,
+    shipped_methods,
+)
 from evaluation.study.chosen_methods import choose_methods
 
 NAME = "map-closures"

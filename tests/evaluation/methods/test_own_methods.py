@@ -8,8 +8,8 @@ from helpers.eval_program import assert_refused, make_block_scene, run
 import numpy as np
 import pytest
 
-from evaluation.methods import method
-from evaluation.methods.method import load_method
+from evaluation.methods import registry
+from evaluation.methods.own_files import load_method
 from evaluation.study.chosen_methods import choose_methods
 
 
@@ -24,7 +24,7 @@ def shown_method(folder):
 
 def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
     # Other tests do not find the method registered.
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     path = shown_method(tmp_path)
     assert len(path.read_text().splitlines()) < 40
     both = ["pr", towns / "town_01", towns / "town_02", "--method", path]
@@ -43,7 +43,7 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
 
 
 def test_the_shown_method_finds_turned_places(tmp_path, monkeypatch):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     heights = load_method(shown_method(tmp_path))()
     scenes = [make_block_scene(seed) for seed in range(6)]
     database = heights.build_database([heights.describe(s) for s in scenes])
@@ -157,7 +157,7 @@ class Own(Method):
 def test_faults_of_a_method_are_one_line(
     capsys, towns, tmp_path, monkeypatch, data, old, new, fault
 ):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     text = _WHOLE.replace("{number}", "a")
     assert old in text
     path = tmp_path / "own.py"
@@ -205,7 +205,7 @@ def test_faults_of_a_method_are_one_line(
 def test_faults_outside_the_class_of_the_method(
     capsys, towns, tmp_path, monkeypatch, parent, own, fault
 ):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     text = _WHOLE.replace("{number}", "p").replace("(Method)", f"({own})")
     if own == "Method":
         text = text.replace("    def desc", "    Config = Config\n    def desc")
@@ -219,7 +219,7 @@ def test_faults_outside_the_class_of_the_method(
 def test_a_relative_path_has_line_and_traceback(
     capsys, towns, tmp_path, monkeypatch, name
 ):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "sub").mkdir()
     text = _WHOLE.replace("{number}", "b").replace("len(points)", "1 / 0")
@@ -260,7 +260,7 @@ def test_a_relative_path_has_line_and_traceback(
 def test_results_of_the_other_functions(
     capsys, towns, tmp_path, monkeypatch, function, body, fault
 ):
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     path = tmp_path / "own.py"
     path.write_text(
         _WHOLE.replace("{number}", "c")
@@ -272,7 +272,7 @@ def test_results_of_the_other_functions(
 
 def test_a_file_in_a_setting_counts_by_its_content(tmp_path, monkeypatch):
     """Weights beside the method, as a text, in a list, and in a folder."""
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     text = _WHOLE.replace("{number}", "weights").replace(
         "    def desc",
         "    class Config(MethodConfig):\n"

@@ -14,15 +14,10 @@ from scipy.special import expit
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.published_networks import (
-    _DPA_NET,
-    _SVT_NET,
-    dpa_net,
-    farthest_points,
-    prepare,
-    svt_net,
-)
+from evaluation.methods.dpa_net import DPA_NET_SHAPES, dpa_net, farthest_points
+from evaluation.methods.pointnetvlad_clouds import prepare_cloud
 from evaluation.methods.sparse_convolution import coarser, convolve
+from evaluation.methods.svt_net import SVT_NET_SHAPES, svt_net
 from evaluation.methods.torch_weights import read_weights
 from evaluation.study.chosen_methods import choose_methods
 
@@ -109,11 +104,11 @@ def street(number=20_000, slope=0.05):
 
 def test_preparation():
     points = street()
-    cloud = prepare(points)
+    cloud = prepare_cloud(points)
     assert cloud.shape == (4096, 3)
     assert cloud.dtype == np.float32
     assert np.abs(cloud).max() <= 1.0
-    again = prepare(street(2000))
+    again = prepare_cloud(street(2000))
     assert again.shape == (4096, 3)
     # Without ground the rest has its centre at 0, and a mean distance of 1/2,
     # up to the few that are drawn anew.
@@ -125,7 +120,9 @@ def test_preparation():
         -0.05, abs=0.01
     )
     ground = np.array([[x, y, -1.6] for x in range(9) for y in range(9)], float)
-    assert prepare(ground).shape == prepare(ground[:0]).shape == (0, 3)
+    assert (
+        prepare_cloud(ground).shape == prepare_cloud(ground[:0]).shape == (0, 3)
+    )
 
 
 def collapsed():
@@ -140,17 +137,17 @@ def collapsed():
 
 def test_clouds_at_one_place_have_no_descriptor():
     for points in collapsed():
-        assert prepare(points).shape == (0, 3)
+        assert prepare_cloud(points).shape == (0, 3)
     # Two places are enough. Points of a grid are often drawn on one line.
     ground = next(collapsed())
     two = [[5.0, 3.0, 1.0], [8.0, -3.0, 4.0]]
-    assert prepare(np.r_[ground, two]).shape == (4096, 3)
+    assert prepare_cloud(np.r_[ground, two]).shape == (4096, 3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["svt-net", "dpa-net"])
 def test_collapsed_clouds_are_no_candidates(tmp_path, monkeypatch, name):
-    shapes = {"svt-net": _SVT_NET, "dpa-net": _DPA_NET}[name]
+    shapes = {"svt-net": SVT_NET_SHAPES, "dpa-net": DPA_NET_SHAPES}[name]
     weights = {
         key: RNG.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
         for key, shape in shapes.items()
@@ -182,7 +179,7 @@ def blank(shapes, **values):
 def svt_weights():
     """Returns weights by which each channel counts the cells of a block."""
     eye = np.eye(32)
-    weights = blank(_SVT_NET)
+    weights = blank(SVT_NET_SHAPES)
     weights["backbone.conv0.kernel"][62] = 1.0
     for number in (0, 1):
         weights[f"backbone.convs.{number}.kernel"][:] = eye
@@ -209,7 +206,7 @@ def test_svt_net_in_closed_form():
 def dpa_weights():
     """Returns weights by which a point is described by its coordinates."""
     rng = np.random.default_rng(4)
-    weights = blank(_DPA_NET, **{"Gem.p": 1.0})
+    weights = blank(DPA_NET_SHAPES, **{"Gem.p": 1.0})
     random = ("spconv", "offset", "q_proj", "k_proj", "rel_pos", "interpolate")
     for name, values in weights.items():
         if any(part in name for part in random) and "var" not in name:

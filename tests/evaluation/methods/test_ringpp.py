@@ -5,7 +5,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.ringpp import RingPlusPlus, _normalise, radon
+from evaluation.methods.radon import radon
+from evaluation.methods.ringpp import RingPlusPlus, _normalise
 
 CELL = 140.0 / 120.0
 # Least possible distance of a pair, see `test_no_pair_is_nearer`.

@@ -17,7 +17,7 @@ from evaluation.methods import (
     MethodConfig,
     make_method,
 )
-from evaluation.methods.btc import align
+from evaluation.methods.btc_verification import align
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,

@@ -16,7 +16,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster, choose_cluster
 from cns_drake.base.jobs.running import run_jobs
 from evaluation.drives import open_drive
-from evaluation.methods import make_method, method
+from evaluation.methods import make_method, registry
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
@@ -445,7 +445,7 @@ def test_own_method_beside_the_others(
     recordings, few_methods, tmp_path, monkeypatch
 ):
     # Other tests do not find the method registered.
-    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     path = tmp_path / "counting.py"
     path.write_text(OWN_METHOD)
     choices = choose_methods(["standard", path])

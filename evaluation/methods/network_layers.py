@@ -1,0 +1,77 @@
+"""Layers of neural networks, for inference, with weights by their names."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import erf
+
+Weights = Mapping[str, np.ndarray]
+_TINY = 1e-6
+
+
+def relu(x: np.ndarray) -> np.ndarray:
+    return np.maximum(x, 0.0)
+
+
+def gelu(x: np.ndarray) -> np.ndarray:
+    return 0.5 * x * (1.0 + erf(x / np.sqrt(x.dtype.type(2.0))))
+
+
+def batch_norm(
+    weights: Weights, name: str, x: np.ndarray, epsilon: float = 1e-5
+) -> np.ndarray:
+    mean, variance = (weights[f"{name}.running_{s}"] for s in ("mean", "var"))
+    scale = weights[f"{name}.weight"] / np.sqrt(variance + epsilon)
+    return (x - mean) * scale + weights[f"{name}.bias"]
+
+
+def layer_norm(
+    weights: Weights, name: str, x: np.ndarray, epsilon: float = 1e-5
+) -> np.ndarray:
+    x = x - x.mean(axis=-1, keepdims=True)
+    x = x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + epsilon)
+    return x * weights[f"{name}.weight"] + weights[f"{name}.bias"]
+
+
+def linear(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
+    """A linear layer, or a convolution of kernel 1, with or without a bias."""
+    kernel = weights[f"{name}.weight"]
+    bias = weights.get(f"{name}.bias", 0.0)
+    return x @ kernel.reshape(kernel.shape[:2]).T + bias
+
+
+def generalised_mean(x: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Returns the generalised mean (channels,) of rows (GeM, 2018)."""
+    return (np.maximum(x, _TINY) ** p).mean(axis=0) ** (1.0 / p)
+
+
+def nearest_three(
+    known: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns indices and weights (M, 3) of the three nearest neighbours."""
+    distances, found = cKDTree(known).query(wanted, min(3, len(known)))
+    distances, found = (
+        one.reshape(len(wanted), -1) for one in (distances, found)
+    )
+    inverse = (1.0 / (distances + 1e-8)).astype(np.float32)
+    return found, inverse / inverse.sum(axis=1, keepdims=True)
+
+
+def interpolated(
+    known: np.ndarray, wanted: np.ndarray, features: np.ndarray
+) -> np.ndarray:
+    found, shares = nearest_three(known, wanted)
+    return np.einsum("mk,mkc->mc", shares, features[found])
+
+
+def batch_norm_shapes(names: str, channels: int) -> dict[str, tuple[int, ...]]:
+    """Returns name -> shape of the weights of batch normalisations.
+
+    `names` are the names of the layers, separated by spaces.
+    """
+    return {
+        f"{name}.{part}": (channels,)
+        for name in names.split()
+        for part in ("weight", "bias", "running_mean", "running_var")
+    }
