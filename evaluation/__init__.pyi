@@ -13,11 +13,11 @@ from evaluation.methods import MethodConfig as MethodConfig
 from evaluation.methods import known_methods as known_methods
 from evaluation.methods import make_method as make_method
 from evaluation.methods import register as register
+from evaluation.recognition.bootstrap import route_blocks as route_blocks
 from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics as PlaceRecognitionMetrics,
 )
 from evaluation.recognition.metrics import evaluate as evaluate
-from evaluation.recognition.metrics import route_blocks as route_blocks
 from evaluation.recognition.overlap_truth import (
     compared_frames as compared_frames,
 )

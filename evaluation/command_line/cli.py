@@ -28,7 +28,8 @@ from evaluation.recognition.protocol_options import with_protocol
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
     from evaluation.methods.method import Method
-    from evaluation.recognition.metrics import Interval, Mode
+    from evaluation.recognition.bootstrap import Interval
+    from evaluation.recognition.metrics import Mode
     from evaluation.recognition.place_outcome import PlaceOutcome
     from evaluation.study.chosen_methods import MethodChoice
 

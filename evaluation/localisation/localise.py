@@ -36,7 +36,7 @@ from evaluation.localisation.estimators import (
 from evaluation.localisation.robust import MAX_RANGE
 from evaluation.maps.voxel_maps import thin
 from evaluation.recognition.auroc import auroc
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.number import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,

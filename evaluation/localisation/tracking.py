@@ -18,7 +18,7 @@ from evaluation.localisation.localise import (
     Starts,
     way_axes,
 )
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.number import Number
 
 # Distance driven between two aligned scans [m].
 SPACING = 2.0

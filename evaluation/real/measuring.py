@@ -40,7 +40,7 @@ from evaluation.real.image_sequences import (
 from evaluation.real.sessions import FOLDER as SESSIONS
 from evaluation.real.sessions import draw_sessions, read_sessions
 from evaluation.recognition.description import Role
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.number import Number
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     RECORDED_PROTOCOL,

@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedScans, DriveDescriptors
+from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.search import Search
 
 # Number of clouds, or of queries, whose time is measured; the time of the first

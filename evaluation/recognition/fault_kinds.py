@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.recognition.place_outcome import (
-    ELSEWHERE,
-    FAULTS,
-    PlaceOutcome,
+from evaluation.recognition.faults import ELSEWHERE, FAULTS
+from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.visible_change import (
     mean_visible_change,
     visible_change_added,
 )
@@ -107,7 +106,7 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
 
     Returns:
         For each of Q queries, "" if the top-ranked place is a match, and
-        otherwise the reason as `evaluation.recognition.place_outcome.faults`
+        otherwise the reason as `evaluation.recognition.faults.faults`
         finds it. In place of `elsewhere` stands the first of these kinds that
         applies:
 

@@ -2,52 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
 from evaluation.methods.method import Method
-from evaluation.recognition.metrics import (
-    MODES,
+from evaluation.recognition.bootstrap import (
     UNKNOWN,
     Interval,
+)
+from evaluation.recognition.faults import faults
+from evaluation.recognition.metrics import (
+    MODES,
     Mode,
     PlaceRecognitionMetrics,
     evaluate,
-    own_samples,
-    paired_samples,
-    percentile_interval,
 )
+from evaluation.recognition.number import Number
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     PoseMetrics,
-    is_accepted,
     pose_metrics,
 )
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
+from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.recognition.scoring import ranked_places
 
-# The reason for a wrong top-ranked place to which no other one applies.
-ELSEWHERE = "elsewhere"
-# Reasons for wrong top-ranked places, in order of precedence.
-FAULTS = ("no_place", "no_candidate", "other_city", "too_far", ELSEWHERE)
-# Up to this multiple of the radius, a wrong place is `too_far`; beyond it,
-# `elsewhere`.
-NEARLY = 2.0
 # Further radii of a match for which AUC is computed [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 # Number of top-ranked places that are kept for each query.
 NUM_BEST = 5
-_HALF = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,209 +312,3 @@ def check_has_match(outcome: PlaceOutcome) -> None:
         f"{outcome.query}: no query lies within {protocol.radius:g} m of a"
         f" place of {database} (the nearest at {outcome.nearest.min():.1f} m)"
     )
-
-
-def faults(
-    outcomes: QueryOutcomes,
-    match_frames: np.ndarray,
-    distances: np.ndarray,
-    radius: float,
-) -> np.ndarray:
-    """Returns, for each query, why its top-ranked place is wrong.
-
-    The top-ranked place is the place that the method ranks first.
-
-    Args:
-        outcomes: outcomes of Q queries.
-        match_frames: (Q,) frame of the top-ranked place; -1 without a
-            candidate.
-        distances: (Q,) distance to the top-ranked place [m]; NaN in another
-            city.
-        radius: radius of a match [m].
-
-    Returns:
-        (Q,) "" if the top-ranked place is a match, and otherwise the first
-        reason that applies: `no_place` if the query has no match;
-        `no_candidate` if the method finds no place, or rejects all places;
-        `other_city` if the top-ranked place is in another city; `too_far` if
-        the top-ranked place is at most twice the radius away; `elsewhere` if no
-        other reason applies.
-    """
-    wrong = [
-        ~outcomes.has_match,
-        match_frames < 0,
-        np.isnan(distances),
-        distances <= NEARLY * radius,
-    ]
-    kinds = np.select(wrong, FAULTS[:-1], FAULTS[-1])
-    return np.where(outcomes.is_right, "", kinds)
-
-
-def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
-    """Returns the mean visible change minus the mean in a baseline.
-
-    The visible change also contains parts of a scan that are occluded only
-    because the viewpoints differ (parallax). Subtracting the baseline removes
-    this share.
-
-    Args:
-        now: (Q,) overlaps, see `PlaceOutcome.of`.
-        before: (Q,) overlaps of the same queries in the baseline.
-
-    Returns:
-        The difference; NaN if no query has both values, or the queries differ.
-    """
-    if before is None or len(before) != len(now):
-        return math.nan
-    added = before - now
-    known = added[~np.isnan(added)]
-    return float(known.mean()) if len(known) else math.nan
-
-
-def mean_visible_change(overlaps: np.ndarray) -> tuple[float, int]:
-    """Returns the mean visible change, and the number of queries.
-
-    The visible change of a query is the share of its scan that the best of its
-    matches does not show.
-
-    Args:
-        overlaps: (Q,) see `PlaceOutcome.of`; NaN for queries that have no
-            match, which do not count.
-
-    Returns:
-        The mean and the number of queries with a match; NaN and 0 if there are
-        none.
-    """
-    known = overlaps[~np.isnan(overlaps)]
-    if len(known) == 0:
-        return math.nan, 0
-    return float(1.0 - known.mean()), len(known)
-
-
-class Number(NamedTuple):
-    """A result of a task.
-
-    Attributes:
-        method: method, estimator or baseline; "" if there is none. For a place
-            recognition method, it is the method's name with its settings.
-        gate: whether geometric verification was used.
-        metric: name of the metric.
-        value: its value.
-        interval: its 95 % interval.
-        n: number of queries, points or other items from which the value is
-            computed.
-    """
-
-    method: str
-    gate: bool
-    metric: str
-    value: float
-    interval: Interval = UNKNOWN
-    n: int = 0
-
-
-def place_numbers(
-    now: PlaceOutcome, before: PlaceOutcome | None
-) -> Iterator[Number]:
-    """Yields a method's place recognition results in a condition, one by one.
-
-    Intervals come from a bootstrap over blocks of the route. Each bootstrap
-    sample contains the same blocks in the condition and in the baseline, in
-    which nothing differs between the drives.
-
-    Args:
-        now: outcome of the method in the condition.
-        before: outcome of the method in the baseline; None to leave out the
-            results that compare the condition with the baseline.
-
-    Yields:
-        The metrics of the condition and, compared with the baseline, `kept`,
-        `kept_r1` and `kept_strict` (AUC, R@1 and strict AUC in the condition,
-        divided by the same metric in the baseline), `lost` and `found` (numbers
-        of queries that are right only in the baseline, and only in the
-        condition), and the result of the function `visible_change_added`.
-    """
-    outcomes = now.outcomes
-    values = now.by_mode["all"].areas
-    samples = own_samples(outcomes)
-    for (name, value), drawn in zip(values.items(), samples, strict=True):
-        yield now.number(name, value, percentile_interval(drawn))
-    if before is not None:
-        drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
-        if is_paired := len(before.outcomes) == len(outcomes):
-            drawn_then = paired_samples(before.outcomes, outcomes)
-        for name, then, today, drawn, other in zip(
-            ("kept", "kept_r1", "kept_strict"),
-            before.by_mode["all"].areas.values(),
-            values.values(),
-            samples,
-            drawn_then,
-            strict=True,
-        ):
-            interval = percentile_interval(kept_share(drawn, other))
-            yield now.number(name, float(kept_share(today, then)), interval)
-        if is_paired:
-            right = outcomes.is_right
-            was = before.outcomes.is_right
-            yield now.number("lost", float((was & ~right).sum()))
-            yield now.number("found", float((right & ~was).sum()))
-            added = visible_change_added(
-                now.columns["overlap"], before.columns["overlap"]
-            )
-            if not math.isnan(added):
-                yield now.number("visible_change_added", added)
-    yield now.number("with_match", float(outcomes.has_match.sum()))
-    yield now.number("places", float(outcomes.num_places))
-    yield now.number(
-        "recall_at_full_precision",
-        now.by_mode["all"].curve.recall_at_full_precision,
-    )
-    overlaps = now.columns["overlap"]
-    for name in FAULTS:
-        yield now.number(name, float(np.sum(now.columns["why"] == name)))
-    # Their best match shows less than half of their scan.
-    is_little_shown = (overlaps < _HALF) & ~outcomes.is_right
-    yield now.number("hidden", float(is_little_shown.sum()))
-    if not math.isnan(shown := mean_visible_change(overlaps)[0]):
-        yield now.number("visible_change", shown)
-
-
-def pose_numbers(
-    now: PlaceOutcome, before: PlaceOutcome | None
-) -> Iterator[Number]:
-    """Yields a method's pose results; nothing if it estimates no poses.
-
-    Args:
-        now: outcome of the method in a condition.
-        before: outcome of the method in the baseline. If it is given, the
-            results include the metric `kept`: the success rate in the condition
-            divided by the success rate in the baseline.
-    """
-    value = now.pose.success
-    if math.isnan(value):
-        return
-    number = int(now.outcomes.has_match.sum())
-    yield now.number("pose_success", value, n=number)
-    if before is not None:
-        kept = float(kept_share(value, before.pose.success))
-        yield now.number("kept", kept, n=number)
-    known = is_accepted(now.outcomes) & ~np.isnan(now.pose_errors.translation)
-    for name, median in (
-        ("translation_median", now.pose.translation_median),
-        ("rotation_median_deg", now.pose.rotation_median_deg),
-    ):
-        if not math.isnan(median):
-            yield now.number(name, median, n=int(known.sum()))
-
-
-def kept_share(
-    changed: np.ndarray | float, unchanged: np.ndarray | float
-) -> np.ndarray:
-    """Returns `changed` / `unchanged`, NaN where `unchanged` is 0 or NaN.
-
-    If `changed` is a result under a change, and `unchanged` the same result
-    without the change, the quotient is the retained share.
-    """
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.divide(changed, unchanged)
-    return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

@@ -23,7 +23,7 @@ class QueryOutcomes:
             infinite if no candidate is a true match.
         num_places: size of the database.
         blocks: (Q,) block of the route in which each query lies, see
-            `evaluation.recognition.metrics.route_blocks`; None if each is a
+            `evaluation.recognition.bootstrap.route_blocks`; None if each is a
             block of its own.
 
     Example:

@@ -11,15 +11,16 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DriveDescriptors, describe_drive
+from evaluation.recognition.description import describe_drive
+from evaluation.recognition.descriptors import DriveDescriptors
+from evaluation.recognition.geometric_verification import (
+    gated_at,
+    tested_places,
+)
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
-from evaluation.recognition.scoring import (
-    gated_at,
-    ranked_places,
-    tested_places,
-)
+from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.search import Search
 from evaluation.recognition.sequences import along_the_way
 

@@ -42,8 +42,8 @@ def write_scores(
         database: folder of the scans of places, one file each.
         query: folder of the scans of queries, one file each.
         output: the file to write.
-        gate_radius: radius of geometric verification [m], see
-            `evaluation.recognition.scoring.gated`; None for none.
+        gate_radius: radius of geometric verification [m] (see
+            `evaluation.recognition.geometric_verification`); None for none.
         columns: number of columns of `.bin` files; by default guessed for each
             folder from the values.
         on_note: is called with notes on how scans were read, one note of each

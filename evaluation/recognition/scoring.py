@@ -1,6 +1,6 @@
-"""Checks scores, verifies candidates geometrically, and ranks the places."""
+"""Asks a method for the scores of places, and checks them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import contextlib
 from typing import Any
 
@@ -8,140 +8,9 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import read_only
-from evaluation.methods.method import Method, check_number
-from evaluation.recognition.pose_errors import checked_pose
-
-# These values were chosen on development worlds, see docs/notes/fitting.md.
-NUM_GATED = 30
-SOFTNESS = 0.05
-
-
-def ranked_places(scores: np.ndarray) -> np.ndarray:
-    """Returns places from the best to the worst.
-
-    Of places with equal scores, the first in the database is ranked higher.
-    Places that are no candidates (NaN) come last, even after a score of minus
-    infinity.
-
-    Args:
-        scores: (..., D), higher is more similar; NaN is no candidate.
-
-    Returns:
-        (..., D) indices of places.
-    """
-    # NumPy sorts NaN last.
-    return np.argsort(-scores, axis=-1, kind="stable")
-
-
-def gate_weight(
-    distance: np.ndarray | float, radius: float, softness: float = SOFTNESS
-) -> np.ndarray:
-    """Returns the factor by which geometric verification scales a score.
-
-    The factor is 1 for near places, 0 for far places, and 1/2 at the radius.
-
-    Args:
-        distance: distances from query to place according to the method's own
-            pose [m], an array of any shape.
-        radius: radius of a match [m].
-        softness: half the width of the transition, as a fraction of the radius.
-    """
-    far = np.asarray(distance, dtype=np.float64) / radius
-    return np.clip((1.0 + softness - far) / (2.0 * softness), 0.0, 1.0)
-
-
-def gated(
-    method: Method,
-    query: Any,
-    database: Any,
-    scores: np.ndarray,
-    radii: Sequence[float],
-) -> list[np.ndarray]:
-    """Returns scores after geometric verification: (D,) for each radius.
-
-    Geometric verification tests the `NUM_GATED` places with the best scores.
-    The method estimates the distance of each of these places from the query,
-    and `gate_weight` returns a weight w from 1 (near) to 0 (far). If w is 0,
-    the place is rejected: its score becomes NaN. Otherwise the score s becomes
-    s - (1 - w) |s|; a positive score is thus multiplied by w. A place for which
-    the method estimates no pose keeps its score. Scores of places that are not
-    tested become NaN.
-
-    If the method estimates no pose at all, all scores stay the same.
-
-    Args:
-        method: method that made the scores.
-        query: descriptor of the query by the method.
-        database: database of the D places, made by the method.
-        scores: (D,) scores by the method; NaN for a place that is no candidate.
-        radii: radii of a match [m].
-
-    Raises:
-        InputError: if the method returns something other than poses.
-    """
-    best = tested_places(scores)
-    if len(best) == 0 or not radii:
-        return [scores for _ in radii]
-    poses = estimated_poses(method, query, database, best.tolist())
-    return gated_at(scores, dict(zip(best.tolist(), poses, strict=True)), radii)
-
-
-def estimated_poses(
-    method: Method, query: Any, database: Any, places: Sequence[int]
-) -> list[np.ndarray | None]:
-    """Returns the pose X_PQ (4, 4) of a query at each place, or None.
-
-    Args:
-        method: method that estimates the poses.
-        query: descriptor of the query by the method.
-        database: database of places, made by the method.
-        places: places in the database.
-
-    Raises:
-        InputError: if the method returns something other than poses.
-    """
-    found = method.relative_poses(query, database, places)
-    check_number(method, "relative_poses", found, len(places))
-    return [checked_pose(method, X_PQ) for X_PQ in found]
-
-
-def tested_places(scores: np.ndarray) -> np.ndarray:
-    """Returns the places that geometric verification tests, best first.
-
-    Args:
-        scores: (D,) scores; NaN for a place that is no candidate.
-    """
-    num_candidates = int((~np.isnan(scores)).sum())
-    return ranked_places(scores)[: min(NUM_GATED, num_candidates)]
-
-
-def gated_at(
-    scores: np.ndarray,
-    poses: Mapping[int, np.ndarray | None],
-    radii: Sequence[float],
-) -> list[np.ndarray]:
-    """Returns scores after geometric verification, see `gated`.
-
-    Args:
-        scores: (D,) scores; NaN for a place that is no candidate.
-        poses: place -> the query's pose X_PQ (4, 4) there, or None, for each of
-            `tested_places`.
-        radii: radii of a match [m].
-    """
-    if all(X_PQ is None for X_PQ in poses.values()):
-        return [scores for _ in radii]
-    best = np.array(list(poses))
-    distance = np.array(
-        [0.0 if X is None else np.linalg.norm(X[:3, 3]) for X in poses.values()]
-    )
-    results = []
-    for radius in radii:
-        weight = gate_weight(distance, radius)
-        values = scores[best] - (1.0 - weight) * np.abs(scores[best])
-        result = np.full(len(scores), np.nan)
-        result[best] = np.where(weight > 0.0, values, np.nan)
-        results.append(result)
-    return results
+from evaluation.methods.method import Method
+from evaluation.recognition.geometric_verification import gated
+from evaluation.recognition.ranking import ranked_places
 
 
 def score_places(

@@ -8,12 +8,9 @@ import numpy as np
 
 from cns_drake.base.progress import track
 from evaluation.methods.method import Method
-from evaluation.recognition.description import DescribedScans, DriveDescriptors
-from evaluation.recognition.scoring import (
-    checked_scores,
-    estimated_poses,
-    score_places,
-)
+from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
+from evaluation.recognition.geometric_verification import estimated_poses
+from evaluation.recognition.scoring import checked_scores, score_places
 from evaluation.recognition.stored_places import StoredDescriptors
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from evaluation.recognition.description import DescribedScans, DriveDescriptors
+from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 
 # Greatest size of the descriptors that are in memory at a time, unless those of
 # a single drive are larger [bytes].

@@ -25,20 +25,12 @@ from evaluation.recognition.fault_kinds import (
     fault_kinds,
     fault_words,
 )
-from evaluation.recognition.metrics import (
-    MODES,
-    Difference,
-    Mode,
-    PlaceRecognitionMetrics,
-    compared_by_auc,
-)
-from evaluation.recognition.place_outcome import (
-    ELSEWHERE,
-    RADII,
-    PlaceOutcome,
-    kept_share,
-)
+from evaluation.recognition.faults import ELSEWHERE
+from evaluation.recognition.metrics import MODES, Mode, PlaceRecognitionMetrics
+from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.place_outcome import RADII, PlaceOutcome
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS, check_one_protocol
+from evaluation.recognition.significance import Difference, compared_by_auc
 from evaluation.report.reference import NO_REFERENCE, Published, Reference
 from evaluation.results.table_forms import (
     CAPTIONS,

@@ -36,7 +36,7 @@ from matplotlib.patches import Rectangle
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.place_outcome import kept_share
+from evaluation.recognition.place_numbers import kept_share
 from evaluation.results.drawing import METHOD_STYLES, escape_dollars
 from evaluation.results.headlines import (
     from_least_to_greatest,

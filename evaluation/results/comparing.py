@@ -15,16 +15,15 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from evaluation.recognition.metrics import (
-    Difference,
+from evaluation.recognition.bootstrap import (
     Interval,
-    areas,
-    compared_by_auc,
     percentile_interval,
     resampled_metrics,
     weights_by_drive,
 )
+from evaluation.recognition.metrics import main_metrics
 from evaluation.recognition.protocol import PROTOCOL_NAMES, PROTOCOLS
+from evaluation.recognition.significance import Difference, compared_by_auc
 from evaluation.results.summaries import (
     LEAST_UNITS,
     Ranked,
@@ -366,7 +365,7 @@ def _check_agreement(
             (*one.but(), name) in known for name in _RECOMPUTED
         ):
             continue
-        for name, value in areas(one.outcomes).items():
+        for name, value in main_metrics(one.outcomes).items():
             row = known.get((*one.but(), name))
             number = len(one.outcomes)
             if row is None or (

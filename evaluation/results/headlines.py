@@ -7,7 +7,7 @@ p-value below 0.05, see `evaluation.recognition.metrics`.
 from collections.abc import Iterable, Mapping, Sequence
 import math
 
-from evaluation.recognition.metrics import compared_by_auc
+from evaluation.recognition.significance import compared_by_auc
 from evaluation.results.summaries import (
     LEAST_UNITS,
     Ranked,

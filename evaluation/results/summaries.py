@@ -22,14 +22,14 @@ from scipy.special import stdtrit
 from scipy.stats import rankdata
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.metrics import (
+from evaluation.recognition.bootstrap import (
     UNKNOWN,
     Interval,
     paired_samples,
     percentile_interval,
     resampled_weights,
 )
-from evaluation.recognition.place_outcome import kept_share
+from evaluation.recognition.place_numbers import kept_share
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import (

@@ -21,8 +21,9 @@ from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.faults import NEARLY
 from evaluation.recognition.overlap_truth import sample_points
-from evaluation.recognition.place_outcome import NEARLY, PlaceOutcome
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice

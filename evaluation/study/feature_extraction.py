@@ -27,6 +27,7 @@ from evaluation.maps.voxel_maps import (
 )
 from evaluation.methods import MethodConfig
 from evaluation.recognition import description
+from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.parts import Part
@@ -177,7 +178,7 @@ class ExtractedFeatures:
     """
 
     placed: DriveNames
-    described: dict[str, description.DriveDescriptors]
+    described: dict[str, DriveDescriptors]
     scans: KeptScans | list[np.ndarray] | None
     drive: DriveSummary | None = None
     fine: np.ndarray | None = None
@@ -310,7 +311,7 @@ def _described(
     asked: Mapping[str, description.Request],
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
-) -> dict[str, description.DriveDescriptors]:
+) -> dict[str, DriveDescriptors]:
     found = description.describe_drive(
         drive, (), roles, protocol, visit, asked.values()
     )

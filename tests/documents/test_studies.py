@@ -19,7 +19,7 @@ from cns_drake.studies.experiment import (
 )
 from cns_drake.studies.study import TASKS
 from evaluation.localisation import localise, tracking
-from evaluation.recognition import place_outcome
+from evaluation.recognition import faults, place_numbers, place_outcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import (
     FROZEN_REDRAW,
@@ -121,7 +121,8 @@ def test_metrics_are_those_of_the_tasks():
         for name, task in TASKS.items()
     }
     for name in ("place", "pose"):
-        tasks[name] += inspect.getsource(place_outcome)
+        for module in (faults, place_numbers, place_outcome):
+            tasks[name] += inspect.getsource(module)
     for module in (localise, tracking):
         tasks["localise"] += inspect.getsource(module)
     tasks["map"] += inspect.getsource(map_scores)

@@ -9,11 +9,8 @@ from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.place_outcome import (
-    PlaceOutcome,
-    place_numbers,
-    pose_numbers,
-)
+from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval

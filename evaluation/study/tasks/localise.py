@@ -14,7 +14,8 @@ from cns_drake.base.progress import track
 from evaluation.localisation import estimators, localise, tracking
 from evaluation.localisation.localise import Starts
 from evaluation.maps.voxel_maps import map_drive
-from evaluation.recognition.place_outcome import Number, kept_share
+from evaluation.recognition.number import Number
+from evaluation.recognition.place_numbers import kept_share
 from evaluation.study.sources import (
     DriveSource,
     JoinedSource,

@@ -10,12 +10,9 @@ from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
 from evaluation.recognition.keeping import KEEP_ALL
-from evaluation.recognition.place_outcome import (
-    Number,
-    PlaceOutcome,
-    place_numbers,
-    pose_numbers,
-)
+from evaluation.recognition.number import Number
+from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import (
     measure_method,

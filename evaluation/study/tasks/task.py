@@ -15,7 +15,7 @@ from cns_drake.base.jobs.running import Job
 from cns_drake.base.repetitions import repeated
 from evaluation.recognition.description import Role
 from evaluation.recognition.keeping import KEEP_ALL
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.number import Number
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import FROZEN_REDRAW
 from evaluation.study.chosen_methods import MethodChoice
@@ -508,8 +508,8 @@ class Task(abc.ABC):
         """Yields the answers of each method to all queries; by default none.
 
         Each item has three parts: the method; whether geometric verification
-        was used (see `evaluation.recognition.scoring.gated`); and a mapping
-        from columns of `queries.csv` to values (Q,).
+        was used (see `evaluation.recognition.geometric_verification`); and a
+        mapping from columns of `queries.csv` to values (Q,).
 
         Args:
             found: the task's result for a pair of drives.

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
 from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.localisation import estimators
-from evaluation.recognition.description import DescribedScans, joined_scans
+from evaluation.recognition.descriptors import DescribedScans, joined_scans
 
 
 class Straight(Drive):

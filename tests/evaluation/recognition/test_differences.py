@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from evaluation.recognition.metrics import (
+from evaluation.recognition.bootstrap import (
     bootstrap_intervals,
-    compared_by_auc,
-    holm,
     resampled_weights,
     route_blocks,
     weights_by_drive,
 )
 from evaluation.recognition.query_outcomes import judge
+from evaluation.recognition.significance import compared_by_auc, holm
 from evaluation.report.result_tables import method_differences
 
 

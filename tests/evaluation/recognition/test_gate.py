@@ -12,14 +12,14 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.methods import Method, MethodConfig, make_method
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.retrieval import retrieve
-from evaluation.recognition.scoring import (
+from evaluation.recognition.geometric_verification import (
     NUM_GATED,
     SOFTNESS,
     gate_weight,
     gated,
 )
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import retrieve
 
 RADIUS = 8.0
 # Up to this distance, a place has the full weight [m].

@@ -4,13 +4,13 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from evaluation.recognition.metrics import (
-    evaluate,
+from evaluation.recognition.bootstrap import (
     resampled_metrics,
     resampled_weights,
 )
+from evaluation.recognition.metrics import evaluate
 from evaluation.recognition.query_outcomes import judge
-from evaluation.recognition.scoring import ranked_places
+from evaluation.recognition.ranking import ranked_places
 
 NAN = np.nan
 

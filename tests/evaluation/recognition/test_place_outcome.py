@@ -5,14 +5,10 @@ import pytest
 from scipy.stats import binom
 
 from evaluation.methods import make_method
-from evaluation.recognition.metrics import UNKNOWN
-from evaluation.recognition.place_outcome import (
-    FAULTS,
-    PlaceOutcome,
-    faults,
-    place_numbers,
-    pose_numbers,
-)
+from evaluation.recognition.bootstrap import UNKNOWN
+from evaluation.recognition.faults import FAULTS, faults
+from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes

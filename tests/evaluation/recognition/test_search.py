@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from evaluation.methods import make_method
-from evaluation.recognition.description import DescribedScans, DriveDescriptors
+from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.recognition.retrieval import compare_with_gates
 from evaluation.recognition.search import Search

@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 from scipy.stats import spearmanr
 
-from evaluation.recognition.metrics import Interval
+from evaluation.recognition.bootstrap import Interval
 from evaluation.results import summaries
 from evaluation.results.table import Answers, QueryRows, Results, Row
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from evaluation import QueryRows, Results
-from evaluation.recognition.metrics import route_blocks
+from evaluation.recognition.bootstrap import route_blocks
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.table import OWN, STAGE
 from evaluation.study.chosen_methods import choose_methods

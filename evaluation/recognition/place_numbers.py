@@ -1,0 +1,133 @@
+"""A method's results of place recognition and poses, number by number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import math
+
+import numpy as np
+
+from evaluation.recognition.bootstrap import (
+    own_samples,
+    paired_samples,
+    percentile_interval,
+)
+from evaluation.recognition.faults import FAULTS
+from evaluation.recognition.number import Number
+from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.pose_errors import (
+    is_accepted,
+)
+from evaluation.recognition.visible_change import (
+    mean_visible_change,
+    visible_change_added,
+)
+
+_HALF = 0.5
+
+
+def place_numbers(
+    now: PlaceOutcome, before: PlaceOutcome | None
+) -> Iterator[Number]:
+    """Yields a method's place recognition results in a condition, one by one.
+
+    Intervals come from a bootstrap over blocks of the route. Each bootstrap
+    sample contains the same blocks in the condition and in the baseline, in
+    which nothing differs between the drives.
+
+    Args:
+        now: outcome of the method in the condition.
+        before: outcome of the method in the baseline; None to leave out the
+            results that compare the condition with the baseline.
+
+    Yields:
+        The metrics of the condition and, compared with the baseline, `kept`,
+        `kept_r1` and `kept_strict` (AUC, R@1 and strict AUC in the condition,
+        divided by the same metric in the baseline), `lost` and `found` (numbers
+        of queries that are right only in the baseline, and only in the
+        condition), and the result of the function `visible_change_added`.
+    """
+    outcomes = now.outcomes
+    values = now.by_mode["all"].main_metrics
+    samples = own_samples(outcomes)
+    for (name, value), drawn in zip(values.items(), samples, strict=True):
+        yield now.number(name, value, percentile_interval(drawn))
+    if before is not None:
+        drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
+        if is_paired := len(before.outcomes) == len(outcomes):
+            drawn_then = paired_samples(before.outcomes, outcomes)
+        for name, then, today, drawn, other in zip(
+            ("kept", "kept_r1", "kept_strict"),
+            before.by_mode["all"].main_metrics.values(),
+            values.values(),
+            samples,
+            drawn_then,
+            strict=True,
+        ):
+            interval = percentile_interval(kept_share(drawn, other))
+            yield now.number(name, float(kept_share(today, then)), interval)
+        if is_paired:
+            right = outcomes.is_right
+            was = before.outcomes.is_right
+            yield now.number("lost", float((was & ~right).sum()))
+            yield now.number("found", float((right & ~was).sum()))
+            added = visible_change_added(
+                now.columns["overlap"], before.columns["overlap"]
+            )
+            if not math.isnan(added):
+                yield now.number("visible_change_added", added)
+    yield now.number("with_match", float(outcomes.has_match.sum()))
+    yield now.number("places", float(outcomes.num_places))
+    yield now.number(
+        "recall_at_full_precision",
+        now.by_mode["all"].curve.recall_at_full_precision,
+    )
+    overlaps = now.columns["overlap"]
+    for name in FAULTS:
+        yield now.number(name, float(np.sum(now.columns["why"] == name)))
+    # Their best match shows less than half of their scan.
+    is_little_shown = (overlaps < _HALF) & ~outcomes.is_right
+    yield now.number("hidden", float(is_little_shown.sum()))
+    if not math.isnan(shown := mean_visible_change(overlaps)[0]):
+        yield now.number("visible_change", shown)
+
+
+def pose_numbers(
+    now: PlaceOutcome, before: PlaceOutcome | None
+) -> Iterator[Number]:
+    """Yields a method's pose results; nothing if it estimates no poses.
+
+    Args:
+        now: outcome of the method in a condition.
+        before: outcome of the method in the baseline. If it is given, the
+            results include the metric `kept`: the success rate in the condition
+            divided by the success rate in the baseline.
+    """
+    value = now.pose.success
+    if math.isnan(value):
+        return
+    number = int(now.outcomes.has_match.sum())
+    yield now.number("pose_success", value, n=number)
+    if before is not None:
+        kept = float(kept_share(value, before.pose.success))
+        yield now.number("kept", kept, n=number)
+    known = is_accepted(now.outcomes) & ~np.isnan(now.pose_errors.translation)
+    for name, median in (
+        ("translation_median", now.pose.translation_median),
+        ("rotation_median_deg", now.pose.rotation_median_deg),
+    ):
+        if not math.isnan(median):
+            yield now.number(name, median, n=int(known.sum()))
+
+
+def kept_share(
+    changed: np.ndarray | float, unchanged: np.ndarray | float
+) -> np.ndarray:
+    """Returns `changed` / `unchanged`, NaN where `unchanged` is 0 or NaN.
+
+    If `changed` is a result under a change, and `unchanged` the same result
+    without the change, the quotient is the retained share.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.divide(changed, unchanged)
+    return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

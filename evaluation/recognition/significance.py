@@ -1,0 +1,113 @@
+"""Differences of AUC between methods, and whether they are significant."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtr, stdtrit
+
+from evaluation.recognition.bootstrap import (
+    UNKNOWN,
+    Interval,
+    resampled_metrics,
+    weights_by_drive,
+)
+from evaluation.recognition.precision_recall import (
+    pr_curve,
+)
+from evaluation.recognition.query_outcomes import QueryOutcomes
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The difference of two areas under precision-recall curves.
+
+    Attributes:
+        value: the first area minus the second.
+        interval: 95 % interval.
+        p_value: two-sided p-value under the hypothesis that there is no
+            difference; NaN if a route has a single bootstrap block.
+    """
+
+    value: float
+    interval: Interval
+    p_value: float
+
+
+def holm(p_values: np.ndarray) -> np.ndarray:
+    """Returns p-values (N,) corrected for multiple tests, by Holm's method.
+
+    NaN stays NaN and does not count as a test.
+    """
+    known = np.flatnonzero(~np.isnan(p_values))
+    order = known[np.argsort(p_values[known], kind="stable")]
+    steps = p_values[order] * np.arange(len(order), 0, -1)
+    result = np.full(len(p_values), math.nan)
+    result[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return result
+
+
+def compared_by_auc(
+    answers: Mapping[Hashable, Sequence[QueryOutcomes]],
+    drives: Sequence[int] | None = None,
+) -> dict[tuple[Any, Any], tuple[Difference, float]]:
+    """Returns the difference of the mean AUC between any two methods.
+
+    The mean is over one or more sets of queries. All queries count, with or
+    without a match.
+
+    The p-value comes from a t test. Several sets can have the same query drive.
+    The variance of the sum over the sets of one drive comes from a bootstrap,
+    whose samples contain the same blocks of the route for both methods and for
+    all sets of the drive. With n blocks, this variance is multiplied by
+    n/(n-1). Different drives are independent: their variances add up, and their
+    degrees of freedom (n - 1 for each drive) add up.
+
+    Args:
+        answers: method -> its outcomes on each set of queries. The queries must
+            be the same for all methods, and so must their blocks of the route,
+            see `QueryOutcomes.blocks`.
+        drives: for each set of queries, a number that identifies the drive. By
+            default, each set belongs to a different drive.
+
+    Returns:
+        (first method, second method) -> AUC of the first minus AUC of the
+        second; and the p-value, corrected by Holm's method for the number of
+        differences.
+    """
+    sets = list(zip(*answers.values(), strict=True))
+    drives = range(len(sets)) if drives is None else drives
+    blocks = [one[0].own_blocks for one in sets]
+    of_drive: dict[int, int] = {}
+    sums: dict[int, Any] = {}
+    drawn = weights_by_drive(blocks, drives)
+    for drive, some, (number, weights) in zip(drives, sets, drawn, strict=True):
+        samples = [resampled_metrics(one, weights)[0] for one in some]
+        sums[drive] = sums.get(drive, 0.0) + np.array(samples)
+        of_drive[drive] = number
+    numbers = np.array(list(of_drive.values()))
+    areas = [[pr_curve(one).auc for one in some] for some in sets]
+
+    def difference(first: int, second: int) -> Difference:
+        value = float(np.mean([some[first] - some[second] for some in areas]))
+        if (numbers < 2).any():
+            return Difference(value, UNKNOWN, math.nan)
+        samples = [some[first] - some[second] for some in sums.values()]
+        variances = np.var(samples, axis=1) * numbers / (numbers - 1)
+        spread = math.sqrt(variances.sum()) / len(sets)
+        freedom = (numbers - 1).sum()
+        margin = float(stdtrit(freedom, 0.975)) * spread
+        p_value = 1.0
+        if spread > 0.0:
+            p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
+        interval = Interval(value - margin, value + margin)
+        return Difference(value, interval, p_value)
+
+    pairs = list(itertools.combinations(range(len(answers)), 2))
+    found = [difference(*pair) for pair in pairs]
+    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    names = itertools.combinations(answers, 2)
+    return dict(zip(names, zip(found, corrected, strict=True), strict=True))
