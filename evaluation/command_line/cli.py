@@ -118,12 +118,13 @@ def tcr(
         return
     from cns_drake.base.files import make_folder
     from evaluation.change import drive_change as change
+    from evaluation.change.drive_maps import maps_in_one_world
     from evaluation.results.table import LAST, OWN, STAGE
     from evaluation.study import one_pair
     from evaluation.study.tasks.change import ChangeTask
 
     named = [path for path in (source, target, control) if path is not None]
-    maps, alignments = change.maps_in_one_world(named, align, lidar, columns)
+    maps, alignments = maps_in_one_world(named, align, lidar, columns)
     before, after, *controls = maps
     compared = [(before, after)] + [
         (one, change.same_stage_partner(before, after, one)) for one in controls

@@ -106,10 +106,14 @@ def localise(
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.change.drive_change import open_source
+    from evaluation.change.drive_maps import open_source
     from evaluation.drives import Drive, check_same_world
-    from evaluation.localisation import estimators, tracking
-    from evaluation.localisation import localise as queries
+    from evaluation.localisation import results, tracking
+    from evaluation.localisation.estimators import make_estimator
+    from evaluation.localisation.initial_poses import Starts
+    from evaluation.localisation.localisation_map import FEWEST_POINTS
+    from evaluation.localisation.one_scan import OneScan
+    from evaluation.localisation.settings import default_settings
     from evaluation.study import one_pair
     from evaluation.study.chosen_methods import method_settings
     from evaluation.study.one_pair import OpenSource
@@ -129,7 +133,7 @@ def localise(
     if method is None:
         raise InputError("--method: missing")
     num_jobs = choose_cluster(jobs, None).num_workers
-    queries.Starts(start, start_turn, seed)  # It checks them.
+    Starts(start, start_turn, seed)  # It checks them.
     if track and query_spacing is not None:
         raise InputError("--query-spacing: not together with --track")
     if not track and odometry_drift is not None:
@@ -144,15 +148,13 @@ def localise(
     name = Path(method).stem
     given = method_settings(parameter or [], [name])[name]
     # Faults are told before the slow work.
-    estimators.make_estimator(
+    make_estimator(
         method,
-        estimators.default_settings(method).with_values(given.items(), method),
+        default_settings(method).with_values(given.items(), method),
     )
     source = open_source(place, lidar, columns)
     asked = open_source(query, lidar, columns)
-    drive = (
-        asked if isinstance(asked, Drive) else queries.OneScan(asked, columns)
-    )
+    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
     for one in (source, drive):
         for note in one.notes if isinstance(one, Drive) else ():
             terminal.note(note)
@@ -201,22 +203,20 @@ def localise(
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
     if all(map(math.isnan, rows["unmapped"])):
-        least = estimators.default_settings(method).with_values(
-            given.items(), method
-        )
+        least = default_settings(method).with_values(given.items(), method)
         raise InputError(
-            f"{drive.name}: no scan has {estimators.FEWEST_POINTS} points in"
+            f"{drive.name}: no scan has {FEWEST_POINTS} points in"
             f" different voxels of {least.scan_voxel:g} m"
         )
     for note in notes:
         terminal.note(note)
-    values |= queries.summary(rows)
+    values |= results.summary(rows)
     if output is not None:
         if track:
             from evaluation.report.curve_figures import draw_track
 
             draw_track(rows, output / "track")
-        queries.write_rows(rows, output / "localisation.csv")
+        results.write_rows(rows, output / "localisation.csv")
         terminal.note(f"wrote {output / 'localisation.csv'}")
         options.write_tables(engine)
     terminal.show(values, _rows(values), json=json)

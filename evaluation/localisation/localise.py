@@ -17,172 +17,30 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
-from cns_drake.base.csv_files import write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.json_text import json_values
 from cns_drake.base.progress import track
-from evaluation.clouds.cloud_files import read_cloud
-from evaluation.clouds.notes import OnNote
 from evaluation.drives.sampling import cropped, sample_frames
-from evaluation.drives.scan_files import FileDrive
-from evaluation.localisation.estimators import (
+from evaluation.localisation.estimators import Estimator
+from evaluation.localisation.fit import fit_at
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
-    Estimator,
     LocalisationMap,
-    Settings,
-    fit_at,
 )
+from evaluation.localisation.results import COLUMNS, QUERY
 from evaluation.localisation.robust import MAX_RANGE
+from evaluation.localisation.settings import Settings
 from evaluation.maps.voxel_maps import thin
-from evaluation.recognition.auroc import auroc
-from evaluation.recognition.number import Number
 from evaluation.recognition.pose_errors import (
-    SUCCESS_ROTATION_DEG,
-    SUCCESS_TRANSLATION,
     pose_error,
 )
 
-# Results with errors of at most these are right [m, deg].
-RIGHT_TRANSLATION = 0.3
-RIGHT_ROTATION_DEG = 1.0
-# Greatest distance of a start [m]; beyond it lies place recognition.
-FARTHEST_START = 50.0
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].
 NEAR = 7.5
-# Numbers of the summary that go into a table of results.
-_SHOWN = (
-    "success_03m_1deg",
-    "success_2m_5deg",
-    "translation_median",
-    "translation_95",
-    "rotation_median_deg",
-    "auroc_own_score",
-)
-# Share of the right results whose scores pass the suggested threshold.
-_BELIEVED = 0.95
 # Number of queries that wait, per process.
 _WAITING = 4
-
-# One row per query: its frame and time; the start's offset in W [m], and its
-# turn as a rotation vector in S; errors of the result; scores; standard
-# deviations of the result from its covariance [m]; the share of the scan that,
-# at the ground-truth pose, has no point of the map within a voxel, NaN if the
-# scan has too few points to be aligned; number of steps, and CPU time [s].
-QUERY = np.dtype(
-    [
-        ("frame", "<i8"),
-        ("stamp_ns", "<i8"),
-        *(
-            (name, "<f8")
-            for name in (
-                "start_x",
-                "start_y",
-                "start_z",
-                "start_turn_x_deg",
-                "start_turn_y_deg",
-                "start_turn_z_deg",
-                "translation_error",
-                "rotation_error_deg",
-                "along",
-                "across",
-                "up",
-                "own_score",
-                "fit",
-                "residual",
-                "std_along",
-                "std_across",
-                "std_up",
-                "unmapped",
-            )
-        ),
-        ("iterations", "<i8"),
-        ("seconds", "<f8"),
-    ]
-)
-COLUMNS = tuple(QUERY.fields or ())
-
-
-@dataclass(frozen=True)
-class Starts:
-    """How the random initial poses of scans are sampled.
-
-    Attributes:
-        radius: distance of each initial position from the ground-truth position
-            [m].
-        turn_deg: angle between each initial orientation and the ground truth
-            [deg].
-        seed: seed of the random directions in which initial poses are moved and
-            rotated.
-
-    Raises:
-        InputError: if a value is out of range.
-    """
-
-    radius: float
-    turn_deg: float
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.radius <= FARTHEST_START:
-            raise InputError(
-                f"--start: {self.radius:g} m is not above 0 and up to"
-                f" {FARTHEST_START:g}"
-            )
-        if not 0.0 <= self.turn_deg <= 180.0:
-            raise InputError(
-                f"--start-turn: {self.turn_deg:g} deg is not from 0 to 180"
-            )
-        if self.seed < 0:
-            raise InputError(f"--seed: {self.seed} is below 0")
-
-    def draw(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the random error of a frame's initial pose.
-
-        Returns:
-            (3,) offset of the position in W, in a random direction [m]; (3,)
-            rotation about a random axis, as a rotation vector in S [rad].
-            Offset and rotation depend only on the seed and the frame.
-        """
-        rng = np.random.default_rng([self.seed, frame])
-        offset, axis = rng.normal(size=(2, 3))
-        return (
-            self.radius * offset / np.linalg.norm(offset),
-            math.radians(self.turn_deg) * axis / np.linalg.norm(axis),
-        )
-
-
-class OneScan(FileDrive):
-    """A point cloud that is read as a drive: one scan at the origin of W."""
-
-    def __init__(self, path: Path, columns: int | None = None):
-        """Opens the point cloud.
-
-        Args:
-            path: its file.
-            columns: number of columns of a `.bin` file; by default guessed from
-                the values.
-        """
-        notes: list[str] = []
-        scan = read_cloud(path, columns, notes.append)
-        super().__init__(
-            name=path.name,
-            world_frame="map",
-            files=[path],
-            stamps_ns=np.zeros(1, np.int64),
-            X_WS=np.eye(4)[None],
-            read=lambda path, stamp_ns: scan,
-            notes=tuple(notes),
-        )
-
-    def scan(self, index: int) -> np.ndarray:
-        """Returns all points of the cloud, including points at the origin.
-
-        Other drives leave out points at the origin, which stand for beams
-        without a return. In this cloud, such a point can be real.
-        """
-        return self._read(self._files[index], 0)
 
 
 def mapped_frames(
@@ -402,147 +260,6 @@ def localise(
             track(rows(), f"localising {query.name}", len(frames), "scans")
         )
     return [np.array(list(some), QUERY) for some in zip(*done, strict=True)]
-
-
-def is_right(
-    rows: np.ndarray,
-    translation: float = RIGHT_TRANSLATION,
-    rotation_deg: float = RIGHT_ROTATION_DEG,
-) -> np.ndarray:
-    """Returns which results have errors within given limits, (K,) bool.
-
-    Args:
-        rows: (K,) results, records of `QUERY`.
-        translation: greatest error of the position [m].
-        rotation_deg: greatest error of the orientation [deg].
-    """
-    return (rows["translation_error"] <= translation) & (
-        rows["rotation_error_deg"] <= rotation_deg
-    )
-
-
-def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
-    """Notes how many scans had too few points to be aligned, if any.
-
-    Args:
-        name: name of the query drive.
-        rows: (K,) results, records of `QUERY`.
-        on_note: is called with the note.
-    """
-    if sparse := np.count_nonzero(np.isnan(rows["unmapped"])):
-        on_note(
-            f"{name}: {sparse} of {len(rows)} scans have fewer than"
-            f" {FEWEST_POINTS} points after thinning; they count as"
-            " failures"
-        )
-
-
-def _believed_from(rows: np.ndarray) -> float:
-    """Returns the score that 95 % of the right results reach, or NaN."""
-    scores = rows["own_score"][is_right(rows)]
-    if len(scores) == 0:
-        return math.nan
-    return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
-
-
-def summary(rows: np.ndarray) -> dict[str, float | int | None]:
-    """Returns a summary of localised scans, for JSON.
-
-    Success rates count all queries; quantiles count queries with a pose.
-
-    Args:
-        rows: (K,) results, records of `QUERY`.
-    """
-    right = is_right(rows)
-    posed = rows[~np.isnan(rows["translation_error"])]
-
-    def quantile(name: str, part: float) -> float | None:
-        values = np.abs(posed[name])
-        return float(np.quantile(values, part)) if len(values) else None
-
-    least = _believed_from(rows)
-    believed = rows["own_score"] >= least
-    near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
-    found: dict[str, float | int | None] = {
-        "queries": len(rows),
-        "without_pose": len(rows) - len(posed),
-        "success_03m_1deg": float(right.mean()),
-        "success_2m_5deg": float(near.mean()),
-        "translation_median": quantile("translation_error", 0.5),
-        "translation_95": quantile("translation_error", 0.95),
-        "rotation_median_deg": quantile("rotation_error_deg", 0.5),
-        "rotation_95_deg": quantile("rotation_error_deg", 0.95),
-    }
-    for name in ("along", "across", "up"):
-        found[f"{name}_median"] = quantile(name, 0.5)
-        found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
-    # A small residual, or a small deviation, is a high score.
-    deviation = np.max(
-        [rows[f"std_{name}"] for name in ("along", "across", "up")], axis=0
-    )
-    for name, scores in (
-        ("own_score", rows["own_score"]),
-        ("fit", rows["fit"]),
-        ("residual", -rows["residual"]),
-        ("hessian", -deviation),
-    ):
-        found[f"auroc_{name}"] = auroc(scores, right)
-    found["believed_from"] = least
-    # Without a right result, there is no threshold.
-    harmful = float((believed & ~right).sum()) if right.any() else math.nan
-    wrong = int((~right).sum())
-    found["confident_wrong"] = harmful / len(rows)
-    found["confident_of_wrong"] = harmful / wrong if wrong else None
-    known = rows["unmapped"][~np.isnan(rows["unmapped"])]
-    found["unmapped_mean"] = float(known.mean()) if len(known) else None
-    found["seconds_mean"] = float(rows["seconds"].mean())
-    return json_values(found)
-
-
-def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields a method's results for `results.csv`, a `Number` for each metric.
-
-    Args:
-        rows: (K,) results, records of `QUERY`.
-        method: name of the method.
-    """
-    found = summary(rows)
-    for name in _SHOWN:
-        if (value := found[name]) is not None:
-            yield Number(method, False, name, float(value), n=len(rows))
-
-
-def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Returns the columns of `queries.csv` from results: name -> (K,) values.
-
-    Args:
-        rows: (K,) results, records of `QUERY`.
-    """
-    scores = rows["own_score"]
-    return {
-        "query_frame": rows["frame"],
-        "query_stamp_ns": rows["stamp_ns"],
-        "correct": is_right(rows),
-        # Queries are where the map is.
-        "has_match": np.ones(len(rows), bool),
-        "score": np.where(np.isfinite(scores), scores, np.nan),
-        "translation_error": rows["translation_error"],
-        "rotation_error_deg": rows["rotation_error_deg"],
-    }
-
-
-def write_rows(rows: np.ndarray, path: Path) -> None:
-    """Writes results as CSV, one row per query; unknown numbers are empty."""
-    cells = (
-        [
-            ""
-            if isinstance(value, float) and not math.isfinite(value)
-            else value
-            for value in row
-        ]
-        for row in rows.tolist()
-    )
-    write_csv(path, rows.dtype.names or (), cells)
 
 
 def query_frames(

@@ -10,14 +10,9 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames, travelled
-from evaluation.localisation.localise import (
-    COLUMNS,
-    QUERY,
-    RIGHT_TRANSLATION,
-    Localiser,
-    Starts,
-    way_axes,
-)
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localise import Localiser, way_axes
+from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
 from evaluation.recognition.number import Number
 
 # Distance driven between two aligned scans [m].

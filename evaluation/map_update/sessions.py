@@ -30,7 +30,8 @@ from cns_drake.base.files import completing, is_there, user_errors
 from cns_drake.base.listing import listed
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import track
-from evaluation.clouds.cloud_files import read_blocks, read_cloud, read_npy
+from evaluation.clouds.cloud_files import read_blocks, read_cloud
+from evaluation.clouds.npy_files import read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.text_tables import read_poses
 from evaluation.map_update.labels import MOVES, SIDES, Label

@@ -20,7 +20,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
 from evaluation.clouds.notes import OnNote
-from evaluation.localisation import estimators
+from evaluation.localisation.settings import METHODS
 from evaluation.methods import MethodConfig, shipped_methods
 from evaluation.methods.own_files import run_module
 from evaluation.real.data_sets import (
@@ -161,7 +161,7 @@ def _is_estimator(name: str) -> bool:
     """Returns whether a name or a file is that of an estimator."""
     if name.endswith(".py"):
         return hasattr(run_module(Path(name)), "localise")
-    return name in estimators.METHODS
+    return name in METHODS
 
 
 def _add_images(

@@ -11,8 +11,9 @@ from matplotlib.patches import Patch
 import numpy as np
 from scipy.spatial import cKDTree
 
+from evaluation.change.convex_hull import in_convex_hull
 from evaluation.change.drive_change import ChangeResult
-from evaluation.change.tcr import HULL_MARGIN, TAU, in_convex_hull
+from evaluation.change.tcr import HULL_MARGIN, TAU
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.point_rendering import (
     Picture,

@@ -12,7 +12,7 @@ from typing import Any
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
 from cns_drake.base.jobs.step import Reporter
-from evaluation.change.drive_change import DriveMap
+from evaluation.change.drive_maps import DriveMap
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine

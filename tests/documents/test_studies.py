@@ -18,7 +18,7 @@ from cns_drake.studies.experiment import (
     shipped_experiments,
 )
 from cns_drake.studies.study import TASKS
-from evaluation.localisation import localise, tracking
+from evaluation.localisation import results, tracking
 from evaluation.recognition import faults, place_numbers, place_outcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import (
@@ -123,7 +123,7 @@ def test_metrics_are_those_of_the_tasks():
     for name in ("place", "pose"):
         for module in (faults, place_numbers, place_outcome):
             tasks[name] += inspect.getsource(module)
-    for module in (localise, tracking):
+    for module in (results, tracking):
         tasks["localise"] += inspect.getsource(module)
     tasks["map"] += inspect.getsource(map_scores)
     task = ""

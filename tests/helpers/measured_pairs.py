@@ -12,11 +12,11 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from evaluation.change.drive_change import (
     ChangeReport,
-    DriveMap,
     change_between,
     same_stage_partner,
     spread_over_grids,
 )
+from evaluation.change.drive_maps import DriveMap
 from evaluation.change.tcr import GRIDS
 from evaluation.methods.method import Method
 from evaluation.recognition.place_outcome import (

@@ -11,8 +11,20 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
-from evaluation.localisation import estimators, localise, tracking
-from evaluation.localisation.localise import Starts
+from evaluation.localisation import localise, results, tracking
+from evaluation.localisation.estimators import make_estimator
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localisation_map import (
+    LocalisationMap,
+    make_map,
+    map_of,
+)
+from evaluation.localisation.settings import (
+    KISS_MATCHER,
+    METHODS,
+    Settings,
+    default_settings,
+)
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.recognition.number import Number
 from evaluation.recognition.place_numbers import kept_share
@@ -31,9 +43,7 @@ from evaluation.study.tasks.task import (
 )
 
 # The methods that need no optional package.
-SHIPPED = tuple(
-    name for name in estimators.METHODS if name != estimators.KISS_MATCHER
-)
+SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
 # Expected time to localise the scans of a drive among the others [s].
 _COST = 60.0
 # Expected time to localise the queries of a usual drive [s].
@@ -72,11 +82,11 @@ class LocaliseTask(Task):
             positive(value, where)
         elif name == "methods":
             for one in value:
-                known = str(one) in estimators.METHODS
+                known = str(one) in METHODS
                 if not known and not Path(str(one)).is_file():
                     raise InputError(
                         f"{where}: {one!r} is neither"
-                        f" {', '.join(estimators.METHODS)} nor a file"
+                        f" {', '.join(METHODS)} nor a file"
                     )
         else:
             try:
@@ -155,19 +165,19 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._named_results(before)) if before is not None else {}
         for method, rows in self._named_results(found):
-            yield from localise.numbers(rows, method)
+            yield from results.numbers(rows, method)
             if self.settings["odometry_drift"] is not None:
                 yield from tracking.numbers(rows, method)
             if method in then:
                 share = kept_share(
-                    float(localise.is_right(rows).mean()),
-                    float(localise.is_right(then[method]).mean()),
+                    float(results.is_right(rows).mean()),
+                    float(results.is_right(then[method]).mean()),
                 )
                 yield Number(method, False, "kept", float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):
-            yield method, False, localise.columns(rows)
+            yield method, False, results.columns(rows)
 
 
 def _check(name: str, value: Any, where: str) -> None:
@@ -221,26 +231,24 @@ def measure_localisation(
     Returns:
         An array for each pair of a method and an entry of `starts`. The arrays
         of the first method come first, in the order of `starts`. Each array
-        contains one record of `evaluation.localisation.localise.QUERY` per
+        contains one record of `evaluation.localisation.results.QUERY` per
         query, or one record of `TRACKED` per tracked scan. If no query is near
         the map, the list is empty.
     """
     mapped = database()
     asked = query()
     columns = getattr(database, "columns", None)
-    maps: dict[tuple[float, int], estimators.LocalisationMap] = {}
+    maps: dict[tuple[float, int], LocalisationMap] = {}
     localisers = []
     for method in map(str, methods):
-        settings = estimators.default_settings(method)
+        settings = default_settings(method)
         settings = settings.with_values(values, method)
-        estimator = estimators.make_estimator(method, settings)
+        estimator = make_estimator(method, settings)
         key = settings.voxel, settings.neighbours
         if key not in maps:
             # The drive is opened anew for each other map.
             source = mapped if not maps else database()
-            maps[key] = estimators.make_map(
-                source, settings, columns, reporter.note
-            )
+            maps[key] = make_map(source, settings, columns, reporter.note)
         localisers.append(localise.Localiser(maps[key], estimator, settings))
     try:
         is_mapped = localise.mapped_frames(
@@ -259,7 +267,7 @@ def measure_localisation(
             for one in localisers
             for draw in starts
         ]
-    localise.note_sparse(asked.name, found[0], reporter.note)
+    results.note_sparse(asked.name, found[0], reporter.note)
     return found
 
 
@@ -286,9 +294,9 @@ def localise_among_others(
     X_WS = drive.X_WS
     R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
     made = [
-        (estimators.make_estimator(one, settings), settings)
+        (make_estimator(one, settings), settings)
         for one in map(str, methods)
-        for settings in (estimators.default_settings(one),)
+        for settings in (default_settings(one),)
     ]
     found: list[list[np.ndarray]] = [[] for _ in range(len(made) * len(starts))]
     frames = range(len(drive))
@@ -298,10 +306,8 @@ def localise_among_others(
         if apart.min() > localise.NEAR:
             continue
         around = np.flatnonzero(apart < _AROUND).tolist()
-        mapped = map_drive(drive, estimators.Settings.voxel, frames=around)
-        surroundings = estimators.map_of(
-            mapped.centroids_W, drive.name, estimators.Settings()
-        )
+        mapped = map_drive(drive, Settings.voxel, frames=around)
+        surroundings = map_of(mapped.centroids_W, drive.name, Settings())
         stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
         ends = iter(found)
         for estimator, settings in made:
@@ -319,6 +325,6 @@ def localise_among_others(
         )
     if number == 0:
         return []
-    rows = [np.array(some, localise.QUERY) for some in found]
-    localise.note_sparse(drive.name, rows[0], reporter.note)
+    rows = [np.array(some, results.QUERY) for some in found]
+    results.note_sparse(drive.name, rows[0], reporter.note)
     return rows

@@ -30,7 +30,7 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import map_step, recording
 from cns_drake.studies.recording import is_recorded, record_all
-from evaluation.change.drive_change import read_map
+from evaluation.change.drive_maps import read_map
 from evaluation.drives import open_drive
 
 pytestmark = pytest.mark.slow

@@ -5,18 +5,12 @@ import pytest
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.drives import open_drive
-from evaluation.localisation.estimators import (
-    default_settings,
-    make_estimator,
-    make_map,
-)
-from evaluation.localisation.localise import (
-    COLUMNS,
-    Localiser,
-    Starts,
-    localise,
-    summary,
-)
+from evaluation.localisation.estimators import make_estimator
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localisation_map import make_map
+from evaluation.localisation.localise import Localiser, localise
+from evaluation.localisation.results import COLUMNS, summary
+from evaluation.localisation.settings import default_settings
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
 

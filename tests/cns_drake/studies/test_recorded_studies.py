@@ -13,7 +13,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment
 from cns_drake.studies.study import run_study
-from evaluation.change.drive_change import read_map
+from evaluation.change.drive_maps import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol

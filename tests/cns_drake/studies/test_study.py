@@ -20,7 +20,7 @@ from cns_drake.studies import map_step
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiment import Experiment, load_experiment
 from cns_drake.studies.study import Study, run_study
-from evaluation.change.drive_change import DriveMap
+from evaluation.change.drive_maps import DriveMap
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol

@@ -26,7 +26,7 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import xyz
 from evaluation.alignment import align, in_one_world
-from evaluation.change.drive_change import maps_in_one_world
+from evaluation.change.drive_maps import maps_in_one_world
 from evaluation.change.tcr import temporal_change
 from evaluation.drives import Drive
 from evaluation.drives.mulran import MulranDrive

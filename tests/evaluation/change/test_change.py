@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
-from evaluation.change.drive_change import DriveMap, read_map
+from evaluation.change.drive_maps import DriveMap, read_map
 from evaluation.change.tcr import GRIDS
 from evaluation.maps.voxel_maps import CELL_SIZE, voxelise
 

@@ -9,7 +9,8 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
 from evaluation.drives.joined_drive import JoinedDrive
-from evaluation.localisation import estimators
+from evaluation.localisation.localisation_map import make_map, map_frames
+from evaluation.localisation.settings import Settings
 from evaluation.recognition.descriptors import DescribedScans, joined_scans
 
 
@@ -53,10 +54,10 @@ def test_two_halves_are_the_whole():
     for frame in (0, 7, 8, 19, 3):  # Also back to the first drive.
         np.testing.assert_array_equal(halves.scan(frame), whole.scan(frame))
     assert (np.diff(halves.stamps_ns) > 0).all()
-    frames = [estimators.map_frames(one) for one in (whole, halves)]
+    frames = [map_frames(one) for one in (whole, halves)]
     np.testing.assert_array_equal(*frames)
-    settings = estimators.Settings()
-    maps = [estimators.make_map(one, settings) for one in (whole, halves)]
+    settings = Settings()
+    maps = [make_map(one, settings) for one in (whole, halves)]
     np.testing.assert_array_equal(*(one.surface.points for one in maps))
 
 
@@ -70,12 +71,10 @@ def test_each_drive_is_sampled_from_its_start():
 @pytest.mark.parametrize("keep", ["latest", 1])
 def test_the_map_is_made_of_the_scans_that_are_kept(keep):
     both = joined((0, 8), (0, 5), keep=keep)
-    frames = estimators.map_frames(both)
+    frames = map_frames(both)
     # The second drive covers the first 5 m anew.
     assert frames.tolist() == [5, 6, 7, 8, 9, 10, 11, 12]
-    assert estimators.map_frames(joined((0, 8), (0, 5))).tolist() == [
-        *range(13)
-    ]
+    assert map_frames(joined((0, 8), (0, 5))).tolist() == [*range(13)]
 
 
 def test_drives_of_other_worlds_are_refused():

@@ -20,29 +20,25 @@ from cns_drake.base.points import from_xyz
 from evaluation.alignment.registration import make_surface
 from evaluation.drives import open_drive
 from evaluation.localisation import robust
-from evaluation.localisation.estimators import (
-    METHODS,
-    Estimate,
-    Settings,
-    default_settings,
-    fit_at,
-    make_estimator,
-    make_map,
-    map_of,
-)
+from evaluation.localisation.estimators import Estimate, make_estimator
+from evaluation.localisation.fit import fit_at
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localisation_map import make_map, map_of
 from evaluation.localisation.localise import (
-    COLUMNS,
-    QUERY,
     Localiser,
-    Starts,
-    is_right,
     localise,
     mapped_frames,
-    note_sparse,
-    summary,
     way_axes,
 )
+from evaluation.localisation.results import (
+    COLUMNS,
+    QUERY,
+    is_right,
+    note_sparse,
+    summary,
+)
 from evaluation.localisation.robust import _step
+from evaluation.localisation.settings import METHODS, Settings, default_settings
 from evaluation.recognition.auroc import auroc
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]

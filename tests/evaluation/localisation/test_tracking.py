@@ -11,9 +11,12 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz
 from evaluation.drives.sampling import travelled
-from evaluation.localisation import localise as queries
-from evaluation.localisation.estimators import Estimate, Settings, map_of
-from evaluation.localisation.localise import Localiser, Starts
+from evaluation.localisation import results
+from evaluation.localisation.estimators import Estimate
+from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.localisation_map import map_of
+from evaluation.localisation.localise import Localiser
+from evaluation.localisation.settings import Settings
 from evaluation.localisation.tracking import (
     drifting_steps,
     losses,
@@ -116,7 +119,7 @@ def test_losses_and_returns():
     # The odometry's error is none of a result.
     assert rows["track_error"][50] == pytest.approx(0.0, abs=1e-9)
     assert np.flatnonzero(np.isnan(rows["translation_error"])).tolist() == [50]
-    assert queries.summary(rows)["without_pose"] == 1
+    assert results.summary(rows)["without_pose"] == 1
     (one, two), values = losses(rows), summary(rows)
     assert one == (pytest.approx(10.0, abs=0.02), True)
     assert two == (pytest.approx(18.0, abs=0.02), False)

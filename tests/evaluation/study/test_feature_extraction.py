@@ -11,7 +11,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
-from evaluation.change import drive_change
+from evaluation.change.drive_maps import read_map
 from evaluation.drives import Drive, open_drive
 from evaluation.drives.sampling import within_range
 from evaluation.recognition.description import describe_drive
@@ -169,7 +169,7 @@ def test_scans_of_places_and_queries_are_kept(recorded, source, files):
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
     asked = {"a": (choose_methods()[0].make(), roles, PAPER_PROTOCOL)}
     found = extract_features(recorded, roles, asked)
-    assert_equal(found.drive.coarse, drive_change.read_map(folder).voxels)
+    assert_equal(found.drive.coarse, read_map(folder).voxels)
 
 
 def test_only_missing_or_stale_parts_are_computed(source, files):

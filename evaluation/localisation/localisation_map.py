@@ -1,0 +1,168 @@
+"""Maps in which scans are localised: made of drives, or of files of clouds."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import small_gicp
+
+from cns_drake.base import points as clouds
+from cns_drake.base import poses
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import track
+from evaluation.alignment.registration import Surface, make_surface
+from evaluation.clouds.cloud_files import read_blocks
+from evaluation.clouds.notes import OnNote, no_note
+from evaluation.drives.joined_drive import JoinedDrive
+from evaluation.drives.sampling import sample_frames, within_range
+from evaluation.localisation.robust import MAX_RANGE
+from evaluation.localisation.settings import (
+    Settings,
+)
+from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.recognition.keeping import kept_places
+
+# Distance between the scans of a drive that enter the map [m].
+_MAP_SPACING = 1.0
+# Least number of points of a map, and of a downsampled scan that is aligned.
+FEWEST_POINTS = 10
+# Shift of the voxels of VGICP, as a fraction of their side.
+_VOXEL_SHIFT = 0.37
+
+
+@dataclass(frozen=True, eq=False)
+class LocalisationMap:
+    """A map in which scans are localised.
+
+    Attributes:
+        name: name of the drive or file from which the map was made.
+        surface: the downsampled points in W, with normals and covariances.
+    """
+
+    name: str
+    surface: Surface
+
+    @cached_property
+    def _voxels(self) -> dict[float, small_gicp.GaussianVoxelMap]:
+        return {}
+
+    def voxels(self, resolution: float) -> small_gicp.GaussianVoxelMap:
+        """Returns the map with one Gaussian per voxel, for VGICP.
+
+        The frame of this map is W, shifted by a fraction of a voxel, so that
+        walls and ground at round coordinates do not lie on the border of
+        voxels.
+
+        Args:
+            resolution: side of a voxel [m].
+        """
+        if resolution not in self._voxels:
+            voxels = small_gicp.GaussianVoxelMap(resolution)
+            voxels.insert(self.surface.cloud, voxel_shift(resolution))
+            self._voxels[resolution] = voxels
+        return self._voxels[resolution]
+
+    def around(self, p_W: np.ndarray, distance: float) -> np.ndarray:
+        """Returns the map points (M, 3) in a box around a position.
+
+        Args:
+            p_W: (3,) the position [m].
+            distance: half the side of the box [m].
+        """
+        offsets = self.surface.points - p_W
+        return self.surface.points[within_range(offsets, distance)]
+
+    def distances(self, points_W: np.ndarray) -> np.ndarray:
+        """Returns the distances (N,) of points from the nearest map point [m].
+
+        Args:
+            points_W: (N, 3) the points [m].
+        """
+        _, squares = self.surface.tree.batch_nearest_neighbor_search(points_W)
+        return np.sqrt(np.asarray(squares))
+
+
+def voxel_shift(resolution: float) -> np.ndarray:
+    """Returns the pose of W in the frame of the voxels of VGICP.
+
+    Without this shift, the ground at height 0 and walls at round coordinates
+    would lie on the sides of voxels, where rounding chooses between two voxels.
+    """
+    return poses.make_pose(np.eye(3), np.full(3, _VOXEL_SHIFT * resolution))
+
+
+def make_map(
+    source: Drive | Path,
+    settings: Settings,
+    columns: int | None = None,
+    on_note: OnNote = no_note,
+) -> LocalisationMap:
+    """Returns the localisation map of a drive or of a cloud in W.
+
+    A drive's scans are placed at their ground-truth poses.
+
+    Args:
+        source: the drive, or the cloud's file.
+        settings: settings for downsampling and for normals.
+        columns: number of columns of a `.bin` file; by default guessed from the
+            values.
+        on_note: is called with notes on how a cloud's file was read.
+
+    Raises:
+        InputError: the source cannot be read, or has too few points.
+    """
+    if isinstance(source, Drive):
+        blocks = _scans(source)
+    else:
+        parts = read_blocks(source, columns, on_note)
+        blocks = ((part, None) for part in parts)
+    accumulator = VoxelAccumulator(settings.voxel)
+    for block, X_WS in blocks:
+        accumulator.add(block, X_WS)
+    points = accumulator.to_map().centroids_W
+    if len(points) < FEWEST_POINTS:
+        raise InputError(
+            f"{source.name}: a map of {len(points)} points, fewer than"
+            f" {FEWEST_POINTS}"
+        )
+    return map_of(points, source.name, settings)
+
+
+def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """Yields the cropped scans of which a map is made, each with its X_WS."""
+    frames = map_frames(drive).tolist()
+    for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
+        scan = drive.scan(frame)
+        near = within_range(clouds.xyz(scan), MAX_RANGE)
+        yield scan[near], drive.X_WS[frame]
+
+
+def map_frames(drive: Drive) -> np.ndarray:
+    """Returns the frames (K,) of a drive that are used for its map.
+
+    If the drive consists of several drives, frames that these drives do not
+    keep in the map are left out.
+    """
+    if not isinstance(drive, JoinedDrive):
+        return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)
+    frames = drive.sampled(_MAP_SPACING)
+    p_WSs = drive.X_WS[frames, :3, 3]
+    kept = kept_places(p_WSs, drive.drive_of(frames), drive.keep, _MAP_SPACING)
+    return frames[kept]
+
+
+def map_of(
+    points: np.ndarray, name: str, settings: Settings
+) -> LocalisationMap:
+    """Returns a localisation map made of points.
+
+    Args:
+        points: (M, 3) points in W [m], at least `FEWEST_POINTS`.
+        name: name of the map.
+        settings: settings for downsampling and for normals.
+    """
+    surface = make_surface(points, settings.neighbours)
+    return LocalisationMap(name, surface)
