@@ -11,9 +11,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
+from cns_drake.ageing.ageing_city import AgeingCity
 from cns_drake.ageing.events import Event
-from cns_drake.ageing.history import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
+from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.years import check_years
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
@@ -141,14 +142,14 @@ def age_map(
                 standing, passed = world.structures_in(year)
                 events += passed if year == min(wanted) else []
                 writing.stage(stage, year, standing)
-            while city.year < year:
-                doing("ageing the city", city.year, max(wanted), "years")
+            while (now := city.standing.year) < year:
+                doing("ageing the city", now, max(wanted), "years")
                 city.live()
             if year > 0:
                 doing(f"writing year {year}")
-                writing.stage(stage, year, city.standing)
-        events += city.events
-        writing.table(city.new)
+                writing.stage(stage, year, city.standing.by_name)
+        events += city.standing.events
+        writing.table(city.standing.new)
         names = [field.name for field in fields(Event)]
         write_csv(draft / HISTORY_NAME, names, map(astuple, events))
         (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
@@ -159,7 +160,7 @@ def age_map(
             stages,
             {stage: number for stage, (number, _) in writing.sizes.items()},
             counts,
-            _changed_places(city),
+            _changed_places(city.standing),
             ways[-1],
         )
         # Frees memory that the pictures need.
@@ -385,11 +386,11 @@ def _write_drives(
         MapFolder(draft).drive(stage).write_text(text, "utf-8")
 
 
-def _changed_places(city: AgeingCity) -> np.ndarray:
+def _changed_places(city: StandingStructures) -> np.ndarray:
     """Returns the places (N, 3) of new buildings and additions [m]."""
     places = [
         one.xyz
         for one in city.new.values()
-        if one.semantic_class == "building" and one.name in city.standing
+        if one.semantic_class == "building" and one.name in city.by_name
     ]
     return np.array(places, float).reshape(-1, 3)

@@ -11,22 +11,19 @@ import pytest
 from scipy.stats import poisson
 import shapely
 
-from cns_drake.ageing import plots
 from cns_drake.ageing.aged_map import age_map
-from cns_drake.ageing.history import AgeingCity
+from cns_drake.ageing.ageing_city import AgeingCity
+from cns_drake.ageing.new_buildings import new_building
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.plots import (
-    Plot,
-    greatest_y,
-    horizontal_section,
-    new_building,
-)
+from cns_drake.ageing.plots import Plot
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
     Tally,
     poisson_p,
     read_rates,
 )
+from cns_drake.ageing.sections import greatest_y, horizontal_section
+from cns_drake.ageing.standing_structures import structure_triangles
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.geometry.structures import Structure, assemble, block
@@ -229,7 +226,7 @@ def test_rates_come_about(world, seed):
         number = tally.number.get(event, 0)
         assert poisson.ppf(0.001, expected) <= number
         assert number <= poisson.ppf(0.999, expected)
-    logged = [e.event for e in city.events]
+    logged = [e.event for e in city.standing.events]
     assert logged.count("renewed") == tally.number["renewed"]
     assert logged.count("extended") == tally.number["extended"]
 
@@ -244,7 +241,7 @@ def test_nothing_happens_at_rate_zero(world):
     )
     for _ in range(5):
         city.live()
-    assert {e.event for e in city.events} <= {"grown"}
+    assert {e.event for e in city.standing.events} <= {"grown"}
 
 
 @pytest.mark.slow
@@ -263,7 +260,9 @@ def test_what_is_painted_is_known_by_its_material(town, tmp_path):
     rates = {**dict.fromkeys(DEFAULT_RATES, 0.0), "markings": 1.0}
     city = AgeingCity(OldWorld(MapFolder(folder)), rates, 1, shapely.Polygon())
     city.live()
-    painted = [e.structure for e in city.events if e.event == "markings"]
+    painted = [
+        e.structure for e in city.standing.events if e.event == "markings"
+    ]
     assert painted == ["crossing_n1"]
 
 
@@ -299,7 +298,9 @@ def test_buildings_that_stay_are_known_by_their_kind(
     rates = {**dict.fromkeys(DEFAULT_RATES, 0.0), "renewed": 1.0}
     city = AgeingCity(world, rates, 1, shapely.Polygon())
     city.live()
-    renewed = {e.structure for e in city.events if e.event == "renewed"}
+    renewed = {
+        e.structure for e in city.standing.events if e.event == "renewed"
+    }
     assert (name in renewed) == changes
     assert "office_001" in renewed
 
@@ -322,12 +323,12 @@ def test_trees_grow_about_their_feet_in_any_frame(town, world, tmp_path):
         city = AgeingCity(one, _BUSY, 2, shapely.Polygon())
         for _ in range(3):
             city.live()
-        events = {e.event: e.structure for e in city.events}
+        events = {e.event: e.structure for e in city.standing.events}
         assert {"grown", "planted"} <= events.keys()
         found.append(
             {
-                name: plots.structure_triangles(tree)
-                for name, tree in city.standing.items()
+                name: structure_triangles(tree)
+                for name, tree in city.standing.by_name.items()
                 if tree is not None and tree.semantic_class == "vegetation"
             }
         )
@@ -373,7 +374,7 @@ def test_furniture_moves_as_far_as_allowed(world, farthest, least):
     }
     city = AgeingCity(world, rates, 1, shapely.Polygon())
     city.live()
-    moves = [e for e in city.events if e.event == "furniture"]
+    moves = [e for e in city.standing.events if e.event == "furniture"]
     assert moves
     by = []
     for one in moves:
@@ -381,7 +382,7 @@ def test_furniture_moves_as_far_as_allowed(world, farthest, least):
             np.array(foot.centroid.coords[0])
             for foot in (
                 world.things[one.structure].footprint,
-                city.new[one.successor].footprint_W,
+                city.standing.new[one.successor].footprint_W,
             )
         )
         by.append(np.linalg.norm(np.subtract(*middles)))
@@ -574,21 +575,22 @@ def test_each_stage_is_what_the_history_tells(long):
 @pytest.mark.slow
 def test_a_scaffold_stands_before_its_building(world):
     city = AgeingCity(world, _BUSY, 3, shapely.Polygon())
+    standing = city.standing
     seen = 0
     for _ in range(8):
         city.live()
-        for name in city.standing:
+        for name in standing.by_name:
             if not name.startswith("scaffold_"):
                 continue
             seen += 1
-            own = city._structure(name).footprint_W.buffer(-0.02)
-            triangles = city._triangles(name.removeprefix("scaffold_"))
-            top = plots.structure_triangles(city._structure(name))[..., 2].max()
+            own = standing.structure(name).footprint_W.buffer(-0.02)
+            triangles = standing.triangles(name.removeprefix("scaffold_"))
+            top = structure_triangles(standing.structure(name))[..., 2].max()
             for z in np.arange(triangles[..., 2].min() + 0.1, top - 1.2, 0.3):
                 cut = horizontal_section(triangles, z)
                 inside = shapely.intersection(shapely.linestrings(cut), own)
                 assert not shapely.length(inside).any()
-            assert city.near(own, [name]) == []
+            assert standing.near(own, [name]) == []
     assert seen
 
 
@@ -596,19 +598,20 @@ def test_a_scaffold_stands_before_its_building(world):
 @pytest.mark.parametrize(("offset", "stands"), [(-0.03, False), (0.03, True)])
 def test_a_scaffold_stands_in_nothing_however_thin(world, offset, stands):
     city = AgeingCity(world, _BUSY, 3, shapely.Polygon())
+    standing, buildings = city.standing, city._buildings
     # The canopies of another building are not in the way of this one's.
-    first, *_, other = (lot for lot in city._lots if lot.building)
+    first, *_, other = (lot for lot in buildings.lots if lot.building)
     parts = []
-    city._scaffold(first.plot, first.height, other.building, parts)
+    buildings._put_scaffold(first.plot, first.height, other.building, parts)
     (name,) = parts
-    area = city._structure(name).footprint_W
-    city._remove(name)
+    area = standing.structure(name).footprint_W
+    standing.remove(name)
     # A railing 5 mm wide, all around its area: just inside, or outside.
     rail = area.buffer(offset).exterior.buffer(0.0025)
     model = assemble(block("steel", (0.1, 0.1, 1.0), (0, 0, 0), rgb=(1, 1, 1)))
-    city._put(Structure("railing", "fence", model, (0, 0, 0), 0.0), rail)
+    standing.put(Structure("railing", "fence", model, (0, 0, 0), 0.0), rail)
     parts.clear()
-    city._scaffold(first.plot, first.height, other.building, parts)
+    buildings._put_scaffold(first.plot, first.height, other.building, parts)
     assert bool(parts) == stands
 
 

@@ -1,0 +1,382 @@
+"""Buildings of an ageing city: demolished, replaced, extended and renewed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.ageing import alterations, kinds, new_buildings
+from cns_drake.ageing.lots import Lot, find_lots
+from cns_drake.ageing.old_world import OldWorld
+from cns_drake.ageing.plots import PARTY_WALL, Plot, building_plot
+from cns_drake.ageing.standing_structures import StandingStructures
+from cns_drake.ageing.trees import Trees
+from cns_drake.ageing.yearly_draws import YearlyDraws
+from cns_drake.city.geometry import Model, Structure, from_above
+from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
+from cns_drake.city.growth.lowering import top_of
+
+# Share of the demolished buildings that are replaced by others.
+_REPLACED = 0.85
+# Share of the sites that take two years; all others take one year.
+_TWO_YEARS = 0.7
+# Share of the renewed fronts with a scaffold in front, in the year of the
+# renewal.
+_SCAFFOLDED = 0.4
+# Share of the free-standing renewed buildings with new insulation.
+_INSULATED = 0.5
+# Share of the renewed fronts with balconies, if they had none.
+_WITH_BALCONIES = 0.35
+# Greatest height of buildings that get another storey [m].
+_HIGHEST_RAISED = 40.0
+# Least height of buildings that get balconies [m].
+_LEAST_WITH_BALCONIES = 8.0
+# Buildings up to this height need no scaffold [m].
+_NO_SCAFFOLD = 3.5
+# Cars on an empty lot -> their weight in the random choice.
+_CARS = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
+_PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
+
+
+class Buildings:
+    """The buildings of an ageing city, on their lots.
+
+    Attributes:
+        lots: the lots of all buildings, and free lots.
+    """
+
+    def __init__(
+        self,
+        world: OldWorld,
+        standing: StandingStructures,
+        draws: YearlyDraws,
+        trees: Trees,
+        kept_free: BaseGeometry,
+    ) -> None:
+        """Begins with the buildings of today.
+
+        Args:
+            world: the city of today.
+            standing: the ageing city.
+            draws: its random numbers.
+            trees: its trees, which are felled for buildings.
+            kept_free: area in W [m] on which nothing is built.
+
+        Raises:
+            InputError: the city has no building.
+        """
+        self.lots = find_lots(world, kept_free)
+        self._world = world
+        self._standing = standing
+        self._draws = draws
+        self._trees = trees
+        self._kept_free = kept_free
+        # Names of the scaffolds that stand for this year only.
+        self._scaffolds: list[str] = []
+
+    def live(self) -> None:
+        """Simulates one year of all lots."""
+        for name in self._scaffolds:
+            self._standing.remove(name, because="scaffold")
+        self._scaffolds = []
+        for lot in self.lots:
+            if lot.finished:
+                self._build_on(lot)
+            elif lot.building is not None:
+                self._change(lot, lot.building)
+        self._build_on_free_lots()
+
+    def _change(self, lot: Lot, name: str) -> None:
+        """Samples whether and how the building of a lot changes."""
+        if kinds.is_kept(self._standing.kind(name)):
+            return
+        for event, change in (
+            ("demolished", self._demolish),
+            ("extended", self._extend),
+            ("renewed", self._renew),
+        ):
+            if self._draws.happens(event, name):
+                change(lot, name)
+                return
+
+    def _demolish(self, lot: Lot, name: str) -> None:
+        self._standing.record("demolished", name)
+        self._standing.remove(name)
+        self._remove_parts(lot)
+        lot.building = None
+        rng = self._draws.generator("replaced", name)
+        if rng.uniform() < _REPLACED:
+            height = lot.height * float(rng.uniform(1.0, 1.7))
+            self._open_site(lot, height, rng, replaced=name)
+        if lot.coming is None:
+            self._use_empty(lot)
+
+    def _open_site(
+        self,
+        lot: Lot,
+        height: float,
+        rng: np.random.Generator,
+        *,
+        replaced: str = "",
+    ) -> None:
+        """Opens a building site on a lot, if a new building fits there.
+
+        Args:
+            lot: the lot.
+            height: approximate height of the new building [m].
+            rng: random generator for the building and the site.
+            replaced: name of the building that stood there; the new one is of
+                another archetype.
+        """
+        plot, standing = lot.plot, self._standing
+        near = [
+            standing.footprint(name)
+            for name in standing.near(plot.area.buffer(PARTY_WALL))
+            if standing.semantic_class(name) == "building"
+        ]
+        banned = self._archetype(replaced) if replaced else ""
+        ending = f"{standing.year:03d}y_{lot.number:03d}"
+        coming = new_buildings.new_building(
+            plot, height, banned, near, rng, ending
+        )
+        if coming is None:
+            return
+        self._clear(plot.area.buffer(0.5))
+        self._remove_parts(lot)
+        lot.coming, lot.old = coming, replaced
+        lot.finished = standing.year + 1 + int(rng.uniform() < _TWO_YEARS)
+        for one in new_buildings.building_site_on(plot, f"site_{ending}", rng):
+            fences = [
+                part
+                for part in lot.parts
+                if standing.semantic_class(part) == "fence"
+            ]
+            self._put_part(lot, one, "site", fences)
+        standing.record("site", coming.name, f"site_{ending}")
+
+    def _archetype(self, name: str) -> str:
+        """Returns the archetype of a building, or else its kind."""
+        # Generated buildings have their district and archetype as tags.
+        _, *archetype = self._world.tags(name) or ("",)
+        return archetype[-1] if archetype else self._standing.kind(name)
+
+    def _clear(self, area: BaseGeometry) -> None:
+        """Removes what stands in an area, except buildings."""
+        standing = self._standing
+        for name in standing.near(area):
+            kind = standing.semantic_class(name)
+            footprint = standing.footprint(name)
+            inside = footprint.intersection(area).area > 0.5 * footprint.area
+            is_loose = kind in (*_PASSING, "other-object", "vegetation")
+            is_solid = kind in ("building", "other-structure")
+            if is_solid or not (inside or is_loose):
+                continue
+            standing.remove(name)
+            self._trees.clear(name)
+            event = "felled" if kind == "vegetation" else "removed"
+            standing.record(event, name, detail="for a building site")
+
+    def _remove_parts(self, lot: Lot) -> None:
+        """Removes what stands on a lot beside the building itself."""
+        for part in lot.parts:
+            self._standing.remove(part, because="plot")
+        lot.parts = []
+        lot.is_raised = lot.has_balconies = False
+
+    def _put_part(
+        self,
+        lot: Lot,
+        one: Structure,
+        because: str,
+        ignored: Sequence[str] = (),
+    ) -> None:
+        """Adds a structure to a lot, if nothing but `ignored` is in the way."""
+        if not self._standing.near(one.footprint_W, ignored):
+            self._standing.put(one, because=because)
+            lot.parts.append(one.name)
+
+    def _use_empty(self, lot: Lot) -> None:
+        """Uses an empty lot as a car park, a market, a yard or a garden."""
+        name = f"lot_{self._standing.year:03d}y_{lot.number:03d}"
+        ground = lot.plot.inside(lot.plot.area.buffer(-0.5))
+        bare = lot.plot.thing(name, "building", Model((), {}, ground))
+        rng = self._draws.generator("lot", name)
+        for one in lot_objects(bare, use_by_size(bare), _CARS, rng):
+            self._put_part(lot, one, "empty plot")
+
+    def _build_on(self, lot: Lot) -> None:
+        """Continues the building site of a lot, or finishes the building."""
+        coming = lot.coming
+        assert coming is not None
+        self._remove_parts(lot)
+        if self._standing.year < lot.finished:
+            self._put_frame(lot, coming)
+        else:
+            self._finish(lot, coming)
+
+    def _put_frame(self, lot: Lot, coming: Structure) -> None:
+        """Adds the unfinished frame of a building, with a scaffold."""
+        model = new_buildings.unfinished_frame(coming, seed=lot.number)
+        frame = replace(coming, name=f"{coming.name}_frame", model=model)
+        self._standing.put(frame)
+        lot.parts.append(frame.name)
+        self._put_scaffold(
+            building_plot(coming), 0.5 * lot.height, frame.name, lot.parts
+        )
+        self._standing.record("frame", coming.name, frame.name)
+
+    def _finish(self, lot: Lot, coming: Structure) -> None:
+        self._standing.put(coming)
+        lot.building, lot.coming, lot.finished = coming.name, None, 0
+        lot.plot = building_plot(coming)
+        lot.height = float(top_of(coming.model))
+        if lot.old:
+            self._standing.record("replaced", lot.old, coming.name)
+        else:
+            self._standing.record("built", coming.name)
+
+    def _put_scaffold(
+        self, plot: Plot, height: float, name: str, scaffolds: list[str]
+    ) -> None:
+        """Adds a scaffold in front of a building, if nothing is in the way.
+
+        Args:
+            plot: plot of the building.
+            height: height of the building [m].
+            name: name of the building.
+            scaffolds: list to which the name of the scaffold is added.
+        """
+        rng = self._draws.generator("scaffold", name)
+        one = alterations.scaffold_before(plot, height, f"scaffold_{name}", rng)
+        area = one.footprint_W.buffer(-0.02)
+        # Canopies and porches of the building itself may be in the way.
+        own = self._standing.triangles(name)
+        own = own[own[:, :, 2].min(axis=1) < plot.z + height]
+        blocked = shapely.intersects(from_above(own), area).any()
+        blocked |= bool(self._standing.near(area))
+        free = not area.intersects(self._world.ground.carriageway)
+        if free and not blocked and height > _NO_SCAFFOLD:
+            self._standing.put(one, because="scaffold")
+            scaffolds.append(one.name)
+
+    def _build_on_free_lots(self) -> None:
+        free = [lot for lot in self.lots if not (lot.building or lot.finished)]
+        if not free:
+            return
+        stock = sum(lot.building is not None for lot in self.lots)
+        share = min(1.0, self._draws.rates["built"] * stock / len(free))
+        for k, lot in enumerate(free):
+            name = f"lot_{lot.number:03d}"
+            if self._draws.share("built", name) < share:
+                rng = self._draws.generator("building", name)
+                height = lot.height * float(rng.uniform(0.8, 1.5))
+                self._open_site(lot, height, rng)
+            hit = lot.coming is not None
+            self._draws.tally.count("built", share, hit, stock if k == 0 else 0)
+
+    def _extend(self, lot: Lot, name: str) -> None:
+        """Adds a storey or an annex to a building, if either fits."""
+        rng = self._draws.generator("extended", name)
+        triangles = self._standing.triangles(name)
+        order = ["annex"]
+        if lot.height < _HIGHEST_RAISED and not lot.is_raised:
+            order.insert(int(rng.integers(2)), "storey")
+        one = None
+        for kind in order:
+            new = f"{name}_{kind}_{self._standing.year:03d}y"
+            if kind == "storey":
+                one = alterations.storey_on(lot.plot, triangles, new, rng)
+            else:
+                one = alterations.annex_to(
+                    lot.plot,
+                    triangles,
+                    new,
+                    lambda area: self._is_free(area, name),
+                    rng,
+                )
+            if one is not None:
+                break
+        if one is None:
+            self._standing.record("extended", name, detail="within its walls")
+            return
+        self._standing.put(one)
+        lot.parts.append(one.name)
+        lot.is_raised |= kind == "storey"
+        self._standing.record("extended", name, one.name)
+
+    def _is_free(self, area: BaseGeometry, building: str) -> bool:
+        """Returns whether an annex of a building may stand on an area."""
+        return not (
+            area.intersects(self._world.streets)
+            or area.intersects(self._kept_free)
+            or self._standing.near(area, (building,))
+        )
+
+    def _renew(self, lot: Lot, name: str) -> None:
+        """Gives a building new walls, and perhaps balconies."""
+        standing = self._standing
+        rng = self._draws.generator("renewed", name)
+        alone = not [
+            n
+            for n in standing.near(
+                standing.footprint(name).buffer(0.4), (name, *lot.parts)
+            )
+            if standing.semantic_class(n)
+            in ("building", "other-structure", "fence")
+        ]
+        insulated = alone and rng.uniform() < _INSULATED
+        triangles = standing.triangles(name)
+        standing.by_name[name] = alterations.renovated(
+            standing.structure(name), rng, insulated=insulated
+        )
+        balconies = ""
+        if rng.uniform() < _WITH_BALCONIES and self._may_have_balconies(
+            lot, name
+        ):
+            balconies = self._put_balconies(lot, name, triangles, rng)
+        if rng.uniform() < _SCAFFOLDED:
+            self._put_scaffold(lot.plot, lot.height, name, self._scaffolds)
+        words = ["colour"]
+        words += ["insulation"] if insulated else []
+        words += ["balconies"] if balconies else []
+        standing.record("renewed", name, balconies, " ".join(words))
+
+    def _may_have_balconies(self, lot: Lot, name: str) -> bool:
+        return (
+            not lot.has_balconies
+            and kinds.is_dwelling(self._standing.kind(name))
+            and lot.height >= _LEAST_WITH_BALCONIES
+        )
+
+    def _put_balconies(
+        self,
+        lot: Lot,
+        name: str,
+        triangles: np.ndarray,
+        rng: np.random.Generator,
+    ) -> str:
+        """Adds balconies to a building; returns their name, "" if none fit.
+
+        Args:
+            lot: lot of the building.
+            name: name of the building.
+            triangles: (M, 3, 3) triangles of the building in W [m].
+            rng: random generator for the balconies.
+        """
+        one = alterations.balconies_on(
+            lot.plot,
+            triangles,
+            f"{name}_balconies_{self._standing.year:03d}y",
+            rng,
+        )
+        if one is None or one.footprint_W.intersects(
+            self._world.ground.carriageway
+        ):
+            return ""
+        self._standing.put(one, Polygon())
+        lot.parts.append(one.name)
+        lot.has_balconies = True
+        return one.name
