@@ -36,8 +36,8 @@ from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.studies.comparisons import DrawnRoute, Fleet
 from cns_drake.studies.experiment import Experiment, MadeMap
+from cns_drake.studies.sampled_drives import DrawnRoute, Fleet
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 from evaluation.methods.published_networks import NetworkConfig

@@ -127,9 +127,9 @@ def study(
             do nothing else.
     """
     with uninterrupted():
-        from cns_drake.studies.experiment import (
+        from cns_drake.studies.experiment import named_programs
+        from cns_drake.studies.experiment_files import (
             load_experiment,
-            named_programs,
             parse_override,
             shipped_experiments,
         )

@@ -2,101 +2,65 @@
 
 An experiment is a YAML file. The file names maps, fields of the database drive
 and of the query drive, and the tasks to measure. A field with a list of values
-is a factor; the conditions of the experiment are the product of all factors.
+is a factor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping
 import contextlib
-from dataclasses import dataclass, replace
-import itertools
-import json
-import math
-from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     BeforeValidator,
-    ConfigDict,
     Field,
     PlainValidator,
-    create_model,
     model_validator,
 )
+import yaml
 
-from cns_drake.base.errors import (
-    InputError,
-    did_you_mean,
-    errors_at,
-    validated,
-    value_errors,
-)
-from cns_drake.base.repetitions import repeated
-from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.base.errors import InputError, validated
+from cns_drake.base.repetitions import check_once
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
-from cns_drake.studies.spread_values import expand_spread, is_spread
-from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
-from evaluation.results.table import FROZEN_REDRAW
+from cns_drake.studies.spread_values import expand_spread
 
-_FOLDER = Path(__file__).with_name("experiments")
+# Sections of an experiment with fields of both drives, or of one of them.
 SIDES = ("both", "database", "query")
-# Places in the file of an experiment where a list of values is a factor.
-_FACTORED = (*SIDES, "protocol")
-# Fields whose value may be a list -> what is in it; other lists are factors.
-_LISTS: Mapping[str, tuple[type, ...]] = {
-    "viewpoint": (int, float),
-    "without": (str,),
-    "route": (dict,),
-    "xyz": (int, float),
-    "rpy_deg": (int, float),
-}
-# Factor of experiments with cases: the name of the case.
-CAUSE = "cause"
-# Factor of experiments with cases: the level of the case.
-LEVEL = "level"
-NO_CAUSE = "none"
 # Field of the database with its drives, each with fields of its own.
 SESSIONS = "sessions"
 # Field of the database with drives that are sampled at random.
 FLEET = "fleet"
-_MOST_CONDITIONS = 20_000
 
-Changes = Mapping[str, Any]
+# The section of each drive -> the fields that a case sets there.
 Case = dict[str, dict[str, Any]]
 
 
-def _in_a_tuple(value: Any) -> Any:
+def _listed(value: Any) -> Any:
+    """Returns a list of distinct values, from one value or from a spread."""
     value = expand_spread(value, whole=True)
     value = [value] if isinstance(value, str | int | dict) else value
     if isinstance(value, list):
         # A map to make has a name.
-        _check_once(
-            [
-                one.get("name", one) if isinstance(one, dict) else one
-                for one in value
-            ]
+        check_once(
+            one.get("name", one) if isinstance(one, dict) else one
+            for one in value
         )
     return value
 
 
-def _check_once(values: Any) -> None:
-    for one in repeated(values) if isinstance(values, list) else ():
-        raise ValueError(f"{one!r} is there twice")
-
-
-def _by_name(value: Any) -> Any:
+def _settings_by_name(value: Any) -> Any:
     """Returns a list of names as a mapping without settings."""
     if isinstance(value, str):
         value = [value]
     if not isinstance(value, list):
         return value
-    _check_once(value)
+    check_once(value)
     return {str(name): {} for name in value}
 
 
-def _base(value: Any) -> Any:
+def _protocol_fields(value: Any) -> Any:
+    """Returns the name of a protocol as the field `base`."""
     return {"base": value} if isinstance(value, str) else value
 
 
@@ -105,7 +69,7 @@ def _case(value: Any) -> Case | tuple[str, ...]:
     if isinstance(value, list | tuple):
         if not value or not all(isinstance(one, str) for one in value):
             raise ValueError("a list of a case holds names of other cases")
-        _check_once(list(value))
+        check_once(value)
         return tuple(value)
     if not (isinstance(value, dict) and value):
         raise ValueError("neither fields of a side nor names of other cases")
@@ -117,9 +81,10 @@ def _case(value: Any) -> Case | tuple[str, ...]:
     return value
 
 
-_Settings = Annotated[dict[str, dict[str, Any]], BeforeValidator(_by_name)]
-# Fields of an experiment that may be written shorter -> their long form.
-_LONG_FORMS = {"tasks": _by_name, "methods": _by_name, "protocol": _base}
+_Settings = Annotated[
+    dict[str, dict[str, Any]], BeforeValidator(_settings_by_name)
+]
+_Protocol = Annotated[dict[str, Any], BeforeValidator(_protocol_fields)]
 
 
 class MadeMap(Section):
@@ -169,7 +134,7 @@ class MadeMap(Section):
         return self
 
 
-def _map(value: Any) -> str | MadeMap:
+def _name_or_made_map(value: Any) -> str | MadeMap:
     """Returns the name of a map, or how to make one."""
     if isinstance(value, str | MadeMap):
         return value
@@ -240,12 +205,15 @@ class Experiment(Section):
     maps: Annotated[
         tuple[
             Annotated[
-                Any, PlainValidator(_map, json_schema_input_type=str | MadeMap)
+                Any,
+                PlainValidator(
+                    _name_or_made_map, json_schema_input_type=str | MadeMap
+                ),
             ],
             ...,
         ]
         | None,
-        BeforeValidator(_in_a_tuple),
+        BeforeValidator(_listed),
     ] = Field(default=None, min_length=1)
     files: str | None = None
     drives: Literal["same-route", "stages", "both-ways", "first-and-last"] = (
@@ -259,18 +227,16 @@ class Experiment(Section):
     ] = Field(default_factory=dict)
     levels: Annotated[
         tuple[Annotated[int, Field(ge=1, le=100, strict=True)], ...] | None,
-        BeforeValidator(_in_a_tuple),
+        BeforeValidator(_listed),
     ] = Field(default=None, min_length=1)
     design: Literal["product", "one-at-a-time"] = "product"
     tasks: _Settings = Field(default={"place": {}}, min_length=1)
     methods: _Settings | None = Field(default=None, min_length=1)
     seeds: Annotated[
         tuple[Annotated[int, Field(ge=0, lt=2**31, strict=True)], ...],
-        BeforeValidator(_in_a_tuple),
+        BeforeValidator(_listed),
     ] = Field(default=(1,), min_length=1)
-    protocol: Annotated[dict[str, Any], BeforeValidator(_base)] = Field(
-        default_factory=dict
-    )
+    protocol: _Protocol = Field(default_factory=dict)
     baseline: dict[str, Any] = Field(default_factory=dict)
     frozen: str | None = None
     charts: tuple[dict[str, Any], ...] = ()
@@ -293,8 +259,6 @@ class Experiment(Section):
     @property
     def text(self) -> str:
         """The experiment as YAML, without fields that have their defaults."""
-        import yaml
-
         values = self.model_dump(
             mode="json", by_alias=True, exclude_defaults=True
         )
@@ -321,542 +285,22 @@ def named_programs(fields: Any) -> list[str]:
     return [file for one in fields for file in named_programs(one)]
 
 
-def shipped_experiments() -> dict[str, Path]:
-    """Returns name -> file of the experiments in this package."""
-    return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
+def in_long_form(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns fields of an experiment with short forms replaced by long ones.
 
-
-def load_experiment(
-    name_or_file: str | Path,
-    overrides: Iterable[str | tuple[str, Any]] = (),
-    *,
-    quick: bool = False,
-    on_note: Callable[[str], None] = lambda text: None,
-) -> Experiment:
-    """Reads an experiment.
+    A field that cannot be used stays as it is, for the validation of
+    `Experiment` to name it.
 
     Args:
-        name_or_file: a shipped experiment by name, or a file.
-        overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
-            a top-level field and its value. In a text, VALUE is YAML and dots
-            separate nested fields, as in `database.years=[0, 5]`.
-        quick: whether the fields in the section `quick` of the experiment
-            replace its other fields.
-        on_note: is called with a note on each word of an earlier version.
-
-    Raises:
-        InputError: there is no such experiment, or a field is unknown or not
-            usable.
+        values: fields of an experiment as its file contains them.
     """
-    shipped = shipped_experiments()
-    path = shipped.get(str(name_or_file), Path(name_or_file))
-    if not path.is_file():
-        raise InputError(
-            f"{name_or_file}: neither an experiment of this package "
-            f"({', '.join(shipped)}) nor a file"
-            f"{did_you_mean(name_or_file, shipped)}"
-        )
-    values = read_yaml(path)
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: not a mapping of an experiment's fields")
-    values.setdefault("name", path.stem)
-    for name, long_form in _LONG_FORMS.items():
-        # Their validation names the field that cannot be used.
-        with contextlib.suppress(ValueError):
-            values |= {name: long_form(values[name])} if name in values else {}
-    if quick:
-        if not isinstance(values.get("quick"), dict):
-            raise InputError(
-                f"{path}: quick: missing, or no mapping; --quick needs this"
-                " section, with the fields to replace"
-            )
-        values = _chosen_anew(values, values["quick"])
-    for one in overrides:
-        if isinstance(one, str):
-            is_nested = "." in one.partition("=")[0]
-            change = merged if is_nested else _chosen_anew
-            fields: Changes = parse_override(one)
-            (first,) = fields
-            if is_nested and first not in Experiment.model_fields:
-                fields, values = _of_method(one, fields, values)
-            values = change(values, fields)
-        else:
-            values = values | dict([one])
-    values = _in_words_of_now(values, f"{path}: ", on_note)
-    experiment = validated(Experiment, values, path)
-    with value_errors(path):
-        conditions(experiment)
-        method_variants(experiment.methods or {})
-    if not quick and experiment.quick:
-        with errors_at(f"{path}: quick", f"{path}: "):
-            load_experiment(name_or_file, overrides, quick=True)
-    return experiment
-
-
-def _in_words_of_now(
-    values: dict[str, Any], place: str, on_note: Callable[[str], None]
-) -> dict[str, Any]:
-    """Returns fields in which words of earlier versions are replaced.
-
-    The field `fresh` of both sides is now `redraw.frozen`.
-    """
-    quick = values.get("quick")
-    if isinstance(quick, dict):
-        inner = _in_words_of_now(quick, f"{place}quick.", on_note)
-        values = {**values, "quick": inner}
-    both = values.get("both")
-    if not (isinstance(both, dict) and "fresh" in both):
-        return values
-    on_note(f"{place}both.fresh: this field is now {FROZEN_REDRAW}")
-    number = {"redraw": {"frozen": both["fresh"]}}
-    left = {name: one for name, one in both.items() if name != "fresh"}
-    return {**values, "both": merged(left, number)}
-
-
-def _of_method(
-    text: str, fields: Changes, values: dict[str, Any]
-) -> tuple[Changes, dict[str, Any]]:
-    """Returns an override `METHOD.NAME=VALUE` as a field `methods`.
-
-    Args:
-        text: the override.
-        fields: the same as nested fields.
-        values: fields of the experiment.
-
-    Returns:
-        The override, and the fields of the experiment, of which `methods` lists
-        all methods; both as given if there is no such method.
-    """
-    from evaluation.methods import known_methods, shipped_methods
-
-    methods = values.get("methods") or {one: {} for one in shipped_methods()}
-    name, _, value = text.partition("=")
-    method, _, setting = name.partition(".")
-    if method not in (*methods, *known_methods()):
-        return fields, values
-    if "," in value and not value.lstrip().startswith("["):
-        # One list, as on the command lines without factors.
-        fields = {method: _nested(setting, [value.split(",")])}
-    return {"methods": fields}, {**values, "methods": methods}
-
-
-def parse_override(text: str) -> dict[str, Any]:
-    """Returns a text `FIELD=VALUE` as nested fields of an experiment.
-
-    Raises:
-        InputError: the text has another form, or VALUE is not YAML.
-    """
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise InputError(f"--set: {text!r} is not FIELD=VALUE")
-    with value_errors(f"--set: {name}"):
-        parsed = parse_yaml(value)
-    return _nested(name, parsed)
-
-
-def merged(values: Any, changes: Any) -> Any:
-    """Returns settings with changes applied.
-
-    Mappings, also nested ones, are changed field by field. All other values are
-    replaced as a whole.
-    """
-    if not (isinstance(values, Mapping) and isinstance(changes, Mapping)):
-        return changes
-    return {
-        **values,
-        **{n: merged(values.get(n), one) for n, one in changes.items()},
-    }
-
-
-def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
-    """Returns `merged` fields, with tasks and methods replaced as a whole."""
-    chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
-    return {**merged(values, changes), **chosen}
-
-
-@dataclass(frozen=True)
-class Condition:
-    """One condition of an experiment: a value for each factor.
-
-    Attributes:
-        factors: name of each factor -> its value. Each factor is a column of
-            the tables.
-        changes: fields that the condition sets, under `database`, `query`,
-            `both` or `protocol`.
-        causes: the causes of change that are combined. Each cause is a list of
-            alternatives: the fields for the wanted level of change, followed by
-            the fields for each lower level. The first alternative that is
-            possible on a map is used.
-        is_baseline: whether other conditions are compared with this one.
-    """
-
-    factors: Changes
-    changes: Mapping[str, Changes]
-    causes: tuple[tuple[Mapping[str, Changes], ...], ...] = ()
-    is_baseline: bool = False
-
-
-def conditions(experiment: Experiment) -> list[Condition]:
-    """Returns the conditions of an experiment, the baseline first.
-
-    Raises:
-        ValueError: a factor has no values or the same value twice, the baseline
-            names an unknown factor or value, or there are too many conditions.
-    """
-    fixed, factors = _factors(experiment)
-    wanted = dict(_leaves(experiment.baseline, ()))
-    first: dict[str, Any] = {}
-    for path, values in factors.items():
-        asked = wanted.pop(path, values[0])
-        if asked not in values:
-            raise ValueError(f"baseline.{path}: {asked!r} is no value of it")
-        first[path] = asked
-    if wanted:
-        raise ValueError(f"baseline.{next(iter(wanted))}: this is no factor")
-    cases = list(_cases(experiment))
-    taken = _changed_paths("", factors.items(), set())
-    for name, case in experiment.cases.items():
-        if isinstance(case, dict):
-            _changed_paths(f"cases.{name}.", _leaves(case, ()), taken)
-    lengths = [len(values) for values in factors.values()]
-    number = 1 + sum(lengths) - len(lengths)
-    if experiment.design == "product":
-        number = math.prod(lengths)
-    if (number := number * len(cases)) > _MOST_CONDITIONS:
-        raise ValueError(f"{number} conditions, more than {_MOST_CONDITIONS}")
-    if experiment.design == "product":
-        cells = [
-            dict(zip(factors, some, strict=True))
-            for some in itertools.product(*factors.values())
-        ]
-        cells.sort(key=lambda cell: cell != first)
-    else:
-        cells = [first]
-        for path, values in factors.items():
-            cells += [
-                {**first, path: one} for one in values if one != first[path]
-            ]
-    found = []
-    for cell, (cause, level, members) in itertools.product(cells, cases):
-        changes: dict[str, Any] = fixed
-        for path, value in cell.items():
-            changes = merged(changes, _nested(path, value))
-        named = {CAUSE: cause, LEVEL: level} if experiment.cases else {}
-        found.append(
-            Condition(
-                {**named, **{n: _table_value(one) for n, one in cell.items()}},
-                changes,
-                members,
-                cause == NO_CAUSE
-                and all(
-                    value == first[path]
-                    for path, value in cell.items()
-                    if not path.startswith("protocol.")
-                ),
-            )
-        )
+    found = dict(values)
+    for name, long_form in (
+        ("tasks", _settings_by_name),
+        ("methods", _settings_by_name),
+        ("protocol", _protocol_fields),
+    ):
+        if name in found:
+            with contextlib.suppress(ValueError):
+                found[name] = long_form(found[name])
     return found
-
-
-def _factors(
-    experiment: Experiment,
-) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns the fixed fields, and the values of each factor by its path."""
-    fixed: dict[str, Any] = {}
-    factors: dict[str, list[Any]] = {}
-    for side in _FACTORED:
-        single, varied = _split_values(getattr(experiment, side), (side,))
-        for path, value in single.items():
-            if path != FROZEN_REDRAW:
-                _set_field(fixed, path, value)
-        factors |= {n: some for n, some in varied.items() if n != FROZEN_REDRAW}
-    return fixed, factors
-
-
-def _changed_paths(
-    place: str, fields: Iterable[tuple[str, Any]], taken: Set[str]
-) -> set[str]:
-    """Returns the paths that factors change; refuses those that are taken."""
-    found = set(taken)
-    for path, values in fields:
-        some = values if isinstance(values, list) else [values]
-        # A mapping as a value changes several fields.
-        paths = {leaf for one in some for leaf, _ in _leaves({path: one}, ())}
-        if paths & found:
-            path = min(paths & found)
-            raise ValueError(f"{place}{path}: another factor changes it, too")
-        found |= paths
-    return found
-
-
-def _split_values(
-    fields: Changes, above: tuple[str, ...]
-) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns path -> value of fixed fields, and path -> values of factors."""
-    single: dict[str, Any] = {}
-    varied: dict[str, list[Any]] = {}
-    for path, value in _leaves(fields, above):
-        if path in single or path in varied:
-            raise ValueError(f"{path}: it is there twice")
-        if isinstance(value, _Values):
-            try:
-                _check_once(list(value))
-                # Nor may two values have one cell in a table.
-                _check_once([str(_table_value(one)) for one in value])
-            except ValueError as error:
-                raise ValueError(f"{path}: {error}") from None
-            varied[path] = list(value)
-        else:
-            single[path] = value
-    return single, varied
-
-
-class _Values(list):
-    """The values of a factor, as a type of its own."""
-
-
-def _leaves(
-    fields: Mapping[Any, Any], above: tuple[str, ...]
-) -> Iterator[tuple[str, Any]]:
-    """Yields (path, value or values) for each leaf of nested fields."""
-    for name, value in fields.items():
-        place = (*above, str(name))
-        path = ".".join(place)
-        if is_spread(value):
-            try:
-                yield path, _Values(expand_spread(value))
-            except ValueError as error:
-                raise ValueError(f"{path}: {error}") from None
-            continue
-        if name == SESSIONS and _is_of(value, dict):
-            # Each drive's fields can be factors, named by its number.
-            value = {str(k): one for k, one in enumerate(value, start=1)}
-        if isinstance(value, dict) and value:
-            yield from _leaves(value, place)
-            continue
-        try:
-            json.dumps(value, allow_nan=False, default=str)
-        except ValueError:
-            raise ValueError(f"{path}: {value} is not finite") from None
-        if isinstance(value, list) and not _is_single(name, value):
-            if not value:
-                raise ValueError(f"{path}: a list without a value")
-            yield path, _Values(value)
-        else:
-            yield path, value
-
-
-def _is_single(name: str, value: Sequence[Any]) -> bool:
-    """Returns whether a list is one value of a field."""
-    if name == SESSIONS and _is_of(value, str):
-        return True  # Recordings.
-    kinds = _LISTS.get(name)
-    return kinds is not None and all(isinstance(v, kinds) for v in value)
-
-
-def _is_of(value: Any, kind: type) -> bool:
-    """Returns whether a value is a list, and all of its members of a type."""
-    return (
-        isinstance(value, list)
-        and len(value) > 0
-        and all(isinstance(one, kind) for one in value)
-    )
-
-
-def _nested(path: str, value: Any) -> Any:
-    for part in reversed(path.split(".")):
-        value = {part: value}
-    return value
-
-
-def _set_field(fields: dict[str, Any], path: str, value: Any) -> None:
-    """Sets a field to a value, in place: like `merged`, without a copy."""
-    *above, name = path.split(".")
-    for part in above:
-        inner = fields.get(part)
-        if not isinstance(inner, dict):
-            inner = fields[part] = {}
-        fields = inner
-    fields[name] = merged(fields.get(name), value)
-
-
-def _table_value(value: Any) -> Any:
-    """Returns a factor's value as a table holds it: a number or text."""
-    if value is None:
-        return "none"
-    if isinstance(value, dict | list):
-        text = json.dumps(value, separators=(",", ": ")).replace('"', "")
-        return text.strip("{}") or "none"
-    return value
-
-
-def _cases(
-    experiment: Experiment,
-) -> Iterator[tuple[str, int, tuple[tuple[Case, ...], ...]]]:
-    """Yields name, level and members' fields of each case, `none` first."""
-    yield NO_CAUSE, 0, ()
-    if experiment.levels and not experiment.cases:
-        raise ValueError("levels: there are no cases")
-    numbers = num_levels(experiment)
-    most = max(numbers.values(), default=0)
-    if experiment.levels and max(experiment.levels) > most:
-        raise ValueError(
-            f"levels: no case has level {max(experiment.levels)}; the greatest"
-            f" is {most}"
-        )
-    for name, most in numbers.items():
-        members = _member_fields(experiment, name)
-        lengths = [_num_levels(one, f"cases.{name}") for one in members]
-        wanted = experiment.levels or range(1, most + 1)
-        levels = sorted({min(level, most) for level in wanted})
-        for level in levels:
-            alone = len(members) == 1
-            yield (
-                name,
-                level,
-                tuple(
-                    tuple(
-                        _at_level(one, k)
-                        for k in range(level, level - 1 if alone else 0, -1)
-                        if k <= length
-                    )
-                    for one, length in zip(members, lengths, strict=True)
-                ),
-            )
-
-
-def num_levels(experiment: Experiment) -> dict[str, int]:
-    """Returns the name of each case -> its number of levels.
-
-    Raises:
-        ValueError: a case has the name of the condition without a change, or
-            combines something that is not a case.
-    """
-    found = {}
-    for name in experiment.cases:
-        if name == NO_CAUSE:
-            raise ValueError(f"cases.{name}: the name of what has no cause")
-        members = _member_fields(experiment, name)
-        found[name] = max(_num_levels(one, f"cases.{name}") for one in members)
-    return found
-
-
-def _member_fields(experiment: Experiment, name: str) -> list[Case]:
-    """Returns the fields of a case, or those of each case that it combines."""
-    case = experiment.cases[name]
-    found = []
-    for one in case if isinstance(case, tuple) else [name]:
-        member = experiment.cases.get(one)
-        if not isinstance(member, dict):
-            raise ValueError(f"cases.{name}: {one} is no case with fields")
-        found.append(member)
-    return found
-
-
-def _num_levels(case: Case, place: str) -> int:
-    fields = _leaves(case, (place,))
-    return max([len(v) for _, v in fields if isinstance(v, _Values)], default=1)
-
-
-def _at_level(case: Case, level: int) -> Case:
-    """Returns the fields of a case at a level, or the next lower one."""
-    fields: Any = {}
-    for path, value in _leaves(case, ()):
-        if isinstance(value, _Values):
-            value = value[min(level, len(value)) - 1]
-        _set_field(fields, path, value)
-    return fields
-
-
-# The fields of a protocol that a study can vary. Both gates are measured in any
-# case; matches are by distance, and drives differ.
-_ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are computed.
-    "_ProtocolFields",
-    __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),
-    **{
-        name: (kind, None)
-        for name, kind in get_type_hints(
-            RetrievalProtocol, localns={"PlaceScan": Literal["middle", "first"]}
-        ).items()
-        if name not in ("gate", "overlap", "exclude_recent")
-    },
-)
-
-
-def base_protocol(
-    fields: Changes, source: object, place: str = "protocol"
-) -> RetrievalProtocol:
-    """Returns the protocol that some fields of an experiment describe.
-
-    Args:
-        fields: field -> value. The field `base` names a protocol, by default
-            `fair`, from which fields that are not given take their values.
-        source: file of the experiment, for error messages.
-        place: name of the section with these fields, for error messages.
-
-    Raises:
-        InputError: a field is unknown or out of range.
-    """
-    values = dict(fields)
-    base = values.pop("base", "fair")
-    if base not in PROTOCOLS:
-        raise InputError(
-            f"{source}: {place}.base: {base!r} is none of"
-            f" {', '.join(PROTOCOLS)}"
-        )
-    validated(_ProtocolFields, values, f"{source}: {place}")
-    try:
-        return replace(PROTOCOLS[base], **values)
-    except InputError as error:
-        option, _, fault = str(error).removeprefix("--").partition(":")
-        name = option.replace("-", "_")
-        raise InputError(f"{source}: {place}.{name}:{fault}") from None
-
-
-class MethodVariant(NamedTuple):
-    """A method with one combination of its settings.
-
-    Attributes:
-        name: name of the method, or its Python file.
-        settings: (name, value) of each setting, as text.
-        columns: path of each setting, such as `methods.solid.ranges` -> its
-            value in a table.
-    """
-
-    name: str
-    settings: tuple[tuple[str, str | tuple[str, ...]], ...]
-    columns: Changes
-
-
-def method_variants(
-    methods: Mapping[str, Mapping[str, Any]],
-) -> list[MethodVariant]:
-    """Returns each method with each combination of its varied settings.
-
-    Args:
-        methods: name of a method -> its settings. A setting with a list of
-            values is varied.
-
-    Raises:
-        ValueError: a setting has no values, or the same value twice.
-    """
-    found = []
-    for name, settings in methods.items():
-        place = f"methods.{name}"
-        fixed, varied = _split_values(settings, (place,))
-        for some in itertools.product(*varied.values()):
-            chosen = dict(zip(varied, some, strict=True))
-            given = tuple(
-                (path.removeprefix(f"{place}."), _setting(one))
-                for path, one in {**fixed, **chosen}.items()
-            )
-            # Fixed ones stand in tables, too: a row says how it was made.
-            columns = {
-                n: _table_value(one) for n, one in {**fixed, **chosen}.items()
-            }
-            found.append(MethodVariant(name, given, columns))
-    return found
-
-
-def _setting(value: Any) -> str | tuple[str, ...]:
-    return tuple(map(str, value)) if isinstance(value, list) else str(value)

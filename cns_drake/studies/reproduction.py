@@ -17,7 +17,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import recordable_map, recordable_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies.comparisons import control_drive
+from cns_drake.studies.control_drives import control_drive
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording import (
     is_recorded,

@@ -22,25 +22,14 @@ from cns_drake.scenarios.shipped import (
 )
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies.comparisons import (
-    Compared,
-    MissingError,
-    PairMaker,
-    with_lidars_beside,
-)
+from cns_drake.studies.comparisons import Compared, PairMaker
+from cns_drake.studies.conditions import Condition, conditions, num_levels
 from cns_drake.studies.experiment import (
-    CAUSE,
     FLEET,
-    LEVEL,
     SESSIONS,
     SIDES,
-    Condition,
     Experiment,
     MadeMap,
-    base_protocol,
-    conditions,
-    method_variants,
-    num_levels,
 )
 from cns_drake.studies.frozen_drives import (
     check_frozen,
@@ -55,9 +44,13 @@ from cns_drake.studies.made_maps import (
 from cns_drake.studies.map_step import make_maps
 from cns_drake.studies.map_task import DrivenMapTask
 from cns_drake.studies.map_upkeep import UpkeptSource, update_maps
+from cns_drake.studies.method_variants import method_variants
+from cns_drake.studies.named_stages import MissingError
+from cns_drake.studies.protocol_fields import protocol_from_fields
 from cns_drake.studies.recording import is_recorded
 from cns_drake.studies.redrawing import redraw_frozen
 from cns_drake.studies.seen_task import SeenTask
+from cns_drake.studies.viewpoints import VIEWPOINTS, with_lidars_beside
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.methods import optional_methods
 from evaluation.recognition.keeping import KEEP_ALL, checked_keep
@@ -65,8 +58,10 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts import check
 from evaluation.results.page import write_page
 from evaluation.results.table import (
+    CAUSE,
     FROZEN_REDRAW,
     LAST,
+    LEVEL,
     OWN,
     QUERIES,
     RESULTS,
@@ -518,7 +513,7 @@ class Study:
         # The same LiDARs see all places.
         database, _ = some.pairs[0]
         if self.experiment.drives == "same-route":
-            database = with_lidars_beside(database)
+            database = with_lidars_beside(database, *VIEWPOINTS["near"])
         return [
             self._named_drive(one)
             for one in distracting_drives(
@@ -755,7 +750,7 @@ class Study:
 
     def _protocol_of(self, condition: Condition) -> RetrievalProtocol:
         fields = condition.changes.get("protocol", {})
-        return base_protocol(fields, self.source)
+        return protocol_from_fields(fields, self.source)
 
 
 def _has_several(condition: Condition) -> bool:

@@ -30,13 +30,13 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.comparisons import with_lidars_moved
 from cns_drake.studies.exact_overlap import VisibleSurfaces, sights_of
 from cns_drake.studies.redrawing import (
     marked_yaml,
     redrawn_inputs,
     turned_content,
 )
+from cns_drake.studies.viewpoints import with_lidars_moved
 from evaluation.drives.sampling import gather, sample_frames
 from evaluation.methods.polar_images import polar_image
 

@@ -46,7 +46,6 @@ from evaluation.results.headlines import (
 from evaluation.results.ranges import checked, range_of
 from evaluation.results.smoothing import curves
 from evaluation.results.summaries import (
-    CAUSE,
     LEAST_POINTS,
     correlations,
     means,
@@ -54,6 +53,7 @@ from evaluation.results.summaries import (
     paired_values,
 )
 from evaluation.results.table import (
+    CAUSE,
     COSTS,
     LAST,
     OWN,

@@ -19,14 +19,16 @@ from evaluation.results import charts as drawing
 from evaluation.results.drawing import save
 from evaluation.results.page_frame import PageSection, environment, framed_page
 from evaluation.results.ranges import check_all
-from evaluation.results.summaries import (
+from evaluation.results.summaries import Summary, means, summarised
+from evaluation.results.table import (
     CAUSE,
+    COSTS,
+    KEYS,
     LEVEL,
-    Summary,
-    means,
-    summarised,
+    SETTINGS,
+    QueryRows,
+    Results,
 )
-from evaluation.results.table import COSTS, KEYS, SETTINGS, QueryRows, Results
 from evaluation.results.table_forms import in_table_order
 from evaluation.results.table_forms import title as title_of
 

@@ -33,7 +33,10 @@ from evaluation.recognition.place_numbers import kept_share
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import (
+    CAUSE,
     COSTS,
+    LEVEL,
+    NO_CAUSE,
     Answers,
     Key,
     QueryRows,
@@ -41,15 +44,12 @@ from evaluation.results.table import (
     Row,
 )
 
-CAUSE = "cause"
 # Factor: what updates the map of several drives.
 MAINTAIN = "database.maintain"
 # Its value without updates.
 _NOT_MAINTAINED = "none"
 # Its value with exact updates.
 _EXACTLY = "truth"
-LEVEL = "level"
-NO_CAUSE = "none"
 # Joins the names of causes that come together.
 _AND = "+"
 _SAMPLES = 1000

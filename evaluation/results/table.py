@@ -50,6 +50,11 @@ OWN = "own"
 LAST = "last"
 # The factor of the frozen redraws of the shipped maps.
 FROZEN_REDRAW = "both.redraw.frozen"
+# The factors of an experiment with cases: the name of the case, and its level.
+CAUSE = "cause"
+LEVEL = "level"
+# The cause of the condition without a change.
+NO_CAUSE = "none"
 # Names of columns in tables of earlier versions -> names of now.
 _FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
 # Names of other columns of `Key`, which no factor can have.

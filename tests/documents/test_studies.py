@@ -10,10 +10,10 @@ import yaml
 
 from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies import comparisons, experiment
-from cns_drake.studies.experiment import (
-    Experiment,
-    conditions,
+from cns_drake.studies import changed_drives, experiment, side_fields
+from cns_drake.studies.conditions import conditions
+from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.experiment_files import (
     load_experiment,
     shipped_experiments,
 )
@@ -73,7 +73,9 @@ def test_what_can_vary_exists():
         section, field = name.split(".")
         annotation = Scenario.model_fields[section].annotation
         assert field in annotation.model_fields, name
-    source = "".join(map(inspect.getsource, (comparisons, experiment)))
+    source = "".join(
+        map(inspect.getsource, (changed_drives, experiment, side_fields))
+    )
     lost = Losses.model_fields.keys()
     assert lost <= set(named)
     for name in set(named) - {*scenario, *lost, "protocol", "crop"}:

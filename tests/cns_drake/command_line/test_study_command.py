@@ -7,7 +7,10 @@ import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiment import load_experiment, shipped_experiments
+from cns_drake.studies.experiment_files import (
+    load_experiment,
+    shipped_experiments,
+)
 from evaluation.methods import shipped_methods
 
 

@@ -14,7 +14,8 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.studies.comparisons import PairMaker
-from cns_drake.studies.experiment import conditions, load_experiment
+from cns_drake.studies.conditions import conditions
+from cns_drake.studies.experiment_files import load_experiment
 
 SOURCE = "mine.yaml: database"
 

@@ -18,12 +18,11 @@ from cns_drake.simulation.loaded_drive import (
     plan_scenario_traffic,
 )
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies.comparisons import MissingError, PairMaker
-from cns_drake.studies.experiment import (
-    Experiment,
-    conditions,
-    load_experiment,
-)
+from cns_drake.studies.comparisons import PairMaker
+from cns_drake.studies.conditions import conditions
+from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.experiment_files import load_experiment
+from cns_drake.studies.named_stages import MissingError
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.overlaps import find_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -12,7 +12,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.studies.comparisons import Compared
-from cns_drake.studies.experiment import load_experiment
+from cns_drake.studies.experiment_files import load_experiment
 from cns_drake.studies.frozen_drives import (
     check_frozen,
     frozen_drives,

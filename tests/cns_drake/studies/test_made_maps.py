@@ -20,7 +20,8 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies import map_step
-from cns_drake.studies.experiment import Experiment, MadeMap, load_experiment
+from cns_drake.studies.experiment import Experiment, MadeMap
+from cns_drake.studies.experiment_files import load_experiment
 from cns_drake.studies.made_maps import AgeCity, MadeMaps, made_map_step
 from cns_drake.studies.map_step import MakeMap
 from cns_drake.studies.redrawing import RedrawCity

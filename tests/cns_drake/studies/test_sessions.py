@@ -9,7 +9,9 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.studies import study as study_module
 from cns_drake.studies.comparisons import PairMaker
-from cns_drake.studies.experiment import Experiment, conditions, load_experiment
+from cns_drake.studies.conditions import conditions
+from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.experiment_files import load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.methods.solid import SolidMethod
 from evaluation.results.table import Results

@@ -18,7 +18,8 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies import map_step
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiment import Experiment, load_experiment
+from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.experiment_files import load_experiment
 from cns_drake.studies.study import Study, run_study
 from evaluation.change.drive_maps import DriveMap
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
