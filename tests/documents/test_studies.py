@@ -199,12 +199,13 @@ def test_inline_examples_load(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "number"), [("sessions", 12), ("maintenance", 6)]
+    ("name", "number", "years"),
+    [("sessions", 12, 20), ("maintenance", 6, 20), ("eight_sessions", 6, 40)],
 )
-def test_examples_of_several_drives_have_one_query(name, number):
-    """Whatever the database, the city of the query is 20 years older."""
+def test_examples_of_several_drives_have_one_query(name, number, years):
+    """Whatever the database, the city of the query has the same age."""
     path = documents.ROOT / f"docs/examples/{name}.yaml"
     found = conditions(load_experiment(path))
     assert len(found) == number
     for one in (*found, *conditions(load_experiment(path, quick=True))):
-        assert one.changes["database"]["years"] == 20
+        assert one.changes["database"]["years"] == years
