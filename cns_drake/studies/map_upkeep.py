@@ -17,10 +17,11 @@ from cns_drake.studies.map_truth import (
     labelled_drive,
 )
 from evaluation.map_update.baselines import run_baseline
-from evaluation.map_update.labels import Label
-from evaluation.map_update.scores import Labels, nearest
+from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair, write_session
-from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptDrive, UpkeptMap
+from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptMap
+from evaluation.map_update.upkept_drive import UpkeptDrive
 from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
 
@@ -106,6 +107,6 @@ def _exact_labels(
         frames: (K,) frames of the drive that are scans of its map.
     """
     gone = label_points(pair.A, drive, frames)
-    far = nearest(pair.B.points, pair.A.points, _KNOWN_WITHIN)
+    far = nearest_distances(pair.B.points, pair.A.points, _KNOWN_WITHIN)
     new = np.where(np.isinf(far), Label.NEW, Label.KEPT)
     return Labels(gone, new.astype(np.uint8))

@@ -1,6 +1,9 @@
 """Labels of the points of maps: what happened to each."""
 
 from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
 
 # SemanticKITTI's classes of moving objects, vehicles and people.
 MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
@@ -29,3 +32,15 @@ SIDES = {
     "A": (Label.UNOBSERVED, Label.KEPT, Label.GONE),
     "B": (Label.NEWLY_SEEN, Label.KEPT, Label.NEW),
 }
+
+
+class Labels(NamedTuple):
+    """Labels of the points of both maps.
+
+    Attributes:
+        A: (N,) uint8 labels of the older map.
+        B: (M,) uint8 labels of the newer map.
+    """
+
+    A: np.ndarray
+    B: np.ndarray

@@ -29,11 +29,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from evaluation.map_update.labels import SIDES, Label
+from evaluation.map_update.labels import SIDES, Label, Labels
+from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair
 from evaluation.map_update.structures import verdicts
 
@@ -47,18 +47,6 @@ _CHANGES = {"gone": ("A", Label.GONE), "new": ("B", Label.NEW)}
 _TOLERANCES = {"within_02m": 0.2, "within_05m": 0.5}
 # Limits of the classes of distance from the other drive [m].
 _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
-
-
-class Labels(NamedTuple):
-    """Labels of the points of both maps.
-
-    Attributes:
-        A: (N,) uint8 labels of the older map.
-        B: (M,) uint8 labels of the newer map.
-    """
-
-    A: np.ndarray
-    B: np.ndarray
 
 
 def score(
@@ -172,27 +160,8 @@ def _share_near(
         return math.nan
     if len(others) == 0:
         return 0.0
-    found = nearest(points, others, distance)
+    found = nearest_distances(points, others, distance)
     return float(np.mean(np.isfinite(found)))
-
-
-def nearest(
-    points: np.ndarray, others: np.ndarray, most: float = math.inf
-) -> np.ndarray:
-    """Returns the distance (N,) to the nearest other point [m].
-
-    Distances beyond `most` are infinite.
-
-    Args:
-        points: (N, 3) points [m].
-        others: (M, 3) other points [m].
-        most: greatest distance [m].
-    """
-    if len(others) == 0:
-        return np.full(len(points), math.inf)
-    return KDTree(others, balanced_tree=False).query(
-        points, distance_upper_bound=most, workers=-1
-    )[0]
 
 
 def _by_structure(both: _Labelled) -> dict[str, float]:
@@ -262,11 +231,11 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
     # them.
     own = np.concatenate(
         [
-            nearest(pair.A.points[observed], pair.B.points),
+            nearest_distances(pair.A.points[observed], pair.B.points),
             np.zeros((comes & counted[1]).sum()),
         ]
     )
-    other = nearest(pair.B.points[counted[1]], updated)
+    other = nearest_distances(pair.B.points[counted[1]], updated)
     tolerance = _TOLERANCES["within_02m"]
     if len(own) == 0 or len(other) == 0:
         return dict.fromkeys(("completeness", "accuracy", "chamfer"), math.nan)
@@ -287,7 +256,7 @@ def _by_distance(both: _Labelled) -> dict:
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):
         return {}
     away = [
-        nearest(mine.points, theirs.X_WS[:, :3, 3])
+        nearest_distances(mine.points, theirs.X_WS[:, :3, 3])
         for mine, theirs in (pair, pair[::-1])
     ]
     found = {}

@@ -75,7 +75,7 @@ class Session:
         Raises:
             InputError: the scan cannot be read.
         """
-        scan = xyz(read_cloud(self.folder / "Scans" / _scan_name(index)))
+        scan = xyz(read_cloud(scan_path(self.folder, index)))
         return scan[np.isfinite(scan).all(axis=1)]
 
 
@@ -111,8 +111,7 @@ def write_session(
             builder.add(scan, X_WS[number])
             if "intensity" not in (scan.dtype.names or ()):
                 scan = _without_intensity(scan)
-            path = folder / "Scans" / _scan_name(number)
-            path.write_bytes(encode_pcd(scan))
+            scan_path(folder, number).write_bytes(encode_pcd(scan))
         rows = X_WS[:, :3].reshape(-1, 12)
         (folder / "poses.txt").write_text(
             "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
@@ -120,7 +119,7 @@ def write_session(
         (folder / "singlesession_posegraph.g2o").write_text(_g2o(X_WS))
         points = builder.points()
         _write_ply(folder / "map.ply", points)
-    return _session(folder, points, X_WS), frames
+    return _session_of(folder, points, X_WS), frames
 
 
 def read_session(folder: Path) -> Session:
@@ -142,7 +141,7 @@ def read_session(folder: Path) -> Session:
         scans = len(listed(folder / "Scans", "*.pcd"))
         if scans != len(X_WS):
             raise InputError(f"{file}: {len(X_WS)} poses for {scans} scans")
-    return _session(folder, points, X_WS)
+    return _session_of(folder, points, X_WS)
 
 
 def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
@@ -161,7 +160,7 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     Raises:
         InputError: the file cannot be read, or has the wrong length or values.
     """
-    labels = _read_array(path)
+    labels = _read_any_labels(path)
     count = len(session.points)
     if labels.ndim != 1 or labels.dtype.kind not in "iub":
         raise InputError(f"{path}: not one whole number for each point")
@@ -188,7 +187,7 @@ def write_labels(path: Path, labels: np.ndarray) -> None:
         np.save(stream, labels.astype(np.uint8))
 
 
-def _read_array(path: Path) -> np.ndarray:
+def _read_any_labels(path: Path) -> np.ndarray:
     if path.suffix == ".ply":
         points = np.concatenate(list(read_blocks(path)))
         if "prediction" not in (points.dtype.names or ()):
@@ -197,18 +196,18 @@ def _read_array(path: Path) -> np.ndarray:
     return read_npy(path)
 
 
-def _session(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
+def _session_of(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
     columns = {}
     for name in ("label", "instance"):
         columns[name] = np.zeros(len(points), np.uint16)
         if name in (points.dtype.names or ()):
-            columns[name] = _numbers_of(folder / "map.ply", points, name)
+            columns[name] = _as_uint16(folder / "map.ply", points, name)
     return Session(
         folder, xyz(points), columns["label"], columns["instance"], X_WS
     )
 
 
-def _numbers_of(path: Path, points: np.ndarray, name: str) -> np.ndarray:
+def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
     """Returns a column of a map as (N,) uint16.
 
     Raises:
@@ -226,8 +225,9 @@ def _numbers_of(path: Path, points: np.ndarray, name: str) -> np.ndarray:
     return numbers
 
 
-def _scan_name(number: int) -> str:
-    return f"{number:06d}.pcd"
+def scan_path(folder: Path, number: int) -> Path:
+    """Returns the path of a scan in the folder of a session."""
+    return folder / "Scans" / f"{number:06d}.pcd"
 
 
 def _without_intensity(scan: np.ndarray) -> np.ndarray:
@@ -256,16 +256,16 @@ def _g2o(X_WS: np.ndarray) -> str:
         "1" if i == j else "0" for i in range(6) for j in range(i, 6)
     )
     vertices = (
-        f"VERTEX_SE3:QUAT {k} {row}" for k, row in enumerate(_rows(X_WS))
+        f"VERTEX_SE3:QUAT {k} {row}" for k, row in enumerate(_g2o_poses(X_WS))
     )
     edges = (
         f"EDGE_SE3:QUAT {k} {k + 1} {row} {information}"
-        for k, row in enumerate(_rows(steps))
+        for k, row in enumerate(_g2o_poses(steps))
     )
     return "\n".join([*vertices, *edges, ""])
 
 
-def _rows(X: np.ndarray) -> Iterable[str]:
+def _g2o_poses(X: np.ndarray) -> Iterable[str]:
     if len(X) == 0:
         return []
     quat_xyzw = Rotation.from_matrix(X[:, :3, :3]).as_quat(canonical=True)

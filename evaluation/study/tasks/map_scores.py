@@ -7,8 +7,8 @@ from typing import Any, ClassVar, NamedTuple
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from evaluation.map_update.baselines import BASELINES, run_baseline
-from evaluation.map_update.labels import Label
-from evaluation.map_update.scores import Labels, score
+from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_labels, read_pair, read_truth
 from evaluation.map_update.structures import class_names
 from evaluation.recognition.number import Number

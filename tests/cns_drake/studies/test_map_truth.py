@@ -25,8 +25,8 @@ from cns_drake.studies.map_truth import (
     simulate_labelled,
     write_truth,
 )
-from evaluation.map_update.labels import Label
-from evaluation.map_update.scores import Labels, score
+from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_pair, read_truth
 
 HOUSE = box_visual("house/body", (-6, 30, 2, 0, 0, 0), (8, 1, 4))

@@ -11,10 +11,11 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import main
-from evaluation.map_update.baselines import by_distance, by_free_space
-from evaluation.map_update.labels import Label
+from evaluation.map_update.baselines import by_distance
+from evaluation.map_update.free_space import by_free_space
+from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.map_builder import THINNED, MapBuilder
-from evaluation.map_update.scores import Labels, score
+from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
     Pair,
     read_labels,

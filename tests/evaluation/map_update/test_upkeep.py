@@ -5,10 +5,10 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.drives.drive_views import DriveView
-from evaluation.map_update.labels import Label
-from evaluation.map_update.scores import Labels
+from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.sessions import write_session
-from evaluation.map_update.upkeep import UpkeptDrive, UpkeptMap, visible_points
+from evaluation.map_update.upkeep import UpkeptMap
+from evaluation.map_update.upkept_drive import UpkeptDrive, visible_points
 
 STEP = 0.1
 

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from evaluation.paper.paper_reference import MET, MISSED, aims, paper
+from evaluation.paper.aims import MET, MISSED, aims
+from evaluation.paper.paper_values import paper
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 

@@ -6,12 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from evaluation.paper.paper_reference import (
-    findings,
-    paper,
-    paper_trend,
-    trend,
-)
+from evaluation.paper.findings import findings, paper_trend, trend
+from evaluation.paper.paper_values import paper
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.result_tables import recognition_table
 

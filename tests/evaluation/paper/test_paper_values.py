@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from evaluation.paper import reference_for
-from evaluation.paper.paper_reference import paper
+from evaluation.paper.paper_values import paper
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import NO_REFERENCE
 

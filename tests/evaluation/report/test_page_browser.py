@@ -9,7 +9,7 @@ from PIL import Image
 import pytest
 
 from evaluation.methods import shipped_methods
-from evaluation.paper.paper_reference import paper
+from evaluation.paper.paper_reference import paper_reference
 from evaluation.report.page import write_page
 from evaluation.report.page_data import CameraImages
 
@@ -158,7 +158,7 @@ def test_table_ii_fits_its_box(browser, content, tmp_path):
     results = [make_result(name, [0, 1, 4, 6, 3]) for name in shipped_methods()]
     assert len(results) == 6
     page = replace(
-        content, recognitions=results, evidence={}, reference=paper()
+        content, recognitions=results, evidence={}, reference=paper_reference()
     )
     write_page(path, page)
     browser.open(path.as_uri(), *DESKTOP)
