@@ -20,7 +20,20 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, is_there
 from cns_drake.base.number_text import number_within, whole_number
 from cns_drake.base.xml_elements import read_elements
-from cns_drake.city.geometry import from_above, read_mesh, structures, triple
+from cns_drake.city.geometry import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+    Shape,
+    SphereShape,
+    Structure,
+    from_above,
+    read_mesh,
+    triple,
+)
+from cns_drake.city.geometry.object_models import ground_footprint
 from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.plants.plant_sizes import younger_plant
 from cns_drake.imports.map_files import YEAR_COLUMN
@@ -109,7 +122,7 @@ class OldWorld:
         """Returns the structures of some classes, sorted by name."""
         return [t for t in self.things.values() if t.semantic_class in classes]
 
-    def structure(self, name: str) -> structures.Structure:
+    def structure(self, name: str) -> Structure:
         """Returns a structure in the form that the city generator uses.
 
         Its footprint is the convex hull of its parts near the ground.
@@ -135,7 +148,7 @@ class OldWorld:
                     f"{self.path}: {name}/{one.name}: a shape that ageing "
                     "cannot change"
                 )
-            if isinstance(shape, structures.MeshShape):
+            if isinstance(shape, MeshShape):
                 file = self.folder.path / MESH_FOLDER / f"{shape.mesh}.obj"
                 try:
                     check_regular(file)
@@ -145,7 +158,7 @@ class OldWorld:
                         f"{file}: not an OBJ file that ageing can change"
                     ) from None
             parts.append(
-                structures.Part(
+                Part(
                     one.name,
                     shape,
                     triple(X_SG.translation().round(4)),
@@ -155,10 +168,8 @@ class OldWorld:
                     materials.get(one.name, materials.get("")),
                 )
             )
-        model = structures.Model(
-            tuple(parts), meshes, structures.ground_footprint(parts, meshes)
-        )
-        return structures.Structure(
+        model = Model(tuple(parts), meshes, ground_footprint(parts, meshes))
+        return Structure(
             name,
             row["class"],
             model,
@@ -173,31 +184,31 @@ class OldWorld:
         return tuple(self.rows.get(name, {}).get("tags", "").split())
 
     @cached_property
-    def shapes(self) -> dict[str, list[structures.Shape]]:
+    def shapes(self) -> dict[str, list[Shape]]:
         """Name of a structure -> its shapes of the kinds that can change."""
         return {
             name: [s for p in one.parts if (s := self._shape(p)) is not None]
             for name, one in self.things.items()
         }
 
-    def _shape(self, part: LoadedPart) -> structures.Shape | None:
+    def _shape(self, part: LoadedPart) -> Shape | None:
         """Returns the shape of a part; None for other kinds of shapes."""
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
         if isinstance(shape, Mesh) and shape.source().is_path():
             name = Path(shape.source().path()).stem
-            return structures.MeshShape(name, triple(shape.scale3()))
+            return MeshShape(name, triple(shape.scale3()))
         if isinstance(shape, Box):
-            return structures.BoxShape(triple(shape.size()))
+            return BoxShape(triple(shape.size()))
         if isinstance(shape, Cylinder):
-            return structures.CylinderShape(shape.radius(), shape.length())
+            return CylinderShape(shape.radius(), shape.length())
         if isinstance(shape, Sphere):
-            return structures.SphereShape(shape.radius())
+            return SphereShape(shape.radius())
         return None
 
     def structures_in(
         self, year: int
-    ) -> tuple[dict[str, structures.Structure | None], list[Event]]:
+    ) -> tuple[dict[str, Structure | None], list[Event]]:
         """Returns the structures of a past year, and the events since then.
 
         Buildings that were built after that year are missing, and their lots
@@ -212,9 +223,7 @@ class OldWorld:
             as today; and the events in order of time.
         """
         assert self.today is not None
-        standing: dict[str, structures.Structure | None] = dict.fromkeys(
-            self.visuals
-        )
+        standing: dict[str, Structure | None] = dict.fromkeys(self.visuals)
         events = []
         for name, thing in self.things.items():
             built = self.built.get(name)
@@ -237,9 +246,7 @@ class OldWorld:
         events.sort(key=lambda one: one.year)
         return standing, events
 
-    def _objects_before(
-        self, name: str, built: int
-    ) -> Iterator[structures.Structure]:
+    def _objects_before(self, name: str, built: int) -> Iterator[Structure]:
         """Returns the objects on a lot before its building was built.
 
         Args:

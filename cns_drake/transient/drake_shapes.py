@@ -7,7 +7,14 @@ from numpy.typing import ArrayLike
 from pydrake import geometry
 from pydrake.common import MemoryFile
 
-from cns_drake.city.geometry import OBJECT_MESHES, Mesh, structures
+from cns_drake.city.geometry import (
+    OBJECT_MESHES,
+    BoxShape,
+    CylinderShape,
+    Mesh,
+    Shape,
+    SphereShape,
+)
 
 
 def memory_mesh(
@@ -33,18 +40,16 @@ def memory_mesh(
     return geometry.Mesh(geometry.InMemoryMesh(mesh_file=file), scale)
 
 
-def model_shape(
-    shape: structures.Shape, meshes: Mapping[str, Mesh]
-) -> geometry.Shape:
+def model_shape(shape: Shape, meshes: Mapping[str, Mesh]) -> geometry.Shape:
     """Returns a Drake shape that equals a shape of the city generator.
 
     `meshes` maps names to the meshes of its model.
     """
-    if isinstance(shape, structures.BoxShape):
+    if isinstance(shape, BoxShape):
         return geometry.Box(*shape.size)
-    if isinstance(shape, structures.CylinderShape):
+    if isinstance(shape, CylinderShape):
         return geometry.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, structures.SphereShape):
+    if isinstance(shape, SphereShape):
         return geometry.Sphere(shape.radius)
     shared = OBJECT_MESHES / f"{shape.mesh}.obj"
     if shared.is_file():

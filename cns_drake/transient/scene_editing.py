@@ -9,7 +9,7 @@ from pydrake import geometry
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cns_drake.base.elementary import product
-from cns_drake.city.geometry.structures import Model, Part
+from cns_drake.city.geometry.models import Model, Part
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.drake_shapes import (

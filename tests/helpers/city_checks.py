@@ -5,8 +5,9 @@ import pytest
 import shapely
 from shapely.strtree import STRtree
 
-from cns_drake.city.geometry.structures import HEADROOM, part_triangles
-from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.geometry.models import part_triangles
+from cns_drake.city.geometry.object_models import HEADROOM
+from cns_drake.city.ground.coverings import GROUND_TAG
 
 # Parts may reach this far outside a footprint: plinths, pilasters, steps.
 OVERHANG = 0.36

@@ -18,8 +18,9 @@ import pytest
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import City, make_city
-from cns_drake.city.geometry.structures import Structure, part_triangles
-from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.geometry.models import part_triangles
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.scenarios.shipped import worlds_folder

@@ -33,7 +33,7 @@ from cns_drake.city.buildings import (
 )
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.assembly import Archetype, Building, Site
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.models import Model
 
 __all__ = ["ARCHETYPES", "sample"]
 

@@ -8,7 +8,15 @@ import numpy as np
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.dice import Dice, Rgb
-from cns_drake.city.geometry import structures
+from cns_drake.city.geometry import (
+    Builder,
+    MeshShape,
+    Model,
+    Part,
+    assemble,
+    block,
+)
+from cns_drake.city.geometry.object_models import ROOT_DEPTH
 
 _LONGEST = 8
 
@@ -51,7 +59,7 @@ def run(
     *,
     length: float = 10.0,
     height: float | None = None,
-) -> structures.Model:
+) -> Model:
     """Returns a fence, wall or hedge of equal panels, in a random colour.
 
     Args:
@@ -74,35 +82,33 @@ def run(
     tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))
     stretch = round(length / (total * kind.panel), 4)
-    parts: list[structures.Part] = []
+    parts: list[Part] = []
     done = 0
     while done < total:
         count = _LONGEST
         while count > total - done:
             count //= 2
-        shape = structures.MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
+        shape = MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
         x = done * kind.panel * stretch - length / 2
         part = f"run_{len(parts):02d}"
         parts.append(
-            structures.Part(
-                part, shape, (x, 0.0, 0.0), rgb=rgb, material=kind.material
-            )
+            Part(part, shape, (x, 0.0, 0.0), rgb=rgb, material=kind.material)
         )
         done += count
     if kind.end_post:
         x, y0, y1, top = kind.end_post
         top *= tall
-        size = (x, y1 - y0, top + structures.ROOT_DEPTH)
+        size = (x, y1 - y0, top + ROOT_DEPTH)
         at = (
             length / 2 - x / 2,
             (y0 + y1) / 2,
-            (top - structures.ROOT_DEPTH) / 2,
+            (top - ROOT_DEPTH) / 2,
         )
-        parts.append(structures.block("end", size, at, rgb=rgb))
-    return structures.assemble(*parts)
+        parts.append(block("end", size, at, rgb=rgb))
+    return assemble(*parts)
 
 
 FENCES = {
-    name: structures.Builder(kind.semantic_class, partial(run, name))
+    name: Builder(kind.semantic_class, partial(run, name))
     for name, kind in RUN_KINDS.items()
 }

@@ -8,7 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from cns_drake.city.geometry import structures
+from cns_drake.city.geometry import (
+    Builder,
+    MeshShape,
+    Model,
+    Part,
+    assemble,
+    triple,
+)
 
 # Paint colours, roughly in the shares seen on the road.
 PAINTS = (
@@ -41,30 +48,30 @@ FORMS = {
 }
 
 
-def car(rng: np.random.Generator, *, form: str) -> structures.Model:
+def car(rng: np.random.Generator, *, form: str) -> Model:
     """Returns a parked vehicle with random paint and a slightly random size.
 
     `form` is a body type, such as `van`: a key of `FORMS`.
     """
     size = rng.uniform(0.97, 1.03, 3)
-    scale = structures.triple(round(float(s), 3) for s in size)
+    scale = triple(round(float(s), 3) for s in size)
     paint = PAINTS[int(rng.integers(len(PAINTS)))]
     colours = {"body": paint, "trim": TRIM}
     if form == "box_truck":
         colours["box"] = WHITE
     parts = [
-        structures.Part(
+        Part(
             name,
-            structures.MeshShape(f"{form}_{name}", scale),
+            MeshShape(f"{form}_{name}", scale),
             rgb=rgb,
             material="trim" if name == "trim" else None,
         )
         for name, rgb in colours.items()
     ]
-    return structures.assemble(*parts)
+    return assemble(*parts)
 
 
 PARKED_CARS = {
-    form: structures.Builder(semantic_class, partial(car, form=form))
+    form: Builder(semantic_class, partial(car, form=form))
     for form, semantic_class in FORMS.items()
 }

@@ -13,7 +13,8 @@ from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import MeshShape, Structure
+from cns_drake.city.geometry.models import MeshShape
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.labels import MAX_INSTANCE

@@ -2,12 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
-from cns_drake.city.geometry.structures import (
-    BoxShape,
-    MeshShape,
-    Shape,
-    Structure,
-)
+from cns_drake.city.geometry.models import BoxShape, MeshShape, Shape
+from cns_drake.city.geometry.structures import Structure
 
 # Triangles of a box.
 _OF_BOX = 12

@@ -5,7 +5,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cns_drake.city.geometry.structures import MeshShape, Part, Shape, Structure
+from cns_drake.city.geometry.models import MeshShape, Part, Shape
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.scene.map_folder import MESH_FOLDER
 from cns_drake.scene.semantics import CLASS_RGB
 

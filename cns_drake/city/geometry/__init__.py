@@ -1,7 +1,30 @@
 """Meshes, polygons, and structures made of meshes."""
 
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes, read_mesh
+from cns_drake.city.geometry.models import (
+    BoxShape,
+    CylinderShape,
+    Finish,
+    MeshShape,
+    Model,
+    Part,
+    Shape,
+    SphereShape,
+    part_mesh,
+    part_triangles,
+    triple,
+)
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
+from cns_drake.city.geometry.object_models import (
+    Builder,
+    assemble,
+    bar,
+    block,
+    in_a_row,
+    mesh_part,
+    pillar,
+    post,
+)
 from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygon_meshes import (
     HeightMap,
@@ -15,29 +38,7 @@ from cns_drake.city.geometry.polygons import (
     snap,
     tiles,
 )
-from cns_drake.city.geometry.structures import (
-    BoxShape,
-    Builder,
-    CylinderShape,
-    Finish,
-    MeshShape,
-    Model,
-    Part,
-    Shape,
-    SphereShape,
-    Structure,
-    assemble,
-    bar,
-    block,
-    ground_triangles,
-    in_a_row,
-    mesh_part,
-    part_mesh,
-    part_triangles,
-    pillar,
-    post,
-    triple,
-)
+from cns_drake.city.geometry.structures import Structure, ground_triangles
 from cns_drake.city.geometry.triangulation import triangulate
 from cns_drake.city.geometry.upper_sides import (
     UpperSides,

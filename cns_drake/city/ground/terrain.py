@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
@@ -13,23 +12,21 @@ from cns_drake.city.geometry import (
     HeightMap,
     Structure,
     merge_meshes,
-    polygons_of,
     snap,
     surface_mesh,
     wall_mesh,
 )
+from cns_drake.city.ground.coverings import Covering, water
 from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.elevation import Ground
-from cns_drake.city.ground.streets import Covering
 
-# Kind of ground -> semantic class, colour and material; None is the usual
+# Kind of dry ground -> semantic class, colour and material; None is the usual
 # material of the class.
 _LOOK = {
     "paved": ("other-ground", (0.70, 0.67, 0.62), None),
     "lawn": ("terrain", (0.45, 0.56, 0.32), None),
     "gravel": ("other-ground", (0.63, 0.58, 0.50), "gravel"),
     "parking": ("parking", (0.38, 0.37, 0.38), None),
-    "water": ("other-ground", (0.25, 0.38, 0.45), "water"),
 }
 _QUAY_RGB = (0.55, 0.53, 0.50)
 # Distance between the vertices of meshes of ground with relief [m].
@@ -132,15 +129,16 @@ def ground_structures(
         for kind, area in district.grounds.items():
             if area.is_empty:
                 continue
-            semantic_class, rgb, material = _LOOK[kind]
             name = f"ground_{district.plan.name}_{kind}"
-            ground = Covering(name, semantic_class, area, rgb, material)
             if kind == "water":
-                structures.append(ground.surface(water_level))
+                structures.append(water(name, area).surface(water_level))
                 structures.append(
                     _quay(district.plan.name, area, land, shape, water_level)
                 )
-            elif shape.base.is_level:
+                continue
+            semantic_class, rgb, material = _LOOK[kind]
+            ground = Covering(name, semantic_class, area, rgb, material)
+            if shape.base.is_level:
                 has_relief = kind == "lawn" and district.plan.relief > 0
                 spacing = _SPACING if has_relief else 0.0
                 structures.append(ground.surface(shape, spacing))
@@ -176,91 +174,17 @@ def _fall(area: BaseGeometry, base: Ground) -> float:
 
 def _quay(
     district: str,
-    water: BaseGeometry,
+    water_surface: BaseGeometry,
     land: BaseGeometry,
     shape: GroundShape,
     water_level: float,
 ) -> Structure:
     """Returns the walls between land and water, with one part per tile."""
-    rim = water.boundary.buffer(0.3).intersection(land.buffer(0.6))
+    rim = water_surface.boundary.buffer(0.3).intersection(land.buffer(0.6))
     quay = Covering(f"quay_{district}", "other-structure", rim, _QUAY_RGB)
     return quay.structure(
         {
-            part: wall_mesh(water, water_level, shape, along=piece)
+            part: wall_mesh(water_surface, water_level, shape, along=piece)
             for part, piece in quay.tiles()
         }
     )
-
-
-# From the upper side of a bridge to its lower side [m].
-_DEPTH = 1.0
-# Distance of the piers from the banks [m].
-_SPAN = 10.5
-# Thickness of the piers [m].
-_PIER = 1.2
-# Edges that two polygons share are found within this distance [m].
-_NEAR = 0.3
-_BRIDGE_RGB = (0.62, 0.57, 0.50)
-_WATER_RGB = (0.25, 0.38, 0.45)
-
-
-def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns the area of a district of water in W [m], also below bridges."""
-    if district.plan.area is None:
-        return district.area
-    below = Polygon(district.plan.area).intersection(streets)
-    return snap(shapely.union(district.area, below))
-
-
-def bridge_structures(
-    districts: Sequence[District],
-    streets: BaseGeometry,
-    shape: HeightMap,
-    water_level: float,
-) -> list[Structure]:
-    """Returns the sides, undersides and piers of all bridges.
-
-    There is a bridge wherever a street crosses a district of water, and
-    wherever such a district has a patch of land. The street or the patch is the
-    upper side of the bridge.
-
-    Args:
-        districts: all districts of the city.
-        streets: area of the streets in W [m].
-        shape: function that returns the heights of the ground at x and y in W
-            [m].
-        water_level: height of the water [m].
-    """
-    structures = []
-    for district in districts:
-        if district.plan.ground != "water":
-            continue
-        water = water_area(district, streets)
-        banks = water.boundary.buffer(_NEAR)
-        inner = water.buffer(-_SPAN, join_style="mitre")
-        ring = inner.difference(inner.buffer(-_PIER, join_style="mitre"))
-        open_water = district.grounds["water"]
-        decks = polygons_of(snap(water.difference(open_water)))
-        for number, deck in enumerate(decks, start=1):
-            name = f"bridge_{district.plan.name}_{number:02d}"
-            middle = np.array([deck.centroid.coords[0]])
-            bottom = float(shape(*middle.T)[0]) - _DEPTH
-            low = water_level
-            beside = deck.buffer(_NEAR)
-            piers = snap(deck.intersection(ring))
-            pieces = {
-                "sides": wall_mesh(open_water, bottom, shape, along=beside),
-                "underside": surface_mesh(deck, bottom).turned(),
-                "abutments": wall_mesh(deck, low, bottom, along=banks),
-                "piers": wall_mesh(piers, low, bottom).turned(),
-            }
-            area = MultiPolygon([deck])
-            bridge = Covering(name, "other-structure", area, _BRIDGE_RGB)
-            below = Covering(
-                f"{name}_water", "other-ground", area, _WATER_RGB, "water"
-            )
-            structures += [
-                bridge.structure(pieces),
-                below.structure({"surface": surface_mesh(deck, low)}),
-            ]
-    return structures

@@ -16,12 +16,8 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.angles import wrapped
 from cns_drake.city.geometry import Structure, polygons_of, snap
-from cns_drake.city.ground.streets import (
-    TILE,
-    Covering,
-    kerb_area,
-    parking_bays,
-)
+from cns_drake.city.ground.coverings import TILE, Covering
+from cns_drake.city.ground.streets import kerb_area, parking_bays
 from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
 from cns_drake.roads.carriageway import Areas, union_without_slits

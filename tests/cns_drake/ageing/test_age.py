@@ -26,7 +26,8 @@ from cns_drake.ageing.sections import greatest_y, horizontal_section
 from cns_drake.ageing.standing_structures import structure_triangles
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
-from cns_drake.city.geometry.structures import Structure, assemble, block
+from cns_drake.city.geometry.object_models import assemble, block
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world

@@ -20,7 +20,7 @@ from cns_drake.city.buildings import ARCHETYPES, BUILDERS, sample
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.assembly import GROUND_OVERHANG_M, HEAD_ROOM_M, Site
 from cns_drake.city.facades.solids import FOUNDATION_M
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry.models import MeshShape
 
 # By day, generated cities are compared with the committed ones byte by byte.
 pytestmark = [pytest.mark.slow, pytest.mark.night]

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city.geometry.structures import part_triangles
-from cns_drake.city.ground.streets import GROUND_TAG, kerb_height
+from cns_drake.city.geometry.models import part_triangles
+from cns_drake.city.ground.coverings import GROUND_TAG
+from cns_drake.city.ground.streets import kerb_height
 from cns_drake.roads.street_areas import RoadSurface
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]

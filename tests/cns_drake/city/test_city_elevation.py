@@ -7,7 +7,8 @@ import pytest
 import shapely
 from shapely.geometry import Polygon, box
 
-from cns_drake.city.geometry.structures import Model, Structure
+from cns_drake.city.geometry.models import Model
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.elevation import (
     LevelGround,
     Pad,

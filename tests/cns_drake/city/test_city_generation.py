@@ -26,8 +26,8 @@ from pydrake.geometry import Role
 import pytest
 import yaml
 
-from cns_drake.city.geometry.structures import part_mesh
-from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.geometry.models import part_mesh
+from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.growth.lowering import cut_at
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.scene.map_folder import STRUCTURES_NAME

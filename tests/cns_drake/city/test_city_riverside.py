@@ -8,7 +8,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
 
-from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.ground.coverings import GROUND_TAG
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 

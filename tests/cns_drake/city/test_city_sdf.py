@@ -9,15 +9,15 @@ from shapely.geometry import box
 
 from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.mesh import box_mesh
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry.models import (
     BoxShape,
     CylinderShape,
     MeshShape,
     Model,
     Part,
     SphereShape,
-    Structure,
 )
+from cns_drake.city.geometry.structures import Structure
 
 PARTS = (
     Part("a_box", BoxShape((1.0, 2.0, 3.0)), (1, 2, 3), (0.1, -0.2, 0.3)),

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.geometry.object_meshes import object_mesh
-from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
 LENGTHS = (1.3, 5.0, 12.4, 37.0)

@@ -13,7 +13,8 @@ from shapely.geometry import MultiPolygon, box
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.mesh import box_mesh
-from cns_drake.city.geometry.structures import Structure, part_mesh
+from cns_drake.city.geometry.models import part_mesh
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.building_sites import building_site
 from cns_drake.city.growth.lot_uses import USES, lot_objects, use_by_size
 from cns_drake.city.growth.lowering import cut_at, enclosed, lowered, top_of

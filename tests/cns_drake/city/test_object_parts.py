@@ -4,22 +4,24 @@ import pytest
 from shapely.geometry import MultiPoint, Point
 
 from cns_drake.city.geometry.mesh import box_mesh
-from cns_drake.city.geometry.structures import (
-    HEADROOM,
-    ROOT_DEPTH,
+from cns_drake.city.geometry.models import (
     CylinderShape,
     MeshShape,
     Part,
     SphereShape,
+    part_mesh,
+    rotation,
+)
+from cns_drake.city.geometry.object_models import (
+    HEADROOM,
+    ROOT_DEPTH,
     assemble,
     bar,
     block,
     ground_footprint,
     in_a_row,
-    part_mesh,
     pillar,
     post,
-    rotation,
 )
 from cns_drake.city.placement.objects import OBJECTS
 

@@ -7,8 +7,8 @@ from shapely.geometry import MultiPoint
 
 from cns_drake.city.furniture.fences import RUN_KINDS
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.models import MeshShape, part_mesh
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
-from cns_drake.city.geometry.structures import MeshShape, part_mesh
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import SPECIES
 from cns_drake.scene.semantics import CLASS_IDS

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.city.furniture.parked_cars import FORMS
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
 # Length, width without mirrors, height of real vehicles of the kind [m].

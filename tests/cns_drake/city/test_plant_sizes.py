@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.city.geometry.structures import part_mesh
+from cns_drake.city.geometry.models import part_mesh
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.plant_sizes import younger_plant
 

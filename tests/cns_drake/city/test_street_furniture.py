@@ -4,7 +4,7 @@ import pytest
 
 from cns_drake.city.furniture.object_data import ONE_MESH
 from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
-from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
 SOLID = [

@@ -5,8 +5,8 @@ from helpers.mesh_checks import out_of_plane, surface_points
 import numpy as np
 import pytest
 
+from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.geometry.object_meshes import object_mesh
-from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import SPECIES, STREET_TREES, mesh_names
 

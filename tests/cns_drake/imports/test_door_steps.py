@@ -4,7 +4,7 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.city.geometry.structures import part_triangles
+from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
 from cns_drake.imports.dressing.dressed_city import dress_city

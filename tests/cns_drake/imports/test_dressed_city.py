@@ -15,7 +15,7 @@ import yaml
 
 from cns_drake.city.facades.assembly import Assembly, Site
 from cns_drake.city.geometry import Finish
-from cns_drake.city.geometry.structures import part_triangles
+from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
 from cns_drake.imports.cityjson_structures import import_cityjson

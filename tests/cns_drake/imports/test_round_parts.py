@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Point
 
-from cns_drake.city.geometry.structures import (
+from cns_drake.city.geometry.models import (
     BoxShape,
     CylinderShape,
     Model,

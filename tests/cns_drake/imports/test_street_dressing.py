@@ -11,8 +11,9 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.geometry.structures import HEADROOM, part_triangles
-from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.geometry.models import part_triangles
+from cns_drake.city.geometry.object_models import HEADROOM
+from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.imports.cityjson_structures import import_cityjson
 from cns_drake.imports.dressing import dressed_city
 from cns_drake.imports.dressing.dressed_city import dress_city

@@ -3,13 +3,8 @@ import pytest
 from shapely.geometry import box
 
 from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.geometry.structures import (
-    Finish,
-    Model,
-    Part,
-    SphereShape,
-    Structure,
-)
+from cns_drake.city.geometry.models import Finish, Model, Part, SphereShape
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS
 from cns_drake.scene.semantics import CLASS_IDS

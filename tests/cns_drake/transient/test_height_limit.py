@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.city.geometry.structures import part_mesh
+from cns_drake.city.geometry.models import part_mesh
 from cns_drake.city.growth.lowering import lowered
 from cns_drake.transient.loaded_structures import triangle_corners
 
