@@ -2,9 +2,10 @@
 
 An archetype is a kind of building. `archetypes.yaml` contains the limits of
 size and the colours of each archetype, and a subclass of `Building` samples and
-builds its buildings. To add an archetype, write an entry of `archetypes.yaml`
-and a subclass, and add the subclass to `BUILDERS`. `sample` returns one
-building:
+builds its buildings. The module of an archetype has the archetype's name; only
+family houses and row houses share a module, and landmarks come from files. To
+add an archetype, write an entry of `archetypes.yaml` and a subclass, and add
+the subclass to `BUILDERS`. `sample` returns one building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -18,18 +19,35 @@ from shapely.geometry import Polygon
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.buildings import (
+    art_deco_tower,
+    balcony_flats,
+    banded_tower,
+    barn,
+    brick_block,
+    chapel,
+    corner_building,
+    corner_store,
+    court_block,
     family_houses,
-    flats,
-    halls,
-    markets,
-    office_towers,
-    open_roofs,
-    public_buildings,
+    gallery_flats,
+    garden_flats,
+    gas_station,
+    glass_skyscraper,
+    grid_tower,
+    hotel,
+    kiosk_row,
+    office,
+    park_pavilion,
+    podium_tower,
     row_houses,
-    slabs,
-    street_blocks,
-    towers,
+    school,
+    shop_strip,
+    slab_tower,
+    sports_hall,
+    supermarket,
     unfinished_tower,
+    walk_up,
+    waterfront_hall,
 )
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
 from cns_drake.city.facades.assembly import Archetype, Building, Site
@@ -47,39 +65,39 @@ ARCHETYPES = {
 }
 # Name of an archetype -> its class.
 BUILDERS: dict[str, type[Building]] = {
-    "art_deco_tower": towers.ArtDecoTower,
-    "balcony_flats": slabs.BalconyFlats,
-    "banded_tower": office_towers.BandedTower,
-    "barn": halls.Barn,
-    "brick_block": street_blocks.BrickBlock,
+    "art_deco_tower": art_deco_tower.ArtDecoTower,
+    "balcony_flats": balcony_flats.BalconyFlats,
+    "banded_tower": banded_tower.BandedTower,
+    "barn": barn.Barn,
+    "brick_block": brick_block.BrickBlock,
     "bungalow": family_houses.Bungalow,
-    "chapel": public_buildings.Chapel,
-    "corner_building": street_blocks.CornerBuilding,
-    "corner_store": street_blocks.CornerStore,
-    "court_block": flats.CourtBlock,
+    "chapel": chapel.Chapel,
+    "corner_building": corner_building.CornerBuilding,
+    "corner_store": corner_store.CornerStore,
+    "court_block": court_block.CourtBlock,
     "detached_house": family_houses.DetachedHouse,
-    "gallery_flats": slabs.GalleryFlats,
-    "garden_flats": flats.GardenFlats,
-    "gas_station": open_roofs.GasStation,
-    "glass_skyscraper": towers.GlassSkyscraper,
-    "grid_tower": office_towers.GridTower,
-    "hotel": towers.Hotel,
-    "kiosk_row": markets.KioskRow,
-    "office": street_blocks.Office,
-    "park_pavilion": open_roofs.ParkPavilion,
-    "podium_tower": towers.PodiumTower,
+    "gallery_flats": gallery_flats.GalleryFlats,
+    "garden_flats": garden_flats.GardenFlats,
+    "gas_station": gas_station.GasStation,
+    "glass_skyscraper": glass_skyscraper.GlassSkyscraper,
+    "grid_tower": grid_tower.GridTower,
+    "hotel": hotel.Hotel,
+    "kiosk_row": kiosk_row.KioskRow,
+    "office": office.Office,
+    "park_pavilion": park_pavilion.ParkPavilion,
+    "podium_tower": podium_tower.PodiumTower,
     "row_house": row_houses.RowHouse,
-    "school": public_buildings.School,
+    "school": school.School,
     "semi_detached": family_houses.SemiDetached,
     "shop_house": row_houses.ShopHouse,
-    "shop_strip": markets.ShopStrip,
-    "slab_tower": slabs.SlabTower,
-    "sports_hall": halls.SportsHall,
-    "supermarket": markets.Supermarket,
+    "shop_strip": shop_strip.ShopStrip,
+    "slab_tower": slab_tower.SlabTower,
+    "sports_hall": sports_hall.SportsHall,
+    "supermarket": supermarket.Supermarket,
     "terrace": row_houses.Terrace,
     "unfinished_tower": unfinished_tower.UnfinishedTower,
-    "walk_up": flats.WalkUp,
-    "waterfront_hall": halls.WaterfrontHall,
+    "walk_up": walk_up.WalkUp,
+    "waterfront_hall": waterfront_hall.WaterfrontHall,
     **dict.fromkeys(LANDMARKS, Landmark),
 }
 

@@ -97,7 +97,8 @@ def _add_garage(p: _FamilyHouse, garage: Wing) -> None:
 
 
 # Kept free around the walls, for eaves and chimneys [m].
-_MARGIN = 0.5
+_MARGIN_M = 0.5
+# Plan of a detached house -> where it has wings besides the main wing.
 _WING_ENDS = {
     "box": (),
     "ell": ("front",),
@@ -158,7 +159,7 @@ class DetachedHouse(_FamilyHouse):
         free ground in front of it [m].
         """
         x0, y0, x1, y1 = self.site.bounds
-        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+        left, right, back = x0 + _MARGIN_M, x1 - _MARGIN_M, y1 - _MARGIN_M
         ahead = self.porch_reach + 0.3 + 1.8 * self.floor
         self.ahead = min(ahead, 0.3 * (back - y0))
         front = y0 + self.ahead
@@ -298,7 +299,7 @@ def _chimney_breast(
 
 
 # Kept free around the walls, for wide eaves [m].
-_BUNGALOW_MARGIN = 0.75
+_BUNGALOW_MARGIN_M = 0.75
 
 
 class Bungalow(_FamilyHouse):
@@ -313,9 +314,9 @@ class Bungalow(_FamilyHouse):
         # Whether the front wing stands on the right.
         self.mirrored = self.chance(0.5)
         self.roof = self.pick(("gable", "hip", "hip"))
-        # Width of a front wing, as a part of the house's.
+        # Width of a front wing, as a share of the width of the house.
         self.wing_width = self.uniform(0.3, 0.4)
-        # How far the front wings stand out.
+        # How far the front wings stand out from the house.
         self.reach = self.uniform(2.0, 4.0, 2)
         self.floor = self.uniform(0.1, 0.35, 2)
         self.window_pitch = self.uniform(2.6, 3.6)
@@ -353,14 +354,14 @@ class Bungalow(_FamilyHouse):
         `free` is the stretch in x of its front that no other wing hides [m].
         """
         x0, y0, x1, y1 = self.site.bounds
-        left, right = x0 + _BUNGALOW_MARGIN, x1 - _BUNGALOW_MARGIN
-        back = y1 - _BUNGALOW_MARGIN
+        left, right = x0 + _BUNGALOW_MARGIN_M, x1 - _BUNGALOW_MARGIN_M
+        back = y1 - _BUNGALOW_MARGIN_M
         width, depth = right - left, back - y0
         wanted = {"long": 0, "ell": 1, "court": 2}[self.plan]
         count = min(wanted, int(width / 6.5))
         ahead = min(1.9, 0.2 * depth)
         reach = min(self.reach, 0.3 * depth) if count else 0.0
-        front = y0 + max(ahead, _BUNGALOW_MARGIN + reach)
+        front = y0 + max(ahead, _BUNGALOW_MARGIN_M + reach)
         deep = min(back - front, 8.5)
         carport: outlines.Area | None = None
         if self.parking == "carport" and width > 13.0:
@@ -437,7 +438,7 @@ class SemiDetached(_FamilyHouse):
     def draw(self) -> None:
         """Samples sizes and style."""
         self.roof = self.pick(("gable", "hip"))
-        # Wanted slope of the roof.
+        # Wanted pitch of the roof.
         self.pitch_deg = self.uniform(30.0, 45.0)
         self.floor = self.uniform(0.15, 0.45, 2)
         self.window_pitch = self.uniform(2.4, 3.2)
@@ -450,7 +451,7 @@ class SemiDetached(_FamilyHouse):
         self.bay_reach = self.uniform(0.6, 1.0, 2)
         self.doors_inside = self.chance(0.5)
         self.porch_reach = self.uniform(1.1, 1.5, 2)
-        # Shape of their roofs, one on either side, or `none`.
+        # Roof of the two garages, one on either side, or `none`.
         self.garages = self.pick(("none", "flat", "shed", "hip"))
         self.garage_width = self.uniform(2.9, 3.4, 2)
         self.chimneys = self.pick(("middle", "ends"))
@@ -461,7 +462,7 @@ class SemiDetached(_FamilyHouse):
         The building's site must be a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
-        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+        left, right, back = x0 + _MARGIN_M, x1 - _MARGIN_M, y1 - _MARGIN_M
         front = y0 + min(2.4, 0.25 * (y1 - y0))
         deep = min(back - front, 10.0)
         has_garages = self.garages != "none" and right - left > 17.0

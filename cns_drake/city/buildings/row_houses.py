@@ -37,6 +37,7 @@ _FIREWALL_M = 0.25
 # cornice. Narrow houses may also have a gable to the street: `front`, or
 # `stepped` with steps on it.
 _ROOFS = ("gable", "gambrel", "flat", "front", "stepped")
+# Roofs of a shop house, of the same kinds.
 _ROOFS_ABOVE_SHOPS = ("flat", "gable", "gambrel", "front", "stepped")
 
 
@@ -65,7 +66,7 @@ class _HouseInARow(Building):
             casings: styles of the frames around the windows.
         """
         self.roof = self.pick(roofs)
-        # Rise of the roof, as a part of half its span.
+        # Rise of the roof, as a share of half its span.
         self.rise = self.uniform(0.75, 1.15)
         self.storey = self.uniform(2.75, 3.1)
         self.plinth = self.pick((0.2, 0.5, 0.8, 1.0))
@@ -76,7 +77,7 @@ class _HouseInARow(Building):
         # `none`, `canted`, `box` (on the ground) or `oriel` (above it).
         self.bay = self.pick(("none", "canted", "box", "oriel"))
         self.bay_storeys = self.whole(1, 4)
-        # Dormers, at most.
+        # Greatest number of dormers.
         self.dormers = self.whole(0, max(2, round(width / 2.2)))
         self.dormer = self.pick(("gable", "shed"))
         # Whether there is a hood above the door.
@@ -286,7 +287,7 @@ def _front_site(p: _HouseInARow) -> tuple[float, float, frozenset[int]]:
 
 
 # A house deeper than this gets a lower wing at its back [m].
-_MOST_DEPTH = 10.5
+_MOST_DEPTH_M = 10.5
 
 
 class RowHouse(_HouseInARow):
@@ -298,7 +299,7 @@ class RowHouse(_HouseInARow):
         self.draw_house(width, _ROOFS[:5] if width < 9.5 else _ROOFS[:3])
         self.stoop = 1.3
         self.floor = self.plinth
-        # Of the lower wing behind the house.
+        # Size and side of the lower wing behind the house.
         self.annex_height = self.uniform(2.8, 3.6, 2)
         self.annex_width = self.uniform(0.45, 0.65)
         self.annex_left = self.chance(0.5)
@@ -311,7 +312,7 @@ class RowHouse(_HouseInARow):
         _, y0, _, y1 = self.site.bounds
         left, right, blind = _front_site(self)
         front, back = y0 + self.stoop, y1 - 0.35
-        deep = min(back - front, _MOST_DEPTH)
+        deep = min(back - front, _MOST_DEPTH_M)
         if back - front - deep < 1.5:
             deep = back - front
         main = _add_unit(self, (left, front, right, front + deep), blind)
@@ -335,6 +336,7 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     openings.enclose((wing_walls.GLASS_M,))
 
 
+# Materials of the doors in a terrace.
 _DOORS = ("accent", "trim", "roof")
 
 
@@ -353,20 +355,20 @@ class Terrace(_HouseInARow):
         self.rise *= 0.8
         self.stoop = 1.6
         self.floor = min(self.plinth, 0.5)
-        # Bay of the houses that have one.
+        # Kind of bay window of the houses that have one.
         self.house_bay = self.bay
         if self.bay == "none":
             self.house_bay = "canted"
             self.bay_storeys = 1
         # Height by which every other pair of houses is lower.
         self.step = self.pick((0.0, 0.4, 0.8))
-        # Distance by which every other pair stands back.
+        # Distance by which every other pair of houses stands back.
         self.setback = self.pick((0.0, 0.0, 0.8))
-        # Part of the houses with their gable to the street.
+        # Share of the houses with a gable to the street.
         self.crossed = self.uniform(0.0, 0.35)
         # Whether doors lie side by side in pairs.
         self.paired = self.chance(0.6)
-        # Part of the houses with a bay window.
+        # Share of the houses with a bay window.
         self.bays = self.uniform(0.2, 0.9)
 
     def build(self) -> None:
@@ -418,15 +420,15 @@ class ShopHouse(_HouseInARow):
         self.draw_house(width, roofs if depth <= 14.0 else ("flat",))
         self.window_pitch = max(self.window_pitch, (width + depth) / 22)
         self.stoop = 0.35
-        # Height of the shops; they take a low house alone.
+        # Height of the shops. A low house contains nothing but shops.
         self.floor = self.uniform(3.5, 4.2, 2)
         if self.height - self.floor < 3.2:
             self.roof = "flat"
             self.floor = round(min(3.4, self.height - 1.6), 2)
         self.shop_width = self.uniform(4.5, 7.5)
-        # Part of the shops with an awning.
+        # Share of the shops with an awning.
         self.awnings = self.uniform(0.2, 0.9)
-        # Bay windows above the shops, at most.
+        # Greatest number of bay windows above the shops.
         self.oriels = self.whole(0, 3)
         # How far the band above the shops sticks out.
         self.course = self.uniform(0.08, 0.2, 2)

@@ -36,27 +36,27 @@ class UnfinishedTower(Building):
         """Samples sizes and style."""
         rise = self.height - self.uniform(3.5, 5.5)
         wanted = max(3, round(rise / self.uniform(3.4, 4.0)))
-        # Storeys that are placed as one.
+        # Number of storeys that together are one part.
         self.group = -(-wanted // 8)
-        # Slabs above the ground.
+        # Number of slabs above the ground.
         self.storeys = self.group * max(2, round(wanted / self.group))
         self.storey = round(rise / self.storeys, 3)
         self.pitch = self.uniform(6.0, 8.0)
-        # Extent of the core, as parts of the plan.
+        # Width and depth of the core, as shares of the tower's width and depth.
         self.core = (self.uniform(0.28, 0.4), self.uniform(0.28, 0.4))
-        # Storeys whose walls are finished.
+        # Number of storeys with finished walls.
         self.clad = self.group * self.whole(
             0, max(1, self.storeys // self.group // 2)
         )
-        # Edges with a scaffold.
+        # Numbers of the edges with a scaffold.
         self.scaffolds = self.pick(((0,), (0, 1), (0, 3), (1, 3)))
-        # Storeys it covers.
+        # Number of storeys that a scaffold covers.
         self.scaffold_top = min(self.whole(self.storeys // 2, self.storeys), 8)
-        # Part of the scaffold's bays behind a net.
+        # Share of a scaffold's bays that have a net.
         self.nets = self.uniform(0.2, 0.7)
         # Whether the top slab is still propped.
         self.props = self.chance(0.7)
-        # Whether a hoist climbs the back.
+        # Whether there is a hoist at the back.
         self.hoist = self.chance(0.6)
 
     def build(self) -> None:

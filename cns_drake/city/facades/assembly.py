@@ -26,6 +26,10 @@ from cns_drake.city.geometry import (
     object_mesh,
 )
 
+# Numbers of the front corners of a rectangular site.
+FRONT_LEFT = 0
+FRONT_RIGHT = 1
+
 
 @dataclass(frozen=True)
 class Site:
@@ -96,9 +100,9 @@ class Site:
 
     @property
     def free_corners(self) -> list[int]:
-        """The front corners (0 left, 1 right) that no blind wall touches."""
-        flanks = {0: {3, 0}, 1: {0, 1}}
-        return [k for k, e in flanks.items() if not e & self.blind_edges]
+        """The front corners of a rectangle that no blind wall touches."""
+        edges_at = {FRONT_LEFT: {3, 0}, FRONT_RIGHT: {0, 1}}
+        return [k for k, e in edges_at.items() if not e & self.blind_edges]
 
     def blind_in(self, number: int, count: int) -> frozenset[int]:
         """Returns the blind edges of one of several units side by side.

@@ -7,6 +7,7 @@ from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
+# Side of the square posts of a porch [m].
 _POST_M = 0.16
 
 

@@ -1,195 +1,27 @@
-"""Public buildings: schools and chapels."""
+"""The chapel."""
 
 import numpy as np
 
 from cns_drake.city.facades import (
     Band,
     Building,
-    Facade,
     Openings,
     Roof,
-    WallFrame,
     Wing,
     bays,
     free_stretches,
     outlines,
-    roofs,
     solids,
-    tiers,
     wing_roofs,
 )
 from cns_drake.city.geometry.mesh import Mesh
 
-_MARGIN = 0.6
-_RECESS = 0.16
-
-
-class School(Building):
-    """The school: classroom wings, a glazed entrance, a gymnasium."""
-
-    def draw(self) -> None:
-        """Samples sizes and style."""
-        site = self.site
-        deep = min(self.uniform(9.0, 12.0), site.depth - 4.5)
-        self.rise = round(self.uniform(0.26, 0.36) * deep, 2)
-        self.roof = self.pick(("hip", "flat", "flat"))
-        # Height of the walls below the roof.
-        body = self.height - (self.rise if self.roof == "hip" else 2.4)
-        if body < 3.6:
-            self.roof = "flat"
-            body = self.height - 1.0
-        # Width of the gymnasium; 0 for none.
-        self.gym = 0.0
-        if site.width > 34.0 and site.depth > 16.0:
-            gym = round(self.uniform(0.3, 0.38) * site.width, 1)
-            self.gym = min(gym, 28.0)
-        self.storeys = min(max(round(body / 3.5), 1), 4)
-        # Depth of the classroom wing.
-        self.depth = round(deep, 1)
-        # Whether there is a wing behind.
-        self.wing = site.depth > 22.0 and self.chance(0.8)
-        # Whether gymnasium and wing stand on the left.
-        self.mirrored = self.chance(0.5)
-        self.gym_roof = self.pick(("barrel", "shed", "flat"))
-        # Width of a classroom's window group.
-        self.pitch = max(self.uniform(3.2, 4.4), site.width / 15)
-        self.mullions = self.whole(1, 3)
-        # Width of the glazed hall.
-        self.entrance = self.uniform(4.5, 6.5, 1)
-        self.roof_items = self.draw_roof_items(
-            "air_handler vents skylight skylight vents", 2, 6
-        )
-
-    def build(self) -> None:
-        """Adds all parts of the school, with the entrance in front.
-
-        The building's site must be a rectangle.
-        """
-        x0, y0, x1, y1 = self.site.bounds
-        front = y0 + 3.2
-        left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
-        gym = self.gym + 1.5 * (self.gym > 0)
-        a, b = (left + gym, right) if self.mirrored else (left, right - gym)
-        bar = np.round(outlines.rectangle(a, front, b, front + self.depth), 2)
-        top = _add_classes(self, bar)
-        _add_entrance(self, bar, top)
-        if self.wing and back - bar[2, 1] > 6.0:
-            _add_back_wing(self, bar, back, top)
-        if self.gym:
-            xs = (left, a + 0.05) if self.mirrored else (b - 0.05, right)
-            _add_gym(self, xs, (front, back), bar)
-
-
-def _add_classes(p: School, bar: np.ndarray) -> float:
-    """Adds the classroom wing; returns the top of its walls [m]."""
-    room = p.height - (p.rise + 0.1 if p.roof == "hip" else 2.4)
-    storey = round(max(room, 3.2) / p.storeys, 3)
-    if p.roof == "flat" and p.storeys == 1:
-        storey = min(storey, p.height - 1.0)
-    head = storey - 0.6
-    group = bays.window(p.pitch - 0.9, 0.9, head, _RECESS, mullions=p.mullions)
-    small = bays.window(1.4, 1.2, head, _RECESS)
-    layouts = {
-        0: bays.rhythm(p.pitch, [group], 0.5),
-        2: bays.rhythm(p.pitch, [small], 0.5),
-    }
-    layout = bays.by_edge(layouts, bays.alone(small, 2.4))
-    walls = Facade(storey, (Band(0.0, 0.3, -0.06),), layout, (_RECESS,))
-    p.add("foundation", solids.foundation(bar))
-    top = tiers.add_storeys(p, bar, walls, 0.0, p.storeys, 1)
-    if p.roof == "hip":
-        roof = roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
-        p.add("hip", roof, finish=p.colours["roof"])
-        return top
-    rim = 0.7
-    crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))
-    tiers.add_crown(p, bar, crown, top, 0.5, items=p.roof_items)
-    return top
-
-
-def _add_entrance(p: School, bar: np.ndarray, top: float) -> None:
-    """Adds a glazed stair hall with steps and a canopy on posts."""
-    wall = WallFrame(bar, 0)
-    share = 0.72 if p.mirrored else 0.28
-    x = share * wall.length
-    half = min(p.entrance, 0.4 * wall.length) / 2
-    x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
-    high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
-    x0, y0 = wall.point(x - half, 1.2)
-    hall = Wing.flat((x0, y0, x0 + 2 * half, bar[0, 1] + 4.0), high, 0.4)
-    openings = Openings(p, hall)
-    glazing = bays.window(
-        2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
-    )
-    openings.replace_by_bay(0, half, 2 * half - 0.4, glazing)
-    doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
-    openings.add_reliefs(0, doors(0.2, 2 * half - 0.2))
-    openings.enclose((_RECESS,), material="accent")
-    front = hall.wall(0)
-    a, b = -0.8, 2 * half + 0.8
-    posts = (
-        front.standing(u - 0.1, u + 0.1, 1.4, 1.6, 2.65)
-        for u in (a + 0.3, b - 0.3)
-    )
-    step = front.standing(a, b, -0.02, 1.8, 0.15, bottom=True)
-    p.add_to("trim", front.box(a, b, -0.02, 1.75, 2.6, 2.85), *posts, step)
-
-
-def _add_back_wing(p: School, bar: np.ndarray, back: float, top: float) -> None:
-    """Adds a lower wing at the back, on the side away from the gymnasium."""
-    (a, _), (b, y) = bar[0], bar[2]
-    wide = min(9.0, 0.4 * (b - a))
-    x0 = b - wide - 0.3 if p.mirrored else a + 0.3
-    high = min(top, 4.2 if p.storeys < 3 else 7.6)
-    area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
-    openings = Openings(p, Wing.flat(area, high, 0.4, rim=0.6))
-    for k in range(2 if high > 6.0 else 1):
-        z = 3.4 * k
-        pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
-        openings.add_bays((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
-    openings.enclose((_RECESS,), material="gym")
-
-
-def _add_gym(p: School, xs: bays.Span, ys: bays.Span, bar: np.ndarray) -> None:
-    """Adds the gymnasium with high windows, and its link to the school."""
-    a, b = xs
-    x0, x1 = (a, b - 1.5) if p.mirrored else (a + 1.5, b)
-    y0 = ys[0] + 1.0
-    y1 = min(ys[1], y0 + 24.0)
-    top = min(p.height, 9.5)
-    drop = {"barrel": 0.16 * (x1 - x0), "shed": 1.2}.get(p.gym_roof, 0.3)
-    wall = max(top - drop, 0.55 * top)
-    eaves = 0.0 if p.gym_roof == "barrel" else 0.4
-    roof = Roof(p.gym_roof, True, eaves, 0.4, 0.25, parapet=0.5)
-    gym = Wing.at((x0, y0, x1, y1), wall, top, roof)
-    link_y = min(bar[2, 1], y1) - 3.4
-    ends = (bar[1, 0] - 0.1, x0 + 0.1)
-    if p.mirrored:
-        ends = (min(x1, bar[1, 0]) - 0.1, bar[0, 0] + 0.1)
-    link = Wing.flat(
-        (ends[0], link_y, ends[1], link_y + 3.0), 3.4, 0.2, rim=0.3
-    )
-    boxes = (gym, link)
-    openings = Openings(p, gym, boxes)
-    high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
-    openings.add_bays((1, 2, 3), 3.5, 3.6, [high], 0.9)
-    openings.replace_by_bay(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
-    for edge in (1, 3):
-        side = gym.wall(edge)
-        for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
-            pier = side.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
-            p.add_to("accent", pier)
-    openings.enclose((_RECESS,), material="gym")
-    passage = Openings(p, link, boxes)
-    passage.add_bays(
-        (0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3
-    )
-    passage.enclose((_RECESS,), material="trim")
-
-
-_CHAPEL_MARGIN = 0.45
-_CHAPEL_RECESS = 0.22
-_THICK = 0.2
+# Free strip around the walls, for eaves and buttresses [m].
+_MARGIN_M = 0.45
+# Depth of the windows behind the wall [m].
+_RECESS_M = 0.22
+# Vertical thickness of the roof of the nave [m].
+_ROOF_M = 0.2
 
 
 class Chapel(Building):
@@ -205,9 +37,9 @@ class Chapel(Building):
         if self.height >= 13.0:
             self.belfry = self.pick(("front", "side", "front"))
         self.spire = self.pick(("needle", "broach", "cap"))
-        # Side of the tower.
+        # Length of a side of the tower.
         self.tower = round(self.uniform(0.24, 0.3) * wide + 0.6, 2)
-        # Width of the nave, as a part of the site's.
+        # Width of the nave, as a share of the width of the site.
         self.nave = self.uniform(0.62, 0.72)
         self.pitch_deg = self.uniform(44.0, 54.0)
         # Distance between the side windows.
@@ -228,16 +60,16 @@ class Chapel(Building):
         """
         x0, y0, x1, y1 = self.site.bounds
         if y1 - y0 >= x1 - x0:
-            _add_all(self, x1 - x0, y1 - y0)
+            _add_parts(self, x1 - x0, y1 - y0)
             self.turn((x0, y0, 0.0), 0.0)
         else:
             # The chapel is built along y, then turned by a quarter to the
             # right.
-            _add_all(self, y1 - y0, x1 - x0)
+            _add_parts(self, y1 - y0, x1 - x0)
             self.turn((x0, y1, 0.0), -np.pi / 2)
 
 
-def _add_all(p: Chapel, width: float, length: float) -> None:
+def _add_parts(p: Chapel, width: float, length: float) -> None:
     """Adds the chapel on 0..width by 0..length, with its door at y = 0."""
     nave = _nave(p, width, length)
     boxes = [nave]
@@ -267,17 +99,17 @@ def _add_all(p: Chapel, width: float, length: float) -> None:
 def _nave(p: Chapel, width: float, length: float) -> Wing:
     wide = min(p.nave * width, 11.0)
     if p.belfry == "side":
-        wide = min(wide, width - p.tower - 2 * _CHAPEL_MARGIN - 0.1)
+        wide = min(wide, width - p.tower - 2 * _MARGIN_M - 0.1)
     x = (width - wide) / 2
     if p.belfry == "side":
-        x = _CHAPEL_MARGIN if p.mirrored else width - _CHAPEL_MARGIN - wide
-    ahead = 0.6 * p.tower + _CHAPEL_MARGIN if p.belfry == "front" else 2.4
+        x = _MARGIN_M if p.mirrored else width - _MARGIN_M - wide
+    ahead = 0.6 * p.tower + _MARGIN_M if p.belfry == "front" else 2.4
     rise = min(wing_roofs.ridge_rise(wide, p.pitch_deg), 0.42 * p.height)
     share = 0.8 if p.belfry == "cote" else 0.62
     top = min(share * p.height, rise + 7.5)
-    wall_top = max(top - rise - _THICK, 0.35 * top)
-    roof = Roof("gable", True, 0.35, 0.25, _THICK)
-    back = min(length - _CHAPEL_MARGIN, ahead + 2.6 * wide)
+    wall_top = max(top - rise - _ROOF_M, 0.35 * top)
+    roof = Roof("gable", True, 0.35, 0.25, _ROOF_M)
+    back = min(length - _MARGIN_M, ahead + 2.6 * wide)
     return Wing.at((x, min(ahead, 0.3 * length), x + wide, back), wall_top, top,
                    roof)  # fmt: skip
 
@@ -298,7 +130,7 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
     openings = Openings(p, nave, boxes)
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
-    lancet = bays.arched(1.0, 1.2, spring, _CHAPEL_RECESS, rise=0.7)
+    lancet = bays.arched(1.0, 1.2, spring, _RECESS_M, rise=0.7)
     openings.add_bays((1, 3), 1.5, p.bay, [lancet], 1.0)
     middle = nave.width / 2
     if p.belfry != "front":
@@ -310,8 +142,8 @@ def _add_nave(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
                 0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4)
             )
     low = high + 0.2 * (nave.top - high)
-    rose = wing_roofs.attic_window(1.3, low, low + 1.6, _CHAPEL_RECESS)
-    openings.enclose((_CHAPEL_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
+    rose = wing_roofs.attic_window(1.3, low, low + 1.6, _RECESS_M)
+    openings.enclose((_RECESS_M,), (Band(0.0, 0.45, -0.08),), attic=rose)
 
 
 def _add_buttresses(p: Chapel, nave: Wing, boxes: list[Wing]) -> None:
@@ -333,8 +165,8 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
     openings = Openings(p, tower, boxes)
     side, top = tower.width, tower.wall_top
     width = round(min(1.2, 0.4 * side), 2)
-    louvre = bays.arched(width, top - 2.6, top - 1.3, _CHAPEL_RECESS)
-    slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _CHAPEL_RECESS)
+    louvre = bays.arched(width, top - 2.6, top - 1.3, _RECESS_M)
+    slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _RECESS_M)
     for edge in range(4):
         openings.replace_by_bay(edge, side / 2, width + 0.7, louvre)
         if p.belfry != "side" or edge != 3 - 2 * p.mirrored:
@@ -345,7 +177,7 @@ def _add_tower(p: Chapel, tower: Wing, boxes: list[Wing]) -> None:
         openings.replace_by_bay(0, side / 2, width + 0.6, door)
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
-    openings.add_walls((_CHAPEL_RECESS,), bands)
+    openings.add_walls((_RECESS_M,), bands)
     p.add_to("roof", *_spire(p, tower))
     p.add_to("trim", *_cross(*tower.center, p.height - 1.3, p.height))
 
@@ -410,7 +242,7 @@ def _add_porch(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
     openings = Openings(p, wing, boxes)
     arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
     openings.replace_by_bay(0, wing.width / 2, 2.2, arch)
-    openings.enclose((_CHAPEL_RECESS,))
+    openings.enclose((_RECESS_M,))
 
 
 def _add_vestry(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
@@ -418,9 +250,9 @@ def _add_vestry(p: Chapel, wing: Wing, boxes: list[Wing]) -> None:
     openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     openings.add_bays(
-        range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _CHAPEL_RECESS)]
+        range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _RECESS_M)]
     )
-    openings.enclose((_CHAPEL_RECESS,))
+    openings.enclose((_RECESS_M,))
 
 
 def _porch(nave: Wing) -> Wing:
@@ -434,7 +266,7 @@ def _porch(nave: Wing) -> Wing:
 
 def _vestry(nave: Wing, width: float) -> Wing | None:
     """Returns a vestry beside the choir, or None if there is no room for it."""
-    room = width - _CHAPEL_MARGIN - nave.x1, nave.x0 - _CHAPEL_MARGIN
+    room = width - _MARGIN_M - nave.x1, nave.x0 - _MARGIN_M
     side = int(room[1] > room[0])
     if room[side] < 1.5:
         return None

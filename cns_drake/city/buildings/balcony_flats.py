@@ -1,0 +1,253 @@
+"""The white slab block with stacks of balconies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import itertools
+
+import numpy as np
+
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Facade,
+    Relief,
+    Site,
+    WallFrame,
+    balconies,
+    bays,
+    equip_roof,
+    outlines,
+    tiers,
+)
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+# Room for balconies in front, and for canopies [m].
+_FRONT_M = 1.7
+
+
+class BalconyFlats(Building):
+    """The white slab block: stacks of balconies, staggered sections."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        site = self.site
+        room = site.depth - 2.0
+        # Distance by which every other section stands back.
+        self.stagger = self.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
+        # Number of sections of the slab, each with its own stair.
+        self.sections = min(max(round(site.width / 18.0), 1), 3)
+        # Number of storeys by which every other section is lower.
+        self.step = self.whole(0, 2)
+        self.depth = round(
+            min(room - self.stagger, self.uniform(11.0, 14.0)), 1
+        )
+        self.storey = self.uniform(2.8, 3.1)
+        self.pitch = max(self.uniform(2.8, 3.6), site.width / 16)
+        self.window_width = self.uniform(1.3, 2.0, 2)
+        self.recess = self.uniform(0.12, 0.22, 2)
+        self.balcony_width = self.uniform(2.8, 3.8, 2)
+        self.balcony_reach = self.uniform(1.1, 1.5, 2)
+        # `stacks` (one above the other), `ribbons` (all along the front) or
+        # `checks` (every other one left out).
+        self.balconies = self.pick(("stacks", "ribbons", "checks"))
+        self.rail = self.uniform(0.9, 1.1, 2)
+        # `slit` (a strip of glass) or `tower` (stands out in front).
+        self.stair = self.pick(("slit", "tower"))
+        self.roof_items = self.draw_roof_items(
+            "stair_house tank mast vents dish", 1, 6
+        )
+
+    def build(self) -> None:
+        """Adds all parts of the slab block, which lies along the front.
+
+        The building's site must be a rectangle.
+        """
+        sections = _sections(self, self.site)
+        plan, fronts = _outline(sections)
+        storeys = max(2, round((self.height - 1.9) / self.storey))
+        lower = self.step if self.sections > 1 and storeys > 3 else 0
+        storey = (self.height - 1.9) / storeys
+        walls = [_Front(self, plan, edge) for edge in fronts]
+        ground = _storey_walls(self, storey, walls, ground=True)
+        top = tiers.add_ground(self, plan, ground)
+        count, per_group, exact = tiers.storey_groups(
+            (storeys - 1 - lower) * storey, storey, 5
+        )
+        facade = _storey_walls(self, exact, walls)
+        top = tiers.add_storeys(self, plan, facade, top, count, per_group)
+        common = count * per_group
+        _add_balconies(self, walls, ground.height, (count, per_group, exact))
+        for k, section in enumerate(sections):
+            part = f"section_{k}"
+            high = top
+            if lower and k % 2 == 0:
+                rows = bays.rhythm(self.pitch, [_window(self, exact)], 0.5)
+                attic = Facade(exact, (), rows, (self.recess,))
+                high = tiers.add_storeys(
+                    self, section, attic, top, 1, lower, part=f"{part}_storey"
+                )
+            rim = Facade(0.9, (Band(0.0, 0.15, -0.08), Band(0.75, 0.9, -0.08)))
+            roof = tiers.add_crown(
+                self, section, rim, high, 0.6, part=f"{part}_crown",
+                thickness=0.25,
+            )  # fmt: skip
+            items = self.roof_items[k :: self.sections]
+            equip_roof(self, section, roof, items, prefix=f"{part}_")
+        high = ground.height + common * exact
+        stairs = []
+        for k, wall in enumerate(walls):
+            stairs += _stair(self, wall, high, k == 0)
+        self.add("stairs", *stairs, finish=self.colours["rail"])
+
+
+def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
+    """Returns the outlines of the rectangular sections, left to right."""
+    x0, y0, x1, _ = site.bounds
+    bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
+    fronts = [y0 + _FRONT_M + p.stagger * (k % 2) for k in range(p.sections)]
+    return [
+        outlines.rectangle(a, round(y, 2), b, round(y + p.depth, 2))
+        for (a, b), y in zip(itertools.pairwise(bounds), fronts, strict=True)
+    ]
+
+
+def _window(p: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
+    return bays.window(p.window_width, sill, storey - 0.45, p.recess)
+
+
+def _storey_walls(
+    p: BalconyFlats, storey: float, walls: list[_Front], *, ground: bool = False
+) -> Facade:
+    """Returns a storey's walls; the ground floor has doors and a plinth."""
+    window, french = _window(p, storey), _window(p, storey, 0.12)
+    slit = bays.window(1.3, 0.3, storey, p.recess)
+    door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)
+    by_front = {front.edge: front for front in walls}
+    blank = bays.alone(bays.window(1.0, 1.0, storey - 0.5, p.recess), 2.0)
+    rows = bays.rhythm(p.pitch, [window], 0.5)
+
+    def layout(edge: int, length: float) -> Sequence[Relief]:
+        if edge not in by_front:
+            return (rows if length > 15.0 else blank)(edge, length)
+        front = by_front[edge]
+        relief: list[Relief] = []
+        for k, (a, b) in enumerate(front.cells):
+            if k == front.middle:
+                if ground:
+                    relief += door(a, b)
+                elif p.stair == "slit":
+                    relief += slit(a, b)
+            else:
+                has_balcony = k in front.spots and not ground
+                relief += (french if has_balcony else window)(a, b)
+        return relief
+
+    band = Band(0.0, 0.35, -0.06) if ground else Band(0.0, 0.12, -0.04)
+    return Facade(round(storey, 3), (band,), layout, (p.recess,))
+
+
+def _add_balconies(
+    p: BalconyFlats,
+    walls: list[_Front],
+    z0: float,
+    stack: tuple[int, int, float],
+) -> None:
+    """Adds the balconies of several storeys, one above another."""
+    groups, per_group, storey = stack
+    pieces: list[Mesh] = []
+    joined = p.balconies == "ribbons"
+    for front in walls:
+        for a, b in _balcony_stretches(front.cells, front.spots, joined):
+            width = b - a - 0.3
+            if not joined:
+                width = min(width, p.balcony_width)
+            x = (a + b) / 2
+            ends = round(x - width / 2, 2), round(x + width / 2, 2)
+            balcony = balconies.balcony(*ends, p.balcony_reach, 0.0, p.rail)
+            pieces += [
+                front.wall.place(balcony, k * storey) for k in range(per_group)
+            ]
+    if pieces:
+        mesh = merge_meshes(*pieces)
+        step = per_group * storey
+        p.stack("balconies", mesh, z0, step, groups, finish=p.colours["rail"])
+
+
+def _stair(
+    p: BalconyFlats, front: _Front, top: float, highest: bool
+) -> list[Mesh]:
+    """Returns a canopy over the door, and what shows of the stair.
+
+    That is a stair tower in front of the wall, or on the highest section a
+    house on the roof.
+    """
+    x, wall = front.stair, front.wall
+    pieces = [
+        wall.box(x - 1.5, x + 1.5, -0.05, 1.4, 2.55, 2.75),
+        wall.standing(x - 1.4, x - 1.25, 1.1, 1.25, 2.6),
+        wall.standing(x + 1.25, x + 1.4, 1.1, 1.25, 2.6),
+    ]
+    if p.stair == "tower":
+        high = p.height if highest else top + 1.6
+        pieces.append(wall.box(x - 1.5, x + 1.5, -2.5, 0.9, 2.7, high))
+        for k in range(int((high - 4.2) / p.storey)):
+            z = 3.7 + k * p.storey
+            pieces.append(wall.box(x - 0.55, x + 0.55, 0.85, 0.98, z, z + 1.1))
+    elif highest:
+        spot = (x - 2.2, x + 2.2, -5.0, -1.5)
+        pieces.append(wall.box(*spot, top - 0.1, p.height))
+    return pieces
+
+
+def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
+    """Returns the outline of all sections, and which edges are in front."""
+    points: list[np.ndarray] = []
+    fronts = []
+    for section in sections:
+        if not points or abs(points[-1][1] - section[0, 1]) > 1e-6:
+            points.append(section[0])
+        fronts.append(len(points) - 1)
+        points.append(section[1])
+    for section in reversed(sections):
+        if abs(points[-1][1] - section[2, 1]) > 1e-6:
+            points.append(section[2])
+        points.append(section[3])
+    return np.array(points), fronts
+
+
+class _Front:
+    """The front wall of a section, with the bays of stair and balconies."""
+
+    def __init__(self, p: BalconyFlats, plan: np.ndarray, edge: int) -> None:
+        self.edge = edge
+        self.wall = WallFrame(plan, edge)
+        self.cells = bays.stretches(self.wall.length, p.pitch, 0.5)
+        self.middle = len(self.cells) // 2
+        free = [k for k in range(len(self.cells)) if k != self.middle]
+        if p.balconies == "ribbons":
+            self.spots = free
+        elif p.balconies == "checks":
+            self.spots = free[::2]
+        else:
+            last = len(self.cells) - 1
+            self.spots = [k for k in free if min(k, last - k) % 3 != 1]
+
+    @property
+    def stair(self) -> float:
+        """Middle of the stair's bay along the wall [m]."""
+        return sum(self.cells[self.middle]) / 2
+
+
+def _balcony_stretches(
+    cells: list[bays.Span], spots: list[int], joined: bool
+) -> list[bays.Span]:
+    """Returns stretches with balconies; neighbours are merged if `joined`."""
+    runs: list[tuple[float, float]] = []
+    for k in spots:
+        a, b = cells[k]
+        if joined and runs and abs(runs[-1][1] - a) < 1e-6:
+            runs[-1] = (runs[-1][0], b)
+        else:
+            runs.append((a, b))
+    return runs

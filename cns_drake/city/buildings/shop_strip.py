@@ -1,0 +1,119 @@
+"""The strip of shops."""
+
+import numpy as np
+
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Openings,
+    Roof,
+    Wing,
+    bays,
+    equip_roof,
+    wing_walls,
+)
+
+# Kept free in front for canopies [m].
+_FRONT_M = 0.4
+# Kept free behind for gutters [m].
+_BACK_M = 0.1
+
+
+class ShopStrip(Building):
+    """The strip of shops: low flat-roofed units side by side, all different."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        # Height of the shops without their parapets.
+        self.ground = round(min(self.uniform(3.6, 4.2), self.height - 0.5), 2)
+        self.unit_width = self.uniform(5.5, 9.0)
+        # Share of the units with upper floors, if the strip is high enough.
+        self.upper = self.uniform(0.2, 0.7)
+        # Whether one canopy runs along all shops; otherwise shops have awnings.
+        self.canopy = self.chance(0.45)
+        self.canopy_reach = self.uniform(0.9, 1.3, 2)
+        # Step from one height of a parapet to the next.
+        self.steps = self.uniform(0.3, 0.6, 2)
+        self.roof_items = self.draw_roof_items(
+            "ac_unit ac_unit vents skylight", 1, 5
+        )
+
+    def build(self) -> None:
+        """Adds all parts of the shops, side by side along the front.
+
+        The building's site must be a rectangle.
+        """
+        site = self.site
+        x0, y0, x1, y1 = site.bounds
+        count = max(1, round((x1 - x0) / self.unit_width))
+        shares = self.rng.uniform(0.8, 1.2, count)
+        bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
+        highest = self.whole(0, count)
+        for k in range(count):
+            blind = self.site.blind_in(k, count)
+            tall = self.height > self.ground + 3.4 and (
+                k == highest or self.chance(self.upper)
+            )
+            top = self.height if k == highest else _parapet_top(self, tall)
+            back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
+            area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
+            roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
+            wing = Wing.at(area, top - 0.1, top, roof, blind)
+            _add_unit(self, wing, tall)
+            if k % 3 == 0:
+                part = f"unit_{k}_"
+                equip_roof(
+                    self, wing.outline, wing.floor, self.roof_items, prefix=part
+                )
+
+
+def _parapet_top(p: ShopStrip, tall: bool) -> float:
+    """Returns the parapet's height for a unit that is not the highest [m]."""
+    drop = p.steps * p.whole(0, 3)
+    if tall or p.height < p.ground + 3.4:
+        return round(max(p.height - drop, p.ground + 0.4), 2)
+    return round(p.ground + 0.5 + 0.5 * drop, 2)
+
+
+def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
+    openings = Openings(p, wing)
+    wall = wing.wall(0)
+    cladding = "walls" if p.chance(0.5) else "facing"
+    upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
+    storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
+    width = p.uniform(1.1, 2.2, 2)
+    openings.add_window_storeys(
+        (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
+        head=min(2.3, storey - 0.4),
+    )  # fmt: skip
+    openings.add_shops(0, 0.2, wall.length - 0.2, p.ground,
+        width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
+    )  # fmt: skip
+    back = [bays.gate(2.0, 2.2, 0.2), wing_walls.sash(1.0, 0.0, 1.6, 2.3)]
+    openings.add_bays((2,), 0.5, 3.6, back, 0.7)
+    glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
+    openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
+    if p.canopy:
+        z = p.ground - 0.95
+        reach = p.canopy_reach
+        lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
+        p.add_to("awning", wall.box(*lid))
+    _add_parapet(p, wing, cladding)
+
+
+def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
+    """Adds a coping along the parapet's front, or piers at its ends."""
+    wall = wing.wall(0)
+    top = wing.top
+    length = wall.length
+    if p.chance(0.5):
+        coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
+        p.add_to("trim", wall.box(*coping))
+    else:
+        for x in (0.25, length - 0.25):
+            pier = (x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
+            p.add_to(cladding, wall.box(*pier))
+    visible = top - p.ground - 0.1 > 0.6 and top < p.height - 3.0
+    if p.chance(0.4) and visible:
+        sign = (0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7)
+        p.add_to("sign", wall.box(*sign))
