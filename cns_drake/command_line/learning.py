@@ -70,7 +70,10 @@ def train(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies.training import TrainingPlan, make_weights
+        from cns_drake.studies.training.weights import (
+            TrainingPlan,
+            make_weights,
+        )
 
     cluster = choose_cluster(jobs, scheduler)
     fields: dict[str, int | bool] = {"seed": seed}

@@ -6,6 +6,7 @@ from typing import Literal, get_type_hints
 from pydantic import ConfigDict, create_model
 
 from cns_drake.base.errors import InputError, validated
+from cns_drake.studies.conditions import Condition
 from cns_drake.studies.nested_fields import Changes
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 
@@ -52,3 +53,10 @@ def protocol_from_fields(
         option, _, fault = str(error).removeprefix("--").partition(":")
         name = option.replace("-", "_")
         raise InputError(f"{source}: {place}.{name}:{fault}") from None
+
+
+def condition_protocol(
+    condition: Condition, source: object
+) -> RetrievalProtocol:
+    """Returns the protocol of a condition, as by `protocol_from_fields`."""
+    return protocol_from_fields(condition.changes.get("protocol", {}), source)

@@ -31,7 +31,7 @@ def planned(output, *overrides):
         "levels",
         Cluster(),
     )
-    drives = list(study._map_drives(()))
+    drives = list(study._maps.pairs(()))
     study._plan(drives)
     return study, drives
 
@@ -49,7 +49,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     found = {}
     study, maps = planned(tmp_path)
     worlds = {}
-    for one, compared in itertools.chain(*map(study._simulated_pairs, maps)):
+    for one, compared in itertools.chain(*map(study._simulated.pairs, maps)):
         key = one.map_name, one.factors["level"]
         found.setdefault(key, []).append(frozen_print(compared, worlds))
     assert frozen == {

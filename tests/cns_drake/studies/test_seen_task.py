@@ -123,4 +123,4 @@ def test_a_city_that_does_not_age_has_no_such_numbers(tmp_path):
     )
     study = Study(wanted, tmp_path / "out", "mine.yaml", Cluster())
     with pytest.raises(InputError, match="no condition that can be measured"):
-        study._plan(study._map_drives(()))
+        study._plan(study._maps.pairs(()))

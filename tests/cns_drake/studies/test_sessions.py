@@ -189,7 +189,7 @@ def test_costs_grow_with_what_is_measured(town, tmp_path):
             **SIMULATED,
         )
         study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-        jobs = study._plan(study._map_drives(())).jobs
+        jobs = study._plan(study._maps.pairs(())).jobs
         found: dict[str, float] = {}
         for name, job in jobs.items():
             kind = name.partition(" ")[0]
@@ -215,7 +215,7 @@ def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
 
     def cost():
         study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-        jobs = study._plan(study._map_drives(())).jobs
+        jobs = study._plan(study._maps.pairs(())).jobs
         return sum(job.cost for job in jobs.values())
 
     usual = cost()
@@ -488,7 +488,7 @@ def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
         **SIMULATED,
     )
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    jobs = study._plan(study._map_drives(())).jobs
+    jobs = study._plan(study._maps.pairs(())).jobs
     (upkeep,) = [name for name in jobs if name.startswith("upkeep ")]
     waiting = [one.name for one in jobs.values() if upkeep in one.needs]
     kinds = sorted(name.partition(" ")[0] for name in waiting)
@@ -517,9 +517,9 @@ def test_no_map_is_updated_by_drives_through_a_city_to_come(
         **SIMULATED,
     )
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    for some in study._map_drives(()):
-        study._request_maps(some)
-    assert not study._upkeep
+    for some in study._maps.pairs(()):
+        study._simulated.request_maps(some)
+    assert not study._simulated.upkeep
 
 
 @pytest.mark.slow

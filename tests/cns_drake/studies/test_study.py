@@ -70,9 +70,9 @@ def measure(wanted, output, **options):
 def planned(wanted, output, **options):
     """The jobs of an experiment, and the comparisons that they measure."""
     study = Study(wanted, output, "mine.yaml", Cluster(), **options)
-    drives = list(study._map_drives(()))
+    drives = list(study._maps.pairs(()))
     for some in drives:
-        study._request_maps(some)
+        study._simulated.request_maps(some)
     made = study._plan(drives)
     return made.jobs, made.measured
 
@@ -775,10 +775,12 @@ def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
     )
     wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    monkeypatch.setattr(study, "_pairs", lambda folder: [(folder, folder)])
+    monkeypatch.setattr(
+        study._maps, "_drive_pairs", lambda folder: [(folder, folder)]
+    )
     found = {
         one.factors["both.redraw.frozen"]: one.pairs[0][0].name
-        for one in study._drives_of("suburbia")
+        for one in study._maps._pairs_of("suburbia")
     }
     numbers = given if isinstance(given, list) else [given]
     assert found == {one: f"suburbia_f{one:02d}" for one in numbers}
@@ -829,10 +831,10 @@ def test_maps_on_the_command_line(town, tmp_path):
         maps=["suburbia", {"name": "a", "age": "x", "years": 2, "seed": 1}],
     )
     study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    (drives,) = study._map_drives([str(town)])
+    (drives,) = study._maps.pairs([str(town)])
     assert drives.map_name == "town"
     with pytest.raises(InputError, match="maps: a: no map 'x'"):
-        list(study._map_drives(["a"]))
+        list(study._maps.pairs(["a"]))
 
 
 def test_each_part_of_years_has_a_job_of_its_own(tmp_path):

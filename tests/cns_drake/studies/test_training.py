@@ -8,18 +8,21 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import draw_route
-from cns_drake.studies import training
 from cns_drake.studies.redrawing import marked_yaml
-from cns_drake.studies.training import (
-    MAPS,
-    Sampler,
-    TrainingPlan,
-    TrainingScans,
+from cns_drake.studies.training import batches, descent
+from cns_drake.studies.training.batches import BatchSampler, TrainingScans
+from cns_drake.studies.training.descent import train
+from cns_drake.studies.training.network import (
+    features,
+    scores,
     start_parameters,
-    train,
+)
+from cns_drake.studies.training.sampled_streets import draw_streets
+from cns_drake.studies.training.weights import (
+    MAPS,
+    TrainingPlan,
     write_weights,
 )
-from cns_drake.studies.training_drives import draw_streets
 from evaluation.methods.learned import Learned, LearnedConfig, LearnedScan
 from evaluation.methods.polar_images import CHANNELS, RINGS, SECTORS
 
@@ -45,12 +48,12 @@ def toy_scans(num_cities=2, num_drives=2, length=60):
                 np.concatenate(drives),
             )
         )
-    return TrainingScans.of(parts)
+    return TrainingScans.joined(parts)
 
 
 def test_batches_hold_what_they_say():
     scans = toy_scans()
-    batch = Sampler(scans, seed=4).batch(9)
+    batch = BatchSampler(scans, seed=4).batch(9)
     num_queries, num_places = batch.weights.shape
     assert num_places == 2 * num_queries
     assert len(batch.images) == num_queries + num_places
@@ -60,15 +63,15 @@ def test_batches_hold_what_they_say():
     number = np.arange(num_queries)
     assert (batch.weights[number, 2 * number] > 0.0).all()
     assert (batch.weights[number, 2 * number + 1] == 0.0).all()
-    again = Sampler(scans, seed=4).batch(9)
+    again = BatchSampler(scans, seed=4).batch(9)
     assert np.array_equal(batch.images, again.images)
-    other = Sampler(scans, seed=4).batch(10)
+    other = BatchSampler(scans, seed=4).batch(10)
     assert not np.array_equal(batch.images, other.images)
 
 
 def test_drives_that_never_meet_are_refused():
     with pytest.raises(InputError, match="no city has two drives"):
-        Sampler(toy_scans(num_drives=1), seed=1)
+        BatchSampler(toy_scans(num_drives=1), seed=1)
     scans = toy_scans(num_cities=1)
     away = TrainingScans(
         scans.images,
@@ -77,7 +80,7 @@ def test_drives_that_never_meet_are_refused():
         scans.drives,
     )
     with pytest.raises(InputError, match="hardly meet"):
-        Sampler(away, seed=1).batch(0)
+        BatchSampler(away, seed=1).batch(0)
 
 
 @pytest.mark.slow
@@ -86,13 +89,13 @@ def test_jax_scores_as_the_method_does(tmp_path):
     images = toy_scans(1, 1, 6).images
     write_weights(tmp_path / "w.npz", values, (0.0, 1.0), {"seed": 5})
     method = Learned(LearnedConfig(weights=tmp_path / "w.npz"))
-    maps = np.asarray(training.features(values, images))
+    maps = np.asarray(features(values, images))
     described = []
     for image, one in zip(images, maps, strict=True):
         found = method.describe_image(image)
         assert found.features == pytest.approx(one, abs=1e-5)
         described.append(LearnedScan(one))
-    expected = np.asarray(training.scores(maps, maps))
+    expected = np.asarray(scores(maps, maps))
     database = method.build_database(described)
     for number, query in enumerate(described):
         assert method.score(query, database) == pytest.approx(
@@ -114,13 +117,13 @@ def test_the_same_seed_and_an_interruption(tmp_path, monkeypatch):
         return steps[0]
 
     monkeypatch.setattr(jax, "jit", once)
-    monkeypatch.setattr(training, "_KEPT_EVERY", 2)
-    monkeypatch.setattr(training, "_CLUSTERS", 1)
-    monkeypatch.setattr(training, "_WARM_UP", 1)
+    monkeypatch.setattr(descent, "_KEPT_EVERY", 2)
+    monkeypatch.setattr(batches, "_CLUSTERS", 1)
+    monkeypatch.setattr(descent, "_WARM_UP", 1)
     scans = toy_scans(length=20)
-    batch = Sampler(scans, 1).batch(0)
+    batch = BatchSampler(scans, 1).batch(0)
     # One batch, again and again, so that its loss falls.
-    monkeypatch.setattr(Sampler, "batch", lambda self, step: batch)
+    monkeypatch.setattr(BatchSampler, "batch", lambda self, step: batch)
     whole, curve = train(scans, 5, 1, tmp_path / "whole.npz")
     assert curve.shape == (5, 2)
     assert curve[-1, 0] < curve[0, 0]
@@ -177,7 +180,7 @@ def test_graded_batches_rank_by_overlap():
     graded = TrainingScans(
         scans.images, scans.xy, scans.cities, scans.drives, shared
     )
-    batch = Sampler(graded, seed=4).batch(9)
+    batch = BatchSampler(graded, seed=4).batch(9)
     assert batch.counts.all()
     assert batch.weights.sum(axis=1) == pytest.approx(1.0, abs=1e-6)
     number = np.arange(len(batch.weights))

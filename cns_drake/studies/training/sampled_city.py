@@ -1,0 +1,181 @@
+"""Cities with drives for training, all sampled at random.
+
+A city has the streets of a map, or streets sampled at random. All other
+structures, and two earlier stages, are sampled anew. Several drives follow the
+same route and differ as real visits do: in stage, effects, LiDAR and driver.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cns_drake.base.files import draft_folder
+from cns_drake.city.generation.city_structures import make_city
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.city.generation.starter import start_city
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import draw_route
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import load_scenario
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
+from cns_drake.studies.redrawing import marked_yaml, redrawn_inputs
+from cns_drake.studies.training.sampled_stages import STAGES, draw_stages
+from cns_drake.studies.training.sampled_streets import draw_streets
+from cns_drake.studies.viewpoints import with_lidars_moved
+
+# First seed, far from the seeds of all experiments and tests.
+_FIRST_SEED = 500_000
+# Distance between the seeds of successive trainings.
+_MOST_CITIES = 1000
+# Length of a route [m].
+_ROUTE_LENGTH = 1600.0
+_PRESETS = ("os1-64", "hdl-64e", "os1-32", "vlp-16", "os1-128")
+# Takes the place of a map's name in cities whose streets are drawn.
+DRAWN_STREETS = "drawn"
+# Purpose of the random numbers of streets; cities and drives have the least.
+_STREETS = 2**32 - 1
+# The map whose first drive has the car and the LiDAR of all drives there.
+_CAR_OF = "riverside"
+
+
+@dataclass(frozen=True)
+class SampledCity:
+    """A city with its drives, all sampled from a seed.
+
+    Attributes:
+        map_name: the shipped map whose streets the city has, or `DRAWN_STREETS`
+            for streets sampled at random.
+        seed: seed of the training.
+        number: number of the city in the training.
+        num_drives: number of drives along one route.
+        change: whether drives see different stages and temporary changes.
+        returns: whether some drives have weather, and LiDAR returns with the
+            losses and errors of a data sheet.
+        driver: whether drivers wander and change lanes.
+        graded: whether the overlap of each scan with the places of the other
+            scans is computed.
+    """
+
+    map_name: str
+    seed: int
+    number: int
+    num_drives: int = 4
+    change: bool = True
+    returns: bool = True
+    driver: bool = True
+    graded: bool = False
+
+    @property
+    def city_seed(self) -> int:
+        """Seed from which the city is generated; drives do not depend on it."""
+        return _FIRST_SEED + self.seed * _MOST_CITIES + self.number
+
+    def write(self, folder: Path) -> None:
+        """Writes the map folder of the city.
+
+        Raises:
+            InputError: the city cannot be generated, or the folder cannot be
+                written.
+        """
+        with draft_folder(folder, replaces=True) as draft:
+            if self.map_name == DRAWN_STREETS:
+                roads = marked_yaml(
+                    "streets", draw_streets(self._rng(_STREETS))
+                )
+                MapFolder(draft).roads.write_bytes(roads)
+                start_city(draft, self.city_seed)
+            else:
+                source = shipped_maps()[self.map_name]
+                inputs = redrawn_inputs(source, STAGES[-1], self.city_seed)
+                for name, content in inputs.items():
+                    (draft / name).write_bytes(content)
+            stages = draw_stages(make_city(draft), self._rng(0))
+            text = yaml.safe_dump({"stages": stages}, sort_keys=False)
+            (draft / STAGES_NAME).write_text(text, encoding="utf-8")
+            generate_city(draft)
+
+    def drives(self, folder: Path) -> list[Scenario]:
+        """Returns the drives through the city.
+
+        Args:
+            folder: folder to which `write` has written the map.
+        """
+        rng = self._rng(1)
+        drawn = self.map_name == DRAWN_STREETS
+        source = MapFolder(shipped_maps()[_CAR_OF if drawn else self.map_name])
+        base = load_scenario(source.recordable_drives()[0])
+        network = load_road_network(MapFolder(folder).roads)
+        base = base.replaced(
+            map=str(folder),
+            stage=STAGES[-1],
+            route=draw_route(network, _ROUTE_LENGTH, rng),
+            waypoints=None,
+            aside=0.0,
+        )
+        return [self._drive(base, number) for number in range(self.num_drives)]
+
+    def _drive(self, base: Scenario, number: int) -> Scenario:
+        # If one kind of change is left out, the draws of all others stay the
+        # same.
+        rng = self._rng(2 + number)
+        drive = base.replaced(name=f"{self.map_name}_{self.number}_{number}")
+        aside = float(rng.uniform(-1.0, 1.0))
+        if rng.random() < 0.35:
+            aside = float(rng.uniform(-2.0, 6.0))
+        preset = _PRESETS[int(rng.integers(len(_PRESETS)))]
+        changes = _draw_changes(rng, number)
+        returns = rng.random() < 0.6
+        fog = float(rng.uniform(80.0, 400.0)) if rng.random() < 0.2 else None
+        seed = int(rng.integers(2**31))
+        if rng.random() < 0.35:
+            drive = drive.with_lidar_preset(preset)
+        fields: dict[str, Any] = {"seed": seed}
+        if self.driver:
+            fields["driver"] = {
+                "wander": 0.35,
+                "lane_changes": 6.0,
+                "seed": seed,
+            }
+        else:
+            aside = 0.0
+        if self.change:
+            fields |= changes
+        if self.returns and returns:
+            drive = drive.with_returns("calibrated")
+            fields["weather"] = {"visibility": fog}
+        return with_lidars_moved(drive, 0.0, aside, 0.0).with_fields(
+            fields, drive.name
+        )
+
+    def _rng(self, purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self.seed, self.number, purpose])
+
+
+def _draw_changes(rng: np.random.Generator, number: int) -> dict[str, Any]:
+    """Returns random changes of a drive: stage, temporary changes, ride."""
+    ends = {
+        "parked_cars": (0.0, 1.0),
+        "leaves": (0.1, 1.0),
+        "snow": (0.02, 0.2),
+        "scaffolds": (0.0, 0.3),
+        "works": (0.0, 0.15),
+        "furniture": (0.0, 0.7),
+    }
+    parts = {
+        name: round(float(rng.uniform(low, high)), 4)
+        for name, (low, high) in ends.items()
+        if rng.random() < (0.15 if name == "snow" else 0.4)
+    }
+    rough = "ABC"[int(rng.integers(3))]
+    changes: dict[str, Any] = {
+        # The last stage, the first, the one in between, and the last again.
+        "stage": (STAGES[-1], STAGES[0], STAGES[1], STAGES[-1])[number % 4],
+        "transient": {"seed": int(rng.integers(2**31)), **parts},
+    }
+    if rng.random() < 0.5:
+        changes["ride"] = {"roughness": rough, "seed": int(rng.integers(2**31))}
+    return changes
