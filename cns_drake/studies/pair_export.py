@@ -31,7 +31,7 @@ from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
 from cns_drake.transient.ground_surface import GROUND_CLASSES
 from evaluation.drives.sampling import gather, sample_frames
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.overlap_truth import (
     compared_frames,
     write_overlaps,
@@ -235,7 +235,7 @@ def _cloud(points: np.ndarray, max_range: float, seed: int) -> np.ndarray:
     """Returns 4096 points in [-1, 1], without ground, of mean 0; float64."""
     kept = points[~np.isin(points["label"], _GROUND)]
     xyz = np.stack([kept[axis] for axis in "xyz"], axis=1)
-    xyz = thin(xyz, _VOXEL)
+    xyz = downsample(xyz, _VOXEL)
     if len(xyz) == 0:
         return np.zeros((_POINTS, 3))
     rng = np.random.default_rng(seed)

@@ -55,9 +55,9 @@ _FEWEST_LOOPS = 4
 _LEAST_YIELD = 0.25
 # Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
-# A drive has drifted if a quarter of its loops have a greater error [m]. The
-# loops are those with itself, or those with the target under the best rigid
-# pose.
+# A drive has drifted if a quarter of its loops have an error greater than this
+# [m]. These are loops of the drive with itself or, under the best rigid pose,
+# with the target.
 _DRIFT = 0.3
 # Heights are not changed if the ground is within this distance of zero [m].
 _GROUND_TOLERANCE = 0.25
@@ -213,13 +213,13 @@ def align(
     swapped = held > moving and not hold_first
     if swapped:
         target, held, source, moving = source, moving, target, held
-    search, guess, num_candidates = _start(source, target)
+    search, guess, num_candidates = _search_from_a_guess(source, target)
     search.grow()
-    X_TK, model = _fit(search)
+    X_TK, model = _fit_poses(search)
     for _ in range(_ROUNDS):
         if not search.retry(_doubtful_keyframes(search, X_TK), X_TK):
             break
-        X_TK, model = _fit(search)
+        X_TK, model = _fit_poses(search)
     loops = list(search.loops.values())
     is_inlier = agreeing(loops, target.X_WK, X_TK)
     needed = max(
@@ -240,8 +240,9 @@ def align(
     if ground != 0.0 or held > 0.0:
         # The drive's world frame is no longer the one that its name stands for.
         frame = f"{frame}, corrected by {target.name}"
-    held_drive = _lowered(target.drive, target.X_WS, ground, frame, target)
-    moved_drive = _lowered(source.drive, X_TS, ground, frame, target)
+    datum = target.drive.datum
+    held_drive = _lowered(target.drive, target.X_WS, ground, frame, datum)
+    moved_drive = _lowered(source.drive, X_TS, ground, frame, datum)
     return Alignment(
         moved_drive if swapped else held_drive,
         held_drive if swapped else moved_drive,
@@ -260,12 +261,12 @@ def align(
             model=model,
             straightened=(held, moving),
             ground=ground,
-            **_motion((first if swapped else second).X_WS, X_TS),
+            **_motion_fields((first if swapped else second).X_WS, X_TS),
         ),
     )
 
 
-def _start(
+def _search_from_a_guess(
     source: Submaps, target: Submaps
 ) -> tuple[LoopSearch, str, int | None]:
     """Finds a guess that holds, and the first loops.
@@ -335,7 +336,7 @@ def _probe(
     return search, len(search.loops) >= max(2, 0.5 * len(chosen))
 
 
-def _fit(search: LoopSearch) -> tuple[np.ndarray, str]:
+def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
     """Returns poses X_TK (K, 4, 4) that fit all loops, and the model's name."""
     loops = list(search.loops.values())
     X_TL, source = search.target.X_WK, search.source
@@ -364,15 +365,15 @@ def _lowered(
     X_WS: np.ndarray,
     ground: float,
     world_frame: str,
-    target: Submaps,
+    datum: str | None,
 ) -> Drive:
-    """Returns a drive at given poses, moved so that its ground has height 0."""
+    """Returns a drive at given poses, lowered by the height of its ground."""
     X = X_WS.copy()
     X[:, 2, 3] -= ground
-    return MovedDrive(drive, X, world_frame, target.drive.datum)
+    return MovedDrive(drive, X, world_frame, datum)
 
 
-def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
+def _motion_fields(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
     """Returns the report's fields `move`, `turn_deg` and `bend`."""
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]

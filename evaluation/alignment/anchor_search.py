@@ -118,12 +118,12 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     guess with the most agreeing candidates comes first. Candidates that agree
     with a guess do not count for later guesses.
     """
-    trials = _trials(candidates)
+    trials = _guesses_of_two(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
     guesses: list[Guess] = []
     while len(guesses) < _NUM_GUESSES and len(trials):
         agreement = np.stack(
-            [_agrees(candidates, turn, move) for turn, move in trials]
+            [_agree(candidates, turn, move) for turn, move in trials]
         )
         # A query for which several pairs agree has only one vote.
         votes = np.array(
@@ -137,8 +137,8 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
             break
         pairs = agreement[best] & is_left
         for _ in range(3):
-            turn, move = _fit(candidates, pairs)
-            agreeing = _agrees(candidates, turn, move)
+            turn, move = _fit_turn_and_move(candidates, pairs)
+            agreeing = _agree(candidates, turn, move)
             if not agreeing.any():
                 break
             pairs = agreeing
@@ -152,7 +152,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     return guesses
 
 
-def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
+def _guesses_of_two(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
     """Returns the turns and moves on which each two candidates agree."""
     p_S, p_T = candidates.p_S[:, :2], candidates.p_T[:, :2]
     one, two = np.triu_indices(len(p_S), k=1)
@@ -175,14 +175,12 @@ def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
     for pair in chosen:
         ends = [one[pair], two[pair]]
         trials.append(
-            (turns[pair], _move(candidates, np.array(ends), turns[pair]))
+            (turns[pair], _mean_move(candidates, np.array(ends), turns[pair]))
         )
     return trials
 
 
-def _agrees(
-    candidates: Candidates, turn: float, move: np.ndarray
-) -> np.ndarray:
+def _agree(candidates: Candidates, turn: float, move: np.ndarray) -> np.ndarray:
     """Returns which pairs agree with a guess, (M,) bool."""
     p_T = _turned(candidates.p_S, turn) + move
     distances = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
@@ -191,17 +189,21 @@ def _agrees(
     )
 
 
-def _fit(candidates: Candidates, pairs: np.ndarray) -> tuple[float, np.ndarray]:
+def _fit_turn_and_move(
+    candidates: Candidates, pairs: np.ndarray
+) -> tuple[float, np.ndarray]:
     """Returns turn and move by least squares (Umeyama 1991, in 2-D)."""
     p_S, p_T = candidates.p_S[pairs, :2], candidates.p_T[pairs, :2]
     a, b = p_S - p_S.mean(axis=0), p_T - p_T.mean(axis=0)
     turn = float(
         np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
     )
-    return turn, _move(candidates, pairs, turn)
+    return turn, _mean_move(candidates, pairs, turn)
 
 
-def _move(candidates: Candidates, pairs: np.ndarray, turn: float) -> np.ndarray:
+def _mean_move(
+    candidates: Candidates, pairs: np.ndarray, turn: float
+) -> np.ndarray:
     offsets = candidates.p_T[pairs] - _turned(candidates.p_S[pairs], turn)
     move = offsets.mean(axis=0)
     # Wrong pairs may be at any height.

@@ -171,25 +171,26 @@ class LoopSearch:
         keyframe and the drive's own motion between the two keyframes.
         """
         path = self.source.path
+        # The nearest keyframe with a loop, and the distance to it.
+        nearest = np.zeros(len(path), dtype=np.int64)
         away = np.full(len(path), np.inf)
-        teacher = np.zeros(len(path), dtype=np.int64)
         is_open = np.ones(len(path), dtype=bool)
 
-        def learn(k: int) -> None:
+        def add_registered(k: int) -> None:
             distance = np.abs(path - path[k])
             closer = distance < away
-            away[closer], teacher[closer] = distance[closer], k
+            away[closer], nearest[closer] = distance[closer], k
             is_open[k] = False
 
         for k in self.loops:
-            learn(k)
+            add_registered(k)
         remaining = int(is_open.sum())
         description = f"aligning {self.source.name}"
         for _ in track(range(remaining), description, remaining, "loops"):
             k = int(np.where(is_open, away, np.inf).argmin())
             is_open[k] = False
-            if self.attempt(k, self._moved_like(teacher[k], k)):
-                learn(k)
+            if self.attempt(k, self._moved_with(nearest[k], k)):
+                add_registered(k)
 
     def retry(self, keyframes: np.ndarray, X_TK: np.ndarray) -> int:
         """Registers keyframes again if their guesses have changed.
@@ -211,12 +212,12 @@ class LoopSearch:
             made += self.attempt(k, X_TK[k])
         return made
 
-    def _moved_like(self, teacher: int, k: int) -> np.ndarray:
-        """Returns X_TK (4, 4) of k if it moves like keyframe `teacher`."""
-        loop = self.loops[teacher]
+    def _moved_with(self, registered: int, k: int) -> np.ndarray:
+        """Returns X_TK (4, 4) of keyframe k, moved with a registered one."""
+        loop = self.loops[registered]
         X_TJ = self.target.X_WK[loop.target] @ loop.X_LK
         X_WK = self.source.X_WK
-        return X_TJ @ poses.inverse(X_WK[teacher]) @ X_WK[k]
+        return X_TJ @ poses.inverse(X_WK[registered]) @ X_WK[k]
 
     def _place(self, X_TK: np.ndarray) -> int | None:
         """Returns the nearest keyframe of the target; None if none is near."""

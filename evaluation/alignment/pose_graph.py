@@ -86,7 +86,7 @@ def optimise(
     free = slice(0, len(V) - num_held)
     for width in _WIDTHS:
         for _ in range(_STEPS):
-            step = _solve(V, free, all_ties, information, width)
+            step = _gauss_newton_steps(V, free, all_ties, information, width)
             V[free] = V[free] @ poses.make_pose(
                 Rotation.from_rotvec(step[:, :3]).as_matrix(), step[:, 3:]
             )
@@ -95,7 +95,7 @@ def optimise(
     return V
 
 
-def _solve(
+def _gauss_newton_steps(
     V: np.ndarray,
     free: slice,
     all_ties: list[Ties],
@@ -115,17 +115,17 @@ def _solve(
         # the error by the adjoint of Z times the step; a step of V_i changes it
         # directly, with the opposite sign.
         opposite = np.broadcast_to(-np.eye(6), omega.shape)
-        J = _blocks(_adjoint(ties.Z), ties.j, len(V)) + _blocks(
+        J = _block_matrix(_adjoint(ties.Z), ties.j, len(V)) + _block_matrix(
             opposite, ties.i, len(V)
         )
         J = J.tocsc()[:, :size]
-        weighted = J.T @ _blocks(omega, np.arange(len(omega)), len(omega))
+        weighted = J.T @ _block_matrix(omega, np.arange(len(omega)), len(omega))
         H = H + weighted @ J
         b += weighted @ errors.ravel()
     return -spsolve(H.tocsc(), b).reshape(-1, 6)
 
 
-def _blocks(
+def _block_matrix(
     blocks: np.ndarray, columns: np.ndarray, number: int
 ) -> sparse.bsr_matrix:
     """Returns a sparse matrix with one block (6, 6) in each row of blocks."""

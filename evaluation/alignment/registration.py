@@ -149,10 +149,10 @@ def register(
         )
         if found.num_inliers >= _FEWEST_PAIRS:
             X = found.T_target_source
-    return _judge(source, target, X)
+    return _registration_at(source, target, X)
 
 
-def _pair_points(
+def _nearest_pairs(
     source: Surface, target: Surface, X_TS: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Pairs a sample of the points with the nearest ones of the target.
@@ -176,19 +176,23 @@ def _pair_points(
     return sample, is_paired, p_T, nearest
 
 
-def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
-    sample, is_paired, p_T, nearest = _pair_points(source, target, X_TS)
+def _registration_at(
+    source: Surface, target: Surface, X_TS: np.ndarray
+) -> Registration:
+    sample, is_paired, p_T, nearest = _nearest_pairs(source, target, X_TS)
     n_T = target.normals[nearest[is_paired]]
     J = np.concatenate([np.cross(p_T[is_paired], n_T), n_T], axis=1)
     counting = len(source.points) / len(sample) / _CORRELATED
     H = J.T @ J * (counting / _SIGMA**2)
-    reverse, is_found, _, _ = _pair_points(target, source, poses.inverse(X_TS))
+    reverse, is_found, _, _ = _nearest_pairs(
+        target, source, poses.inverse(X_TS)
+    )
     return Registration(
         X_TS=X_TS,
         fitness=float(max(is_paired.mean(), is_found.mean())),
         structure=max(
-            _part(is_paired, source.is_upright[sample]),
-            _part(is_found, target.is_upright[reverse]),
+            _share_of(is_paired, source.is_upright[sample]),
+            _share_of(is_found, target.is_upright[reverse]),
         ),
         # Directions without constraints get uncertainties of a metre and a few
         # degrees.
@@ -196,6 +200,6 @@ def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
     )
 
 
-def _part(is_counted: np.ndarray, of: np.ndarray) -> float:
+def _share_of(is_counted: np.ndarray, of: np.ndarray) -> float:
     total = np.count_nonzero(of)
     return np.count_nonzero(is_counted & of) / total if total else 0.0

@@ -107,11 +107,13 @@ class ChangeReport:
         if change.undefined_because:
             values["reason"] = change.undefined_because
         if self.masked is not None:
-            masked = _summary(self.masked)
+            masked = _numbers_of_change(self.masked)
             values["coverage_masked"] = masked | {"radius": COVERAGE_RADIUS}
         if self.control is not None and self.control_names is not None:
             names = list(self.control_names)
-            values["control"] = _summary(self.control) | {"between": names}
+            values["control"] = _numbers_of_change(self.control) | {
+                "between": names
+            }
         if self.alignment is not None:
             values["alignment"] = self.alignment.to_json()
         return json_values(values)
@@ -125,7 +127,7 @@ def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
     """
     if source.drive is not None and target.drive is not None:
         check_same_world(source.drive, target.drive)
-    change, clouds = _change(source, target)
+    change, clouds = _change_on_grid(source, target)
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
@@ -150,11 +152,11 @@ def spread_over_grids(
         grids: shifts of the grid [m].
     """
     values = [change.symmetric]
-    values += [_change(source, target, at)[0].symmetric for at in grids]
+    values += [_change_on_grid(source, target, at)[0].symmetric for at in grids]
     return float(np.min(values)), float(np.max(values))
 
 
-def _change(
+def _change_on_grid(
     source: DriveMap,
     target: DriveMap,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -211,7 +213,7 @@ def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
     return float(max(there.mean(), back.mean()))
 
 
-def _summary(change: TemporalChange) -> dict:
+def _numbers_of_change(change: TemporalChange) -> dict:
     values: dict[str, float | str | None] = {
         "tcr_sym": change.symmetric,
         "in_hull": change.num_in_hull,

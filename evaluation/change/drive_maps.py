@@ -49,7 +49,7 @@ def read_map(path: Path) -> DriveMap:
     Raises:
         InputError: if the path can be read neither as a drive nor as a map.
     """
-    return _map_of(open_source(path))
+    return _drive_map_of(open_source(path))
 
 
 def maps_in_one_world(
@@ -96,7 +96,8 @@ def maps_in_one_world(
                 drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
     return [
-        _map_of(drives.get(i, one), columns) for i, one in enumerate(opened)
+        _drive_map_of(drives.get(i, one), columns)
+        for i, one in enumerate(opened)
     ], reports
 
 
@@ -114,7 +115,7 @@ def open_source(
     return open_drive(path, lidar, columns)
 
 
-def _map_of(source: Drive | Path, columns: int | None = None) -> DriveMap:
+def _drive_map_of(source: Drive | Path, columns: int | None = None) -> DriveMap:
     if isinstance(source, Drive):
         voxels = map_drive(source, CELL_SIZE)
         positions = source.X_WS[:, :3, 3]

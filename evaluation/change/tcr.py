@@ -81,7 +81,7 @@ class DirectedChange:
         This is the share of changed points among the points in the hull; NaN if
         no point is in the hull.
         """
-        return _ratio(self.num_unchanged, self.num_in_hull)
+        return _changed_share(self.num_unchanged, self.num_in_hull)
 
     def restricted(self, kept: np.ndarray) -> DirectedChange:
         """Returns the change, counted only over the points in a mask (N,)."""
@@ -136,7 +136,7 @@ class TemporalChange:
     @property
     def symmetric(self) -> float:
         """TCR_sym, equation 1 of the paper; NaN if no point is in a hull."""
-        return _ratio(self.num_unchanged, self.num_in_hull)
+        return _changed_share(self.num_unchanged, self.num_in_hull)
 
     @property
     def undefined_because(self) -> str | None:
@@ -201,8 +201,8 @@ def temporal_change(
         if not np.isfinite(points).all():
             raise ValueError("a coordinate of the map is not finite")
     return TemporalChange(
-        _directed(source, target, tau, margin, restrict_to_hull),
-        _directed(target, source, tau, margin, restrict_to_hull),
+        _directed_change(source, target, tau, margin, restrict_to_hull),
+        _directed_change(target, source, tau, margin, restrict_to_hull),
     )
 
 
@@ -238,7 +238,7 @@ def covered(
     return np.all(near, axis=0)
 
 
-def _directed(
+def _directed_change(
     source: np.ndarray,
     target: np.ndarray,
     tau: float,
@@ -257,7 +257,7 @@ def _directed(
     return DirectedChange(in_hull, unchanged, distances)
 
 
-def _ratio(num_unchanged: int, num_in_hull: int) -> float:
+def _changed_share(num_unchanged: int, num_in_hull: int) -> float:
     if num_in_hull == 0:
         return math.nan
     return 1.0 - num_unchanged / num_in_hull

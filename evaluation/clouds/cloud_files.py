@@ -17,14 +17,14 @@ from evaluation.clouds.pcd_files import read_pcd
 from evaluation.clouds.ply_files import read_ply
 from evaluation.clouds.record_reading import read_records
 
-# Rounding steps of a coordinate from which on surfaces are blurred [m].
+# Least rounding step of float32 coordinates at which surfaces look blurred [m].
 _COARSE_STEP = 0.03
 # A function that reads a file; its second argument is the number of points per
 # block.
 _Reader = Callable[[Path, int, OnNote], Iterator[np.ndarray]]
 # Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
-# Largest file of a scan [bytes]; a turn of a LiDAR cannot fill it.
+# Largest file of a scan [bytes]; a revolution of a LiDAR makes a smaller one.
 SCAN_LIMIT_BYTES = 1 << 27
 
 

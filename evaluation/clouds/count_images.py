@@ -100,7 +100,7 @@ def check_image(path: Path) -> None:
     Raises:
         InputError: see `read_image`.
     """
-    with _opened(path):
+    with _opened_image(path):
         pass
 
 
@@ -112,15 +112,15 @@ def read_image(path: Path) -> np.ndarray:
             or is not square, or has an even or a too large number of pixels on
             a side.
     """
-    with _opened(path) as image, _damages(path):
+    with _opened_image(path) as image, _naming_damage(path):
         return np.asarray(image)
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Image.Image]:
+def _opened_image(path: Path) -> Iterator[Image.Image]:
     check_regular(path)
     with contextlib.ExitStack() as stack:
-        with user_errors(path), _damages(path):
+        with user_errors(path), _naming_damage(path):
             image = stack.enter_context(Image.open(path, formats=("PNG",)))
         if image.mode != "L":
             raise InputError(
@@ -139,7 +139,7 @@ def _opened(path: Path) -> Iterator[Image.Image]:
 
 
 @contextlib.contextmanager
-def _damages(path: Path) -> Iterator[None]:
+def _naming_damage(path: Path) -> Iterator[None]:
     """Turns what Pillow raises for a damaged file into an `InputError`."""
     try:
         yield

@@ -39,7 +39,7 @@ def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
             f"{path}: VIEWPOINT is not applied; the points are taken as they"
             " are written"
         )
-    dtype, count = _describe_pcd(header)
+    dtype, count = _point_type_and_count(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
         # A point takes at least one byte, which bounds the buffer.
@@ -78,7 +78,7 @@ def _is_moved(viewpoint: list[str]) -> bool:
     return bool(viewpoint) and list(map(float, viewpoint)) != _UNMOVED
 
 
-def _describe_pcd(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
+def _point_type_and_count(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     """Returns the type of a point and the number of points."""
 
     def of(keyword: str) -> list[int]:

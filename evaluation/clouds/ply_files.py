@@ -55,7 +55,9 @@ def read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     count = element.number
     alone = element is elements[-1]
     if encoding == "ascii":
-        offset = _behind_lines(path, offset, sum(one.number for one in before))
+        offset = _offset_after_lines(
+            path, offset, sum(one.number for one in before)
+        )
         # A vertex takes at least one byte.
         check_size(path, offset + count, exactly=False)
         more = not alone
@@ -65,7 +67,7 @@ def read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     return read_records(path, dtype, offset, count, block)
 
 
-def _behind_lines(path: Path, offset: int, count: int) -> int:
+def _offset_after_lines(path: Path, offset: int, count: int) -> int:
     """Returns the offset after `count` rows of a text file [bytes]."""
     with open(path, "rb") as stream:
         stream.seek(offset)

@@ -55,25 +55,29 @@ def fit_at(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
     n_W = surface.normals[nearest]
     off = np.einsum("ni,ni->n", n_W, p_W[is_pair] - surface.points[nearest])
     arms = p_W[is_pair] - X_WS[:3, 3]
-    H = _hessian(arms, n_W)
+    H = _point_to_plane_hessian(arms, n_W)
     for axis in np.eye(3):
-        H -= _NORMAL_NOISE * _hessian(arms, np.broadcast_to(axis, arms.shape))
+        H -= _NORMAL_NOISE * _point_to_plane_hessian(
+            arms, np.broadcast_to(axis, arms.shape)
+        )
     residual = math.sqrt(np.mean(off**2)) if len(off) else math.nan
     sigma = max(residual, _ROUGHNESS) if len(off) else 1.0
     return Fit(
         float(np.count_nonzero(np.abs(off) < _FIT) / len(scan)),
         residual,
-        _inverse(H / sigma**2),
+        _bounded_inverse(H / sigma**2),
     )
 
 
-def _hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _point_to_plane_hessian(
+    arms: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
     """Returns the point-to-plane Hessian (6, 6) over turn, then move."""
     J = np.concatenate([np.cross(arms, normals), normals], axis=1)
     return J.T @ J
 
 
-def _inverse(H: np.ndarray) -> np.ndarray:
+def _bounded_inverse(H: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(H)
     # Directions without constraints get a standard deviation of 100 m or rad.
     return vectors / np.maximum(values, 1e-4) @ vectors.T

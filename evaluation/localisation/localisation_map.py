@@ -115,7 +115,7 @@ def make_map(
         InputError: the source cannot be read, or has too few points.
     """
     if isinstance(source, Drive):
-        blocks = _scans(source)
+        blocks = _scans_of_map(source)
     else:
         parts = read_blocks(source, columns, on_note)
         blocks = ((part, None) for part in parts)
@@ -131,7 +131,9 @@ def make_map(
     return map_of(points, source.name, settings)
 
 
-def _scans(drive: Drive) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+def _scans_of_map(
+    drive: Drive,
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """Yields the cropped scans of which a map is made, each with its X_WS."""
     frames = map_frames(drive).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):

@@ -31,7 +31,7 @@ from evaluation.localisation.localisation_map import (
 from evaluation.localisation.results import COLUMNS, QUERY
 from evaluation.localisation.robust import MAX_RANGE
 from evaluation.localisation.settings import Settings
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.pose_errors import (
     pose_error,
 )
@@ -76,7 +76,7 @@ def mapped_frames(
     return is_mapped
 
 
-def way_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
+def path_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
     """Returns rotations R_WT (N, 3, 3), where T is the frame of the path.
 
     The axes of T point along the path, to the left of it, and up.
@@ -149,7 +149,7 @@ class Localiser:
             R = Rotation.from_rotvec(turn).as_matrix()
             X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
         measured = cropped(scan, MAX_RANGE)
-        points = thin(measured, self.settings.scan_voxel)
+        points = downsample(measured, self.settings.scan_voxel)
         row = np.zeros((), QUERY)
         for name in COLUMNS[8:-2]:
             row[name] = np.nan
@@ -184,7 +184,7 @@ class Localiser:
 _localisers: Sequence[Localiser]
 
 
-def _query(
+def _localise_from_all_starts(
     starts: Sequence[Starts],
     frame: int,
     stamp_ns: int,
@@ -230,7 +230,7 @@ def localise(
     """
     global _localisers
     X_WS, stamps = query.X_WS, query.stamps_ns
-    R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
     jobs = max(1, min(jobs, len(frames)))
 
     def arguments(frame: int) -> tuple:
@@ -244,13 +244,16 @@ def localise(
     def rows() -> Iterator[list[np.ndarray]]:
         if jobs == 1 or "fork" not in multiprocessing.get_all_start_methods():
             for frame in frames:
-                yield _query(*arguments(frame))
+                yield _localise_from_all_starts(*arguments(frame))
             return
         context = multiprocessing.get_context("fork")
         with ProcessPoolExecutor(jobs, context) as pool:
             for first in range(0, len(frames), _WAITING * jobs):
                 some = frames[first : first + _WAITING * jobs]
-                waiting = [pool.submit(_query, *arguments(f)) for f in some]
+                waiting = [
+                    pool.submit(_localise_from_all_starts, *arguments(f))
+                    for f in some
+                ]
                 for one in waiting:
                     yield one.result()
 

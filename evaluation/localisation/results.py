@@ -105,7 +105,7 @@ def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
         )
 
 
-def _believed_from(rows: np.ndarray) -> float:
+def _believed_threshold(rows: np.ndarray) -> float:
     """Returns the score that 95 % of the right results reach, or NaN."""
     scores = rows["own_score"][is_right(rows)]
     if len(scores) == 0:
@@ -128,7 +128,7 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
         values = np.abs(posed[name])
         return float(np.quantile(values, part)) if len(values) else None
 
-    least = _believed_from(rows)
+    least = _believed_threshold(rows)
     believed = rows["own_score"] >= least
     near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
     found: dict[str, float | int | None] = {

@@ -68,7 +68,7 @@ def align_robustly(
         begin = X
         for _ in range(iterations):
             total += 1
-            step = _step(surface, scan, X, width, covariances)
+            step = _gauss_newton_step(surface, scan, X, width, covariances)
             R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
             X = poses.make_pose(R, X[:3, 3] + step[3:])
             move, turn = (np.linalg.norm(step[k : k + 3]) for k in (3, 0))
@@ -83,7 +83,7 @@ def align_robustly(
         width = max(widths[1], min(3.0 * deviation, width / 2.0))
 
 
-def _step(
+def _gauss_newton_step(
     surface: Surface,
     scan: np.ndarray,
     X_WS: np.ndarray,

@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.initial_poses import Starts
-from evaluation.localisation.localise import Localiser, way_axes
+from evaluation.localisation.localise import Localiser, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
 from evaluation.recognition.number import Number
 
@@ -101,7 +101,7 @@ def track_drive(
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])
-    R_WT = way_axes(X_WS[:, :3, 3], X_WS)
+    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
     frames = sample_frames(X_WS[:, :3, 3], SPACING)
     frames = frames[is_mapped[frames]]
     if len(frames) < 2:

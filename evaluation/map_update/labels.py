@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 # SemanticKITTI's classes of moving objects, vehicles and people.
-MOVES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
+MOVING_CLASSES = (*range(252, 260), 10, 11, 13, 15, 18, 20, 30, 31, 32)
 
 
 class Label(IntEnum):

@@ -7,7 +7,7 @@ from cns_drake.base.points import xyz
 from evaluation.maps.grid_cells import CELLS_PER_AXIS, cell_keys
 
 # Side of the cells of which each keeps one point [m].
-THINNED = 0.1
+CELL = 0.1
 _MAP_DTYPE = np.dtype(
     [
         ("x", "<f8"),
@@ -30,7 +30,7 @@ class MapBuilder:
 
     def __init__(self, origin: np.ndarray):
         """Starts an empty map; its origin (3,) must be near all points [m]."""
-        self._origin = np.floor(origin / THINNED) - CELLS_PER_AXIS // 2
+        self._origin = np.floor(origin / CELL) - CELLS_PER_AXIS // 2
         self._parts: list[np.ndarray] = []
         self._points: list[np.ndarray] = []
 
@@ -49,7 +49,7 @@ class MapBuilder:
         for name in ("label", "instance"):
             if name in (scan.dtype.names or ()):
                 points[name] = scan[name]
-        cells = np.floor(p_W / THINNED) - self._origin
+        cells = np.floor(p_W / CELL) - self._origin
         keys, inside = cell_keys(cells)
         keys, first = np.unique(keys, return_index=True)
         is_new = np.ones(len(keys), bool)

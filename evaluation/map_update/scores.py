@@ -72,22 +72,22 @@ def score(
         )
     both = _Labelled(pair, truth, predicted, counted)
     still = both.only([~session.moves for session in pair])
-    result: dict = _of_points(both)
+    result: dict = _scores_by_points(both)
     result["points"] = int(sum(rows.sum() for rows in counted))
-    result["without_vehicles_and_people"] = _of_points(still)
+    result["without_vehicles_and_people"] = _scores_by_points(still)
     for name, distance in _TOLERANCES.items():
         result[name] = _scores_within(both, distance)
-    result["by_structure"] = _by_structure(both)
+    result["by_structure"] = _scores_by_structure(both)
     result.update(_predicted_shares(still))
-    result["updated_map"] = _updated_map(both)
+    result["updated_map"] = _scores_of_updated_map(both)
     classes = np.unique(np.concatenate([one.classes for one in pair]))
     result["by_class"] = {
-        names.get(number, str(number)): _of_points(
+        names.get(number, str(number)): _scores_by_points(
             both.only([session.classes == number for session in pair])
         )
         for number in classes.tolist()
     }
-    result["by_distance"] = _by_distance(both)
+    result["by_distance"] = _scores_by_distance(both)
     return json_values(result)
 
 
@@ -104,7 +104,7 @@ class _Labelled(NamedTuple):
         return self._replace(counted=[one & other for one, other in rows])
 
 
-def _of_points(both: _Labelled) -> dict[str, float]:
+def _scores_by_points(both: _Labelled) -> dict[str, float]:
     """Returns IoUs, precisions and recalls by points.
 
     The IoU is NaN for a class that occurs neither in the ground truth nor by
@@ -164,7 +164,7 @@ def _share_near(
     return float(np.mean(np.isfinite(found)))
 
 
-def _by_structure(both: _Labelled) -> dict[str, float]:
+def _scores_by_structure(both: _Labelled) -> dict[str, float]:
     """Returns precision and recall by structures, and numbers of structures.
 
     For each kind of change, such as `gone`, the keys are `precision_gone`,
@@ -212,7 +212,7 @@ def _predicted_shares(both: _Labelled) -> dict[str, float]:
     }
 
 
-def _updated_map(both: _Labelled) -> dict[str, float]:
+def _scores_of_updated_map(both: _Labelled) -> dict[str, float]:
     """Returns completeness, accuracy and Chamfer distance of an updated map.
 
     The updated map consists of the points of A that are not predicted gone, and
@@ -247,7 +247,7 @@ def _updated_map(both: _Labelled) -> dict[str, float]:
     }
 
 
-def _by_distance(both: _Labelled) -> dict:
+def _scores_by_distance(both: _Labelled) -> dict:
     """Returns the scores by points for ranges of distance.
 
     The distance is that of a point from the path of the other drive.
@@ -264,7 +264,7 @@ def _by_distance(both: _Labelled) -> dict:
         ring = both.only([(far >= low) & (far < high) for far in away])
         if any(rows.any() for rows in ring.counted):
             end = "" if math.isinf(high) else f"{high:g}"
-            found[f"{low:g}-{end}"] = _of_points(ring)
+            found[f"{low:g}-{end}"] = _scores_by_points(ring)
     return found
 
 

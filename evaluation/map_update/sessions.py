@@ -34,7 +34,7 @@ from evaluation.clouds.cloud_files import read_blocks, read_cloud
 from evaluation.clouds.npy_files import read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.text_tables import read_poses
-from evaluation.map_update.labels import MOVES, SIDES, Label
+from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
 from evaluation.map_update.map_builder import MapBuilder
 
 # Distance driven between two scans [m].
@@ -67,7 +67,7 @@ class Session:
     @property
     def moves(self) -> np.ndarray:
         """(N,) bool, points on vehicles and people, also on parked ones."""
-        return np.isin(self.classes, MOVES)
+        return np.isin(self.classes, MOVING_CLASSES)
 
     def scan(self, index: int) -> np.ndarray:
         """Returns a scan (M, 3) in the frame of the LiDAR [m].

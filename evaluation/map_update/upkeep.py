@@ -17,7 +17,7 @@ import numpy as np
 
 from evaluation.map_update.baselines import BASELINES
 from evaluation.map_update.labels import Label, Labels
-from evaluation.map_update.map_builder import THINNED
+from evaluation.map_update.map_builder import CELL
 from evaluation.map_update.sessions import Pair, Session, scan_path
 from evaluation.maps.grid_cells import cell_keys
 
@@ -152,7 +152,7 @@ class UpkeptMap:
 
 def _in_cells_of(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Returns which points (N, 3) share a cell of a map with others, (N,)."""
-    cells = [np.floor(one / THINNED) for one in (points, others)]
+    cells = [np.floor(one / CELL) for one in (points, others)]
     corner = np.concatenate(cells).min(axis=0, initial=0.0)
     (keys, _), (taken, _) = (cell_keys(one - corner) for one in cells)
     return np.isin(keys, taken)

@@ -296,7 +296,7 @@ def _corners(
     return np.array(origin_W) + indices * voxel_size
 
 
-def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
+def downsample(points: np.ndarray, voxel_size: float) -> np.ndarray:
     """Returns a cloud with one point per voxel, the centroid.
 
     Points are in the frame of a sensor.

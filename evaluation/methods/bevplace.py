@@ -55,7 +55,7 @@ _EMBEDDING = "encoder.embedder.embedder.network"
 
 
 def _embedding_shapes(name: str, channels: int) -> dict[str, tuple[int, ...]]:
-    """Returns name -> shape of the weights of one network of `_combined`."""
+    """Returns name -> shape of the weights of one network of `_embedded`."""
     kernels = {
         "embed1.0": (64, 32, 3, 3),
         "embed1.2": (64, 64, 3, 3),
@@ -94,17 +94,17 @@ def describe_image(weights: Weights, image: np.ndarray) -> np.ndarray:
     """
     features = np.stack(
         [
-            _features_at(_features(weights, turned), points)
+            _features_at(_feature_map(weights, turned), points)
             for turned, points in _turned_images(image)
         ]
     )
     # At each point, five scales x five turns are treated like pixels.
     grid = features.reshape(_SCALES, len(_TURNS), *features.shape[1:])
     first, second = (
-        _combined(weights, f"{_EMBEDDING}{name}_", grid) for name in "12"
+        _embedded(weights, f"{_EMBEDDING}{name}_", grid) for name in "12"
     )
     local = np.matmul(first.transpose(0, 2, 1), second)
-    return _vlad(weights, _unit(local.reshape(len(local), _CHANNELS)))
+    return _netvlad(weights, _unit(local.reshape(len(local), _CHANNELS)))
 
 
 def _turned_images(
@@ -163,12 +163,12 @@ def _warped(
     start = -inverse @ offset
     column, row = np.arange(size[0]), np.arange(size[1])[:, None]
     unit = _FINE // _COARSE
-    places = []
+    positions = []
     for axis in (0, 1):
         along = np.rint(inverse[axis, 0] * column * _FINE)
         across = np.rint((inverse[axis, 1] * row + start[axis]) * _FINE)
-        places.append((across + unit // 2 + along) // unit / _COARSE)
-    x, y = places
+        positions.append((across + unit // 2 + along) // unit / _COARSE)
+    x, y = positions
     return _sampled(image, x, y, _BORDER)
 
 
@@ -193,14 +193,14 @@ def _sampled(
         share = (x - left if dx else 1.0 - (x - left)) * (
             y - low if dy else 1.0 - (y - low)
         )
-        # Those beyond the first pixels around the image are like these.
+        # Pixels farther outside are like the first pixels around the image.
         column = np.clip(left + dx + 1, 0, width + 1).astype(np.int64)
         row = np.clip(low + dy + 1, 0, height + 1).astype(np.int64)
         result += share.astype(np.float32)[..., None] * padded[row, column]
     return result
 
 
-def _features(weights: Weights, image: np.ndarray) -> np.ndarray:
+def _feature_map(weights: Weights, image: np.ndarray) -> np.ndarray:
     """Returns a map of features (H / 2, W / 2, 32), each of length 1."""
     x = image
     for block in "01":
@@ -256,25 +256,25 @@ def _unit(x: np.ndarray) -> np.ndarray:
 def _features_at(features: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Returns the features (N, channels) at points of an image.
 
-    The authors' program takes the first and the last pixel as the ends of the
-    image where it scales positions, and the borders of these pixels where it
-    interpolates.
+    To scale positions, the authors' program takes the centres of the first and
+    the last pixel as the ends of the image. To interpolate, it takes the outer
+    borders of these pixels.
 
     Args:
         features: (H, W, channels) map of features, of half the image's size.
         points: (N, 2) columns and rows in the image.
     """
     size = np.array(features.shape[1::-1], np.float32)
-    places = ((points + 0.5) / 2.0 - 0.5) * size / (size - 1.0) - 0.5
-    return _sampled(features, *places.T)
+    positions = ((points + 0.5) / 2.0 - 0.5) * size / (size - 1.0) - 0.5
+    return _sampled(features, *positions.T)
 
 
-def _combined(weights: Weights, name: str, grid: np.ndarray) -> np.ndarray:
-    """Returns what a network of small convolutions makes of each point.
+def _embedded(weights: Weights, name: str, grid: np.ndarray) -> np.ndarray:
+    """Returns the output of a network of small convolutions at each point.
 
     Args:
         weights: the weights.
-        name: what the names of the network's layers begin with.
+        name: prefix of the names of the network's layers.
         grid: (5, 5, N, 32) features over scales and turns.
 
     Returns:
@@ -282,16 +282,20 @@ def _combined(weights: Weights, name: str, grid: np.ndarray) -> np.ndarray:
     """
     x = grid
     for block in ("embed1", "embed2"):
-        y = _layer(weights, f"{name}{block}.0", x)
-        y = _layer(weights, f"{name}{block}.2", np.maximum(y, 0.0))
-        y += _layer(weights, f"{name}{block}_short", x)
+        y = _convolved_over_turns(weights, f"{name}{block}.0", x)
+        y = _convolved_over_turns(
+            weights, f"{name}{block}.2", np.maximum(y, 0.0)
+        )
+        y += _convolved_over_turns(weights, f"{name}{block}_short", x)
         x = np.maximum(y, 0.0)
-    y = _layer(weights, f"{name}embed3.0", x)
-    y = _layer(weights, f"{name}embed3.2", np.maximum(y, 0.0))
+    y = _convolved_over_turns(weights, f"{name}embed3.0", x)
+    y = _convolved_over_turns(weights, f"{name}embed3.2", np.maximum(y, 0.0))
     return y.reshape(-1, *y.shape[2:]).transpose(1, 0, 2)
 
 
-def _layer(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
+def _convolved_over_turns(
+    weights: Weights, name: str, x: np.ndarray
+) -> np.ndarray:
     """Returns a convolution over the first two axes, with zeros around.
 
     Args:
@@ -316,7 +320,7 @@ def _layer(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
     return result
 
 
-def _vlad(weights: Weights, x: np.ndarray) -> np.ndarray:
+def _netvlad(weights: Weights, x: np.ndarray) -> np.ndarray:
     """Returns the NetVLAD descriptor (8192,) of local ones (N, 128)."""
     kernel = weights["netvlad.conv.weight"].reshape(_CLUSTERS, _CHANNELS)
     shares = softmax(x @ kernel.T, axis=1)

@@ -60,11 +60,13 @@ def voxel_planes(
         max_points: only voxels with more than this number of points are used.
         flatness: upper limit of the variance along the normal [m^2].
     """
-    index, counts, centers, covariances = _moments(points, voxel_size)
+    index, counts, centers, covariances = _moments_of_voxels(points, voxel_size)
     visited = voxel_order(index)
     dense = visited[counts[visited] > max_points]
     covariances = covariances[dense] / counts[dense, None, None]
-    planes, variances = _fit(centers[dense], covariances, counts[dense])
+    planes, variances = _planes_of_moments(
+        centers[dense], covariances, counts[dense]
+    )
     return planes.take(variances < flatness)
 
 
@@ -132,7 +134,7 @@ def merge(
     spread = planes.covariances + offsets[:, :, None] * offsets[:, None, :]
     covariances = np.zeros((num_groups, 3, 3))
     np.add.at(covariances, labels, weights[:, None, None] * spread)
-    return _fit(centers, covariances, counts)[0]
+    return _planes_of_moments(centers, covariances, counts)[0]
 
 
 @compiled
@@ -198,7 +200,7 @@ def group_alike(
 
 
 @compiled
-def _moments(
+def _moments_of_voxels(
     points: np.ndarray, voxel_size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Returns the voxels of a cloud, in the order of their first points.
@@ -266,7 +268,7 @@ def _moments(
     return index[found], counts[found], means[found], covariances
 
 
-def _fit(
+def _planes_of_moments(
     centers: np.ndarray, covariances: np.ndarray, counts: np.ndarray
 ) -> tuple[Planes, np.ndarray]:
     """Returns the least-squares planes, and the variances (P,) across them."""

@@ -297,8 +297,8 @@ def _search(
     shape = len(database.places), len(_FIRST_TURNS)
     starts = np.zeros((math.prod(shape), 4), np.int64)
     starts[:, 0], starts[:, 1] = np.divmod(np.arange(len(starts)), shape[1])
-    surprise, poses = _overlaps(
-        _coarse_maps(query, _FIRST_TURNS, _FIRST_HALVINGS),
+    surprise, poses = _overlaps_beyond_chance(
+        _maps_of_scan(query, _FIRST_TURNS, _FIRST_HALVINGS),
         database.first,
         _FIRST_WEIGHTS,
         starts,
@@ -313,20 +313,20 @@ def _search(
         best = surprise.argmax(axis=1) + np.arange(shape[0]) * shape[1]
         refined = len(best)
     else:
-        best = _greatest(surprise.ravel(), number)
+        best = _indices_of_greatest(surprise.ravel(), number)
     poses = poses[best] * _TO_SECOND
-    maps = _coarse_maps(query, _SECOND_TURNS, _SECOND_HALVINGS)
+    maps = _maps_of_scan(query, _SECOND_TURNS, _SECOND_HALVINGS)
     for moves in (_SECOND_MOVES, _THIRD_MOVES):
-        surprise, poses = _overlaps(
+        surprise, poses = _overlaps_beyond_chance(
             maps, database.second, _SECOND_WEIGHTS, poses, moves
         )
-        poses = poses[_greatest(surprise, refined)]
+        poses = poses[_indices_of_greatest(surprise, refined)]
     # The best pose of each place, in the order of the places.
     _, first = np.unique(poses[:, 0], return_index=True)
     return poses[np.sort(first)] * _TO_LAST
 
 
-def _overlaps(
+def _overlaps_beyond_chance(
     query: CoarseMaps,
     places: CoarseMaps,
     weights: np.ndarray,
@@ -357,7 +357,7 @@ def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
     """Returns coarse maps of places as recorded, with a margin of rows."""
-    maps = [_coarse_maps(place, turns(1), halvings) for place in places]
+    maps = [_maps_of_scan(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(
         np.pad(bits, ((0, 0), (margin, margin), (0, 0))),
@@ -365,7 +365,7 @@ def _maps_of_places(
     )
 
 
-def _coarse_maps(
+def _maps_of_scan(
     scan: LayeredScan, at: np.ndarray, halvings: int
 ) -> CoarseMaps:
     """Returns coarse maps of a scan at some headings."""
@@ -374,7 +374,7 @@ def _coarse_maps(
     )
 
 
-def _greatest(values: np.ndarray, number: int) -> np.ndarray:
+def _indices_of_greatest(values: np.ndarray, number: int) -> np.ndarray:
     """Returns the indices of the greatest values (N,), decreasing.
 
     Equal values are in order of their indices. A partial sort alone would leave

@@ -49,7 +49,7 @@ TURNS = 48
 FREQUENCIES = TURNS // 2
 # Headings at which two maps are compared.
 HEADINGS = 2 * TURNS
-# Name of an array: least and greatest share of sectors with a return in
+# Name of the array with the least and the greatest share of seen sectors in
 # training.
 SEEN_SHARES = "seen"
 # The shipped weights: trained with matches by radius, on streets of the shipped
@@ -152,8 +152,8 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         """
         if not image.any():
             return LearnedScan(np.zeros((TURNS, FEATURES), np.float32))
-        self._check_seen(image)
-        features = _infer(self._weights, image)
+        self._warn_if_it_sees_little(image)
+        features = _feature_map(self._weights, image)
         length = float(np.linalg.norm(features))
         return LearnedScan(features / np.float32(max(length, 1e-9)))
 
@@ -195,7 +195,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         yaw = 2.0 * math.pi * turn / HEADINGS
         return yaw_pose(yaw)
 
-    def _check_seen(self, image: np.ndarray) -> None:
+    def _warn_if_it_sees_little(self, image: np.ndarray) -> None:
         """Warns once if the sensor sees less than any sensor in training."""
         if self._warned:
             return
@@ -224,11 +224,13 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
     check_regular(path)
     with user_errors(path):
         changed = path.stat()
-    return _load(path, changed.st_mtime_ns, changed.st_size)
+    return _load_checked(path, changed.st_mtime_ns, changed.st_size)
 
 
 @lru_cache(maxsize=4)
-def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
+def _load_checked(
+    path: Path, mtime_ns: int, size: int
+) -> Mapping[str, np.ndarray]:
     if size > _MOST_BYTES:
         raise InputError(
             f"{path}: {size} bytes are too many for weights (at most "
@@ -265,7 +267,9 @@ def _load(path: Path, mtime_ns: int, size: int) -> Mapping[str, np.ndarray]:
     return values
 
 
-def _infer(weights: Mapping[str, np.ndarray], image: np.ndarray) -> np.ndarray:
+def _feature_map(
+    weights: Mapping[str, np.ndarray], image: np.ndarray
+) -> np.ndarray:
     """Returns the map of features (TURNS, FEATURES) of a polar image."""
     cells = image.astype(np.float32) * np.float32(1.0 / 255.0)
     last = len(LAYERS) - 1

@@ -47,7 +47,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
         (N, 6) float64, in the order above; all are at least 0. Eigenvalues
         are exact to about 1e-8 of the greatest.
     """
-    xx, yy, zz, xy, xz, yz, height = _moments(points, neighbours)
+    xx, yy, zz, xy, xz, yz, height = _second_moments(points, neighbours)
     half_sum = 0.5 * (xx + yy)
     root = np.hypot(0.5 * (xx - yy), xy)
     # A vertical line has no horizontal part.
@@ -81,7 +81,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+def _second_moments(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns the second moments of each point's K neighbours about their mean.
 
     The result is (7, N): sums of the products xx, yy, zz, xy, xz and yz, and

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import PositiveFloat, PositiveInt
 
 from cns_drake.base.errors import InputError
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.methods.method import Method, MethodConfig, PlaceScan
 from evaluation.methods.registry import register
 
@@ -26,10 +26,12 @@ from evaluation.methods.registry import register
 # stored as well, as in the package's own program. Here numbers descend, and all
 # places have lower numbers than queries. A new place is then aligned with no
 # map, and a query with all places but no other query.
-# Number of the first query, larger than any count of local maps. Numbers of
-# later queries descend, but stay far above those of places, because the package
-# skips the maps numbered just below.
-_ALL = 1 << 17
+#
+# A number larger than any count of places. It is the number of the first query.
+# Numbers of later queries descend, but stay far above the numbers of places,
+# because the package skips the maps numbered just below. It is also the number
+# of aligned maps to return: all of them.
+_ABOVE_ALL_PLACES = 1 << 17
 
 
 class MapClosuresConfig(MethodConfig):
@@ -111,7 +113,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         )
 
     def describe(self, points: np.ndarray) -> np.ndarray:
-        return thin(points, self.config.density_map_resolution)
+        return downsample(points, self.config.density_map_resolution)
 
     def build_database(
         self, places: Sequence[np.ndarray]
@@ -128,7 +130,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        self._find(query, database)
+        self._align_with_all_places(query, database)
         scores = np.full(database.num_places, np.nan)
         for place, (inliers, _) in database.found.items():
             scores[place] = inliers
@@ -137,16 +139,20 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     def relative_pose(
         self, query: np.ndarray, database: MapClosuresDatabase, place: int
     ) -> np.ndarray | None:
-        self._find(query, database)
+        self._align_with_all_places(query, database)
         found = database.found.get(place)
         return None if found is None else found[1]
 
-    def _find(self, query: np.ndarray, database: MapClosuresDatabase) -> None:
+    def _align_with_all_places(
+        self, query: np.ndarray, database: MapClosuresDatabase
+    ) -> None:
         """Aligns a query with all places, unless it was aligned last."""
         if database.query is query:
             return
-        number = _ALL - database.num_queries
-        closures = database.program.get_top_k_closures(number, query, _ALL)
+        number = _ABOVE_ALL_PLACES - database.num_queries
+        closures = database.program.get_top_k_closures(
+            number, query, _ABOVE_ALL_PLACES
+        )
         database.num_queries += 1
         database.query = query
         # The package has the motion from the earlier map to the later one.

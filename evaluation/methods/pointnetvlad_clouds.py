@@ -16,7 +16,7 @@ import bisect
 
 import numpy as np
 
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.methods.sparse_convolution import coarser
 
 NUM_POINTS = 4096
@@ -55,10 +55,11 @@ def prepare_cloud(points: np.ndarray) -> np.ndarray:
         range(_NUM_VOXELS),
         True,
         key=lambda k: (
-            len(thin(points, _LEAST_VOXEL + _VOXEL_STEP * k)) <= NUM_POINTS
+            len(downsample(points, _LEAST_VOXEL + _VOXEL_STEP * k))
+            <= NUM_POINTS
         ),
     )
-    chosen = thin(points, _LEAST_VOXEL + _VOXEL_STEP * size)
+    chosen = downsample(points, _LEAST_VOXEL + _VOXEL_STEP * size)
     chosen = np.concatenate([chosen, _sample_missing(points, chosen, rng)])
     centre = chosen.mean(axis=0)
     extent = np.linalg.norm(chosen - centre, axis=1).mean()

@@ -168,7 +168,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
     def build_database(self, places: Sequence[Ring]) -> RingDatabase:
         def reference(place: int) -> np.ndarray:
-            return _spectrum(places[place].bev(self.config.cells)).conj()
+            return _normalised_spectrum(
+                places[place].bev(self.config.cells)
+            ).conj()
 
         return RingDatabase(
             places=places,
@@ -183,7 +185,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         del exhaustive  # Always true here.
         if len(query.filled) == 0:
             return np.full(len(database.places), np.nan)
-        weighted = self._weigh(query)
+        weighted = self._weighted_spectrum(query)
         scores = [
             self._correlate(weighted, place.spectrum).max()
             for place in database.places
@@ -202,30 +204,30 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         if len(query.filled) == 0:
             return [None] * len(places)
         num_cells = self.config.cells
-        weighted = self._weigh(query)
+        weighted = self._weighted_spectrum(query)
         query_bev = query.bev(num_cells)
         # Places along one street have few different headings.
         turned = functools.cache(
-            lambda heading: _spectrum(_rotate(query_bev, heading))
+            lambda heading: _normalised_spectrum(_rotated(query_bev, heading))
         )
         return [
             None
             if database.is_empty[place]
-            else self._pose(weighted, turned, database, place)
+            else self._pose_at(weighted, turned, database, place)
             for place in places
         ]
 
-    def _pose(
+    def _pose_at(
         self,
         weighted: np.ndarray,
         turned: Callable[[float], np.ndarray],
         database: RingDatabase,
         place: int,
     ) -> np.ndarray:
-        """Returns X_PQ (4, 4) for a query's `_weigh` spectrum and a place."""
+        """Returns X_PQ (4, 4) for a query's weighted spectrum and a place."""
         num_cells = self.config.cells
         correlation = self._correlate(weighted, database.places[place].spectrum)
-        shift = -_signed(int(correlation.argmax()), num_cells)
+        shift = -_signed_shift(int(correlation.argmax()), num_cells)
         reference = database.reference(place)
         # Rows are 360 / (n - 1) deg apart. The last row repeats the first, so
         # that a shift by one stands for 360 / n deg on average. Spectra of
@@ -289,7 +291,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         image.reshape(-1, _NUM_FEATURES)[cell[order[first]]] = greatest
         return image
 
-    def _weigh(self, query: Ring) -> np.ndarray:
+    def _weighted_spectrum(self, query: Ring) -> np.ndarray:
         """Returns a query's spectrum (6 F, F), weighted for the correlation.
 
         The weights account for the frequencies that are not stored (about half
@@ -305,10 +307,10 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
     ) -> np.ndarray:
         """Returns the (n,) correlation of a query with a place, by shift.
 
-        The query is a result of `_weigh`. The place's rows are shifted by 0,
-        ..., n - 1. As in the program, the circular correlation over the angles
-        is computed for each channel and frequency, and the magnitudes are
-        summed.
+        The query is a result of `_weighted_spectrum`. The place's rows are
+        shifted by 0, ..., n - 1. As in the program, the circular correlation
+        over the angles is computed for each channel and frequency, and the
+        magnitudes are summed.
         """
         correlations = scipy.fft.irfft(
             weighted * spectrum.conj(), n=self.config.cells, axis=1
@@ -348,7 +350,7 @@ def _normalise(magnitudes: np.ndarray, n: int) -> np.ndarray:
     return centred / np.sqrt(variance + _NORM_EPSILON)
 
 
-def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
+def _rotated(image: np.ndarray, angle: float) -> np.ndarray:
     """Returns an image (C, n, n) rotated from the row axis to the column axis.
 
     Each pixel takes the value of the nearest source pixel, or 0 outside the
@@ -365,7 +367,7 @@ def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
     return image.reshape(-1, n * n).take(pixels, axis=1) * inside
 
 
-def _spectrum(image: np.ndarray) -> np.ndarray:
+def _normalised_spectrum(image: np.ndarray) -> np.ndarray:
     """Returns the spectrum (C, n, F) of an image (C, n, n), normalised."""
     centred = image - image.mean()
     return scipy.fft.rfft2(centred / np.linalg.norm(centred))
@@ -384,10 +386,10 @@ def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
     row, column = np.unravel_index(correlation.argmax(), correlation.shape)
     return (
         float(correlation[row, column]),
-        (_signed(int(row), n), _signed(int(column), n)),
+        (_signed_shift(int(row), n), _signed_shift(int(column), n)),
     )
 
 
-def _signed(shift: int, n: int) -> int:
+def _signed_shift(shift: int, n: int) -> int:
     """Returns a shift by 0, ..., n - 1 as one of -n // 2, ..., n // 2 - 1."""
     return (shift + n // 2) % n - n // 2

@@ -35,7 +35,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
 from cns_drake.base.poses import yaw_pose
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 
@@ -156,20 +156,22 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     config: ScanContextConfig
 
     def describe(self, points: np.ndarray) -> Contexts:
-        return Contexts(self._image(self._prepare(points))[None])
+        return Contexts(
+            self._context(self._downsampled_above_ground(points))[None]
+        )
 
     def describe_place(self, points: np.ndarray) -> Contexts:
-        prepared = self._prepare(points)
-        images = [self._image(prepared)]
+        prepared = self._downsampled_above_ground(points)
+        images = [self._context(prepared)]
         if self.config.variant == "augmented-polar":
             for shift in (
                 -self.config.lateral_shift,
                 self.config.lateral_shift,
             ):
-                images.append(self._image(prepared - [0.0, shift, 0.0]))
+                images.append(self._context(prepared - [0.0, shift, 0.0]))
         if self.config.variant == "augmented-cart":
             # The view of a car in the opposite direction.
-            images.append(self._image(prepared * [-1.0, -1.0, 1.0]))
+            images.append(self._context(prepared * [-1.0, -1.0, 1.0]))
         return Contexts(np.stack(images))
 
     def build_database(self, places: Sequence[Contexts]) -> ContextDatabase:
@@ -240,7 +242,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         scores = np.full(database.num_places, np.nan)
         for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
             some = chosen[start : start + _CONTEXTS_AT_ONCE]
-            similarities, _ = self._compare(query, database, some)
+            similarities, _ = self._best_similarities(query, database, some)
             # fmax takes the best context of a place, and NaN only if all are
             # NaN.
             np.fmax.at(scores, database.places[some], similarities)
@@ -257,7 +259,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         fits best. The result is None if no column is filled in both contexts.
         """
         chosen = np.flatnonzero(database.places == place)
-        similarities, shifts = self._compare(query, database, chosen)
+        similarities, shifts = self._best_similarities(query, database, chosen)
         if np.isnan(similarities).all():
             return None
         best = int(np.nanargmax(similarities))
@@ -279,17 +281,17 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         X_PQ[1, 3] = sign * signed * self.config.cart_cell[1]
         return X_PQ
 
-    def _prepare(self, points: np.ndarray) -> np.ndarray:
+    def _downsampled_above_ground(self, points: np.ndarray) -> np.ndarray:
         """Returns the downsampled points, with z from the ground."""
         lift = [0.0, 0.0, self.config.sensor_height]
-        return thin(points, self.config.voxel_size) + lift
+        return downsample(points, self.config.voxel_size) + lift
 
-    def _image(self, points: np.ndarray) -> np.ndarray:
+    def _context(self, points: np.ndarray) -> np.ndarray:
         if self.config.variant in ("polar", "augmented-polar"):
             return _polar_context(points, self.config)
         return _cart_context(points, self.config)
 
-    def _compare(
+    def _best_similarities(
         self, query: Contexts, database: ContextDatabase, chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compares a query with some contexts of a database.

@@ -18,7 +18,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
 from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.poses import yaw_pose
-from evaluation.maps.voxel_maps import Z_ORIGIN, thin
+from evaluation.maps.voxel_maps import Z_ORIGIN, downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register
 
@@ -159,7 +159,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
     def describe(self, points: np.ndarray) -> Solid:
         config = self.config
         elevations, lowest_deg, highest_deg = config.field()
-        x, y, z = self._prepare(points).T
+        x, y, z = self._downsampled_within_range(points).T
         r = np.hypot(x, y)
         # Rounding can put a value on the limit.
         range_cell = np.minimum(
@@ -175,10 +175,10 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         elevation_cell = np.clip(
             np.floor(height * (elevations / field_of_view)), 0, elevations - 1
         ).astype(np.int64)
-        over_range = _count(
+        over_range = _counts_by_cell(
             range_cell, config.ranges, elevation_cell, elevations
         )
-        over_azimuth = _count(
+        over_azimuth = _counts_by_cell(
             azimuth_cell, config.azimuths, elevation_cell, elevations
         )
         weights = _elevation_weights(over_range.sum(axis=0))
@@ -214,7 +214,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         # What the place sees at azimuth a, the query sees at a + shift.
         return yaw_pose(-2.0 * math.pi * shift / num_cells)
 
-    def _prepare(self, points: np.ndarray) -> np.ndarray:
+    def _downsampled_within_range(self, points: np.ndarray) -> np.ndarray:
         """Returns the downsampled points within range.
 
         As in the authors' Python program, the voxels begin half a voxel below
@@ -232,12 +232,12 @@ class SolidMethod(Method[Solid, SolidDatabase]):
             return within
         least = np.array([column.min() for column in within.T])
         first = least - 0.5 * config.voxel_size
-        # The grid of `thin` goes through the origin in x and y, but not in z.
+        # The grid of `downsample` goes through the origin in x and y, not in z.
         offset = first - [0.0, 0.0, Z_ORIGIN]
-        return thin(within - offset, config.voxel_size) + offset
+        return downsample(within - offset, config.voxel_size) + offset
 
 
-def _count(
+def _counts_by_cell(
     rows: np.ndarray, num_rows: int, columns: np.ndarray, num_columns: int
 ) -> np.ndarray:
     """Returns how many points fall into each cell, (num_rows, num_columns)."""

@@ -40,10 +40,10 @@ def read_weights(
     """Returns name -> tensor (float32) of a network's weights.
 
     Numbers of other types are converted. The dictionary of tensors may lie
-    inside other dictionaries, and all names in it may begin with the same
-    words, such as `module.`, which `DataParallel` adds. If several dictionaries
-    have the wanted names, the first dictionary is read, and a note on stderr
-    names it.
+    inside other dictionaries, and all names in it may have the same prefix,
+    such as `module.`, which `DataParallel` adds. If several dictionaries have
+    the wanted names, the first dictionary is read, and a note on stderr names
+    it.
 
     Args:
         path: file that `torch.save` wrote (PyTorch 1.6 or later), with a state
@@ -89,7 +89,7 @@ def _find_state(
     """Returns wanted name -> object, of the best dictionary of tensors."""
     best: list[tuple[str, dict[str, Any]]] = [("", {})]
     for place, inner in _dictionaries(found, "", _DEEPEST, set()):
-        # All wanted names may follow the same words.
+        # All wanted names may have the same prefix.
         prefixes = {
             key.removesuffix(name)
             for key in inner

@@ -74,7 +74,7 @@ def measure_search(
         queries: drive with described queries.
     """
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
-    search = _search_after(method, places, queries)
+    search = _timed_search(method, places, queries)
     return QueryCost(
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
@@ -128,10 +128,10 @@ def query_ms(
         places: described places, all of them candidates.
         queries: drive with described queries.
     """
-    return _median_ms(_search_after(method, places, queries))
+    return _median_ms(_timed_search(method, places, queries))
 
 
-def _search_after(
+def _timed_search(
     method: Method, places: DescribedScans, queries: DriveDescriptors
 ) -> Search:
     """Returns a search after some queries."""

@@ -24,7 +24,7 @@ _Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
 Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
 # How a cloud is made: number of merged scans, how many of these come before its
 # frame, and fields of the points.
-_Kind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
+_CloudKind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
 
 
 def describe_drive(
@@ -64,16 +64,16 @@ def describe_drive(
             needs, or no described cloud has a point within range.
     """
     requests = [*((one, roles, protocol) for one in methods), *further]
-    describing = [_Describing(drive, *request) for request in requests]
+    describing = [_DriveDescriber(drive, *request) for request in requests]
     visited = set().union(
-        *(_frames(drive, role, protocol).tolist() for role in roles)
+        *(_frames_of_role(drive, role, protocol).tolist() for role in roles)
     )
     wanted = sorted(visited.union(*(one.frames for one in describing)))
     num_points = 0
     for frame in track(
         wanted, f"describing {drive.name}", len(wanted), "scans"
     ):
-        seen = _Seen(drive, frame)
+        seen = _FrameClouds(drive, frame)
         if visit is not None and frame in visited:
             of_query = "places" not in roles
             shown = seen.sensor(protocol) if of_query else None
@@ -90,7 +90,7 @@ def describe_drive(
     return [one.finish() for one in describing]
 
 
-class _Seen:
+class _FrameClouds:
     """The clouds of a frame, each gathered once."""
 
     def __init__(self, drive: Drive, frame: int):
@@ -110,7 +110,7 @@ class _Seen:
         return self._sensors[protocol]
 
     def cloud(
-        self, sensor: QuerySensor | None, kind: _Kind, max_range: float
+        self, sensor: QuerySensor | None, kind: _CloudKind, max_range: float
     ) -> np.ndarray:
         """Returns the point cloud (N, 3) at the frame, in the sensor's frame.
 
@@ -144,7 +144,7 @@ class _Seen:
         return max(map(len, self._clouds.values()), default=0)
 
 
-def _frames(
+def _frames_of_role(
     drive: Drive, role: Role, protocol: RetrievalProtocol
 ) -> np.ndarray:
     spacing = protocol.place_spacing
@@ -153,7 +153,7 @@ def _frames(
     return sample_frames(drive.X_WS[:, :3, 3], spacing)
 
 
-class _Describing:
+class _DriveDescriber:
     """Collects the descriptors of one drive by one method."""
 
     def __init__(
@@ -163,7 +163,7 @@ class _Describing:
         roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
-        self._kind: _Kind = (
+        self._cloud_kind: _CloudKind = (
             protocol.scans(method),
             protocol.scans_before(method),
             tuple(method.point_fields),
@@ -176,7 +176,7 @@ class _Describing:
         self._members: dict[Role, set[int]] = {}
         scans = {}
         for role in get_args(Role):
-            frames = _frames(drive, role, protocol)
+            frames = _frames_of_role(drive, role, protocol)
             X_WS = drive.X_WS[frames]
             if role == "queries":
                 X_WS = protocol.query_poses(X_WS, frames)
@@ -195,7 +195,7 @@ class _Describing:
         """All frames that are described."""
         return set().union(*self._members.values())
 
-    def add(self, seen: _Seen) -> None:
+    def add(self, seen: _FrameClouds) -> None:
         """Adds a frame as a place, a query or both.
 
         Frames are described together, once enough of them for a batch have been
@@ -204,7 +204,7 @@ class _Describing:
         clouds = {
             role: seen.cloud(
                 seen.sensor(self._protocol) if role == "queries" else None,
-                self._kind,
+                self._cloud_kind,
                 self._protocol.max_range,
             )
             for role, members in self._members.items()
@@ -213,13 +213,13 @@ class _Describing:
         if clouds:
             self._waiting.append((seen.frame, clouds))
         if len(self._waiting) >= self._method.batch_size:
-            self._flush()
+            self._describe_waiting()
 
     def finish(self) -> DriveDescriptors:
-        self._flush()
+        self._describe_waiting()
         return self._drive
 
-    def _flush(self) -> None:
+    def _describe_waiting(self) -> None:
         places = self._describe("places", {})
         shared = {}
         if self._method.describes_alike:

@@ -64,7 +64,9 @@ def gated(
     if len(best) == 0 or not radii:
         return [scores for _ in radii]
     poses = estimated_poses(method, query, database, best.tolist())
-    return gated_at(scores, dict(zip(best.tolist(), poses, strict=True)), radii)
+    return gated_by_poses(
+        scores, dict(zip(best.tolist(), poses, strict=True)), radii
+    )
 
 
 def estimated_poses(
@@ -96,7 +98,7 @@ def tested_places(scores: np.ndarray) -> np.ndarray:
     return ranked_places(scores)[: min(NUM_GATED, num_candidates)]
 
 
-def gated_at(
+def gated_by_poses(
     scores: np.ndarray,
     poses: Mapping[int, np.ndarray | None],
     radii: Sequence[float],

@@ -123,19 +123,12 @@ class PlaceOutcome:
         order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)
         best_scores = np.take_along_axis(scores, order, axis=1)
         best_places = np.where(np.isnan(best_scores), -1, order)
-        best = retrieval.best_places.tolist()
-        names = np.array([drives[k] if k >= 0 else "" for k in best])
         outcomes = judge(scores, retrieval.matches, retrieval.query_blocks)
-        distances = retrieval.best_distances
         if num_here is None:
             num_here = sum(name == drives[0] for name in drives)
-        distances[retrieval.best_places >= num_here] = math.nan
         if overlaps is None:
             overlaps = np.full(len(outcomes), math.nan)
         query_name, stamps_ns, positions = query
-        why = faults(
-            outcomes, retrieval.best_frames, distances, protocol.radius
-        )
         columns = {
             "query_frame": retrieval.query_frames,
             "query_stamp_ns": stamps_ns,
@@ -143,16 +136,9 @@ class PlaceOutcome:
             "query_y": positions[:, 1],
             "query_z": positions[:, 2],
             "block": outcomes.own_blocks,
-            "correct": outcomes.is_right,
-            "has_match": outcomes.has_match,
-            "score": outcomes.best_scores,
-            "first_right_rank": outcomes.first_right_ranks,
-            "why": why,
-            "match_drive": names,
-            "match_frame": retrieval.best_frames,
-            "distance": distances,
-            "translation_error": retrieval.pose_errors.translation,
-            "rotation_error_deg": retrieval.pose_errors.rotation_deg,
+            **_columns_of_answers(
+                retrieval, outcomes, drives, num_here, protocol.radius
+            ),
             "overlap": overlaps,
             "visible_change": 1.0 - overlaps,
         }
@@ -287,6 +273,40 @@ class PlaceOutcome:
         return Number(
             self.method, self.is_gated, metric, value, interval, count
         )
+
+
+def _columns_of_answers(
+    retrieval: Retrieval,
+    outcomes: QueryOutcomes,
+    drives: Sequence[str],
+    num_here: int,
+    radius: float,
+) -> dict[str, np.ndarray]:
+    """Returns the columns of `queries.csv` on the top-ranked places.
+
+    Args:
+        retrieval: see `PlaceOutcome.of`.
+        outcomes: outcomes of the queries.
+        drives: see `PlaceOutcome.of`.
+        num_here: see `PlaceOutcome.of`.
+        radius: radius of a match [m].
+    """
+    best = retrieval.best_places
+    distances = retrieval.best_distances
+    distances[best >= num_here] = math.nan
+    names = [drives[k] if k >= 0 else "" for k in best.tolist()]
+    return {
+        "correct": outcomes.is_right,
+        "has_match": outcomes.has_match,
+        "score": outcomes.best_scores,
+        "first_right_rank": outcomes.first_right_ranks,
+        "why": faults(outcomes, retrieval.best_frames, distances, radius),
+        "match_drive": np.array(names),
+        "match_frame": retrieval.best_frames,
+        "distance": distances,
+        "translation_error": retrieval.pose_errors.translation,
+        "rotation_error_deg": retrieval.pose_errors.rotation_deg,
+    }
 
 
 def check_has_match(outcome: PlaceOutcome) -> None:

@@ -194,9 +194,9 @@ class RetrievalProtocol:
     def _named(
         self, filled: Callable[[RetrievalProtocol], RetrievalProtocol]
     ) -> str:
-        mine = filled(self)._counting
+        mine = filled(self)._counted_fields
         for name, shipped in PROTOCOLS.items():
-            if filled(shipped)._counting == mine:
+            if filled(shipped)._counted_fields == mine:
                 return name
         return "own"
 
@@ -214,10 +214,10 @@ class RetrievalProtocol:
         # Imported here: it takes time, and options need only the fields.
         from cns_drake.base.jobs.fingerprint import fingerprint
 
-        return fingerprint({**self._counting, **further})[:_DIGEST_LENGTH]
+        return fingerprint({**self._counted_fields, **further})[:_DIGEST_LENGTH]
 
     @property
-    def _counting(self) -> dict[str, object]:
+    def _counted_fields(self) -> dict[str, object]:
         """Name -> value of the fields that change a number."""
         values = asdict(self)
         del values["gate"]
@@ -229,8 +229,8 @@ class RetrievalProtocol:
         }
 
     @property
-    def _asked(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in _ASKED}
+    def _query_changes(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in _QUERY_FIELDS}
 
     @property
     def _changes_queries(self) -> bool:
@@ -253,16 +253,16 @@ class RetrievalProtocol:
             place=method.config.place or self.place,
         )
 
-    def asked_like(self, other: RetrievalProtocol) -> RetrievalProtocol:
+    def with_queries_of(self, other: RetrievalProtocol) -> RetrievalProtocol:
         """Returns the protocol with some options of another protocol.
 
         These are the options for random yaw, tilt and occluded sector of
         queries, their `seed`, and the choice of the scan that determines the
         pose of a place (`place`).
         """
-        return replace(self, place=other.place, **other._asked)
+        return replace(self, place=other.place, **other._query_changes)
 
-    def described(self, *, queries: bool = True) -> dict[str, object]:
+    def descriptor_options(self, *, queries: bool = True) -> dict[str, object]:
         """Returns name -> value of the options that affect descriptors.
 
         Args:
@@ -344,7 +344,7 @@ PROTOCOLS = {
     "recorded": RECORDED_PROTOCOL,
 }
 PROTOCOL_NAMES = (*PROTOCOLS, "own")
-_ASKED = (*_QUERY_CHANGES, "seed")
+_QUERY_FIELDS = (*_QUERY_CHANGES, "seed")
 
 
 def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:

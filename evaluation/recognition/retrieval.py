@@ -14,7 +14,7 @@ from evaluation.methods.method import Method
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.geometric_verification import (
-    gated_at,
+    gated_by_poses,
     tested_places,
 )
 from evaluation.recognition.overlap_truth import overlap_matrix
@@ -22,7 +22,7 @@ from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.search import Search
-from evaluation.recognition.sequences import along_the_way
+from evaluation.recognition.sequences import sequence_scores
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def compare_with_gates(
     rows = range(len(queries.frames))
     alone = search.scores(query, rows, is_known)
     if length := method.config.sequence:
-        alone = along_the_way(
+        alone = sequence_scores(
             alone,
             is_known,
             queries.p_WSs,
@@ -185,7 +185,7 @@ def compare_with_gates(
     errors = [PoseErrors.unknown(len(rows)) for _ in gate_radii]
     distances = _distances(database, query)
     for row, ungated in enumerate(alone):
-        by_gate = iter(gated_at(ungated, poses[row], radii))
+        by_gate = iter(gated_by_poses(ungated, poses[row], radii))
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated if radius is None else next(by_gate)
             kept[row] = found

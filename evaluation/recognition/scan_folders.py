@@ -73,7 +73,7 @@ def write_scores(
     for path in track(
         place_files, "describing places", len(place_files), "scans"
     ):
-        cloud, ignored = _read(path, method, place_columns, on_note)
+        cloud, ignored = _read_cropped(path, method, place_columns, on_note)
         descriptors.append(method.describe_place(cloud))
         if method.rerank_best:
             clouds.append(cloud)
@@ -88,7 +88,7 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files), "scans"):
-            cloud, ignored = _read(path, method, query_columns, on_note)
+            cloud, ignored = _read_cropped(path, method, query_columns, on_note)
             num_ignored += ignored
             queries.append(method.describe(cloud))
             values = score_places(
@@ -137,7 +137,7 @@ def _first_of_each_kind(on_note: OnNote) -> OnNote:
     return pass_on
 
 
-def _read(
+def _read_cropped(
     path: Path, method: Method, columns: int | None, on_note: OnNote
 ) -> tuple[np.ndarray, int]:
     """Returns a cropped cloud, N > 0, and its number of non-finite points."""

@@ -62,12 +62,12 @@ class Search:
             InputError: the method returns something other than scores.
         """
         self.query_ms = np.zeros(len(rows))
-        shares = self._shares(query, rows, is_known)
+        shares = self._entries_by_group(query, rows, is_known)
         scores = np.empty(is_known.shape)
-        for number, group in self._built_groups():
+        for number, group in self._groups_in_memory():
             for k in self._tracked(query, rows):
                 start = process_time_ns()
-                scores[k, group] = self._score(
+                scores[k, group] = self._scores_in_group(
                     query,
                     rows[k],
                     is_known[k],
@@ -95,7 +95,7 @@ class Search:
             InputError: the method returns something other than poses.
         """
         found: list[dict[int, np.ndarray | None]] = [{} for _ in wanted]
-        for _, group in self._built_groups():
+        for _, group in self._groups_in_memory():
             for row, places in enumerate(wanted):
                 here = places[(group.start <= places) & (places < group.stop)]
                 if len(here) == 0:
@@ -109,7 +109,7 @@ class Search:
                 found[row].update(zip(here.tolist(), poses, strict=True))
         return found
 
-    def _shares(
+    def _entries_by_group(
         self,
         query: DriveDescriptors,
         rows: Sequence[int],
@@ -127,7 +127,7 @@ class Search:
         lists: list[list[np.ndarray]] = [
             [np.empty(0)] * len(self._groups) for _ in rows
         ]
-        for number, _ in self._built_groups():
+        for number, _ in self._groups_in_memory():
             for k in self._tracked(query, rows):
                 if not is_known[k].all():
                     continue
@@ -144,7 +144,7 @@ class Search:
             shares[k] = np.bincount(of[best], minlength=len(some))
         return shares
 
-    def _score(
+    def _scores_in_group(
         self,
         query: DriveDescriptors,
         row: int,
@@ -152,7 +152,7 @@ class Search:
         group: slice,
         share: int | None,
     ) -> np.ndarray:
-        """Returns the scores of a query in a group; see `_shares`."""
+        """Returns the scores of a query in a group; see `_entries_by_group`."""
         queries = query.queries
         method = self._method
         is_whole = bool(is_known.all())
@@ -173,7 +173,7 @@ class Search:
             where=f"{query.name}: query at frame {queries.frames[row]}",
         )
 
-    def _built_groups(self) -> Iterator[tuple[int, slice]]:
+    def _groups_in_memory(self) -> Iterator[tuple[int, slice]]:
         """Yields the number and the places of each group, and builds it.
 
         The group that is in memory comes first. Nothing else may hold a

@@ -124,7 +124,7 @@ class SeenSurfaces:
         """
         if len(points) == 0:
             return Shares(math.nan, math.nan)
-        kinds, _ = self._look(points)
+        kinds, _ = self._kinds_and_clearances(points)
         return Shares(
             float(np.mean(kinds == _SHOWN)), float(np.mean(kinds == _BEHIND))
         )
@@ -147,19 +147,21 @@ class SeenSurfaces:
         Args:
             points: (N, 3) points in the sensor's frame [m].
         """
-        return self._look(points)[1]
+        return self._kinds_and_clearances(points)[1]
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which points (N, 3) are behind a seen surface, (N,) bool."""
-        return self._look(points)[0] == _BEHIND
+        return self._kinds_and_clearances(points)[0] == _BEHIND
 
-    def _look(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _kinds_and_clearances(
+        self, points: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         points = np.ascontiguousarray(points, dtype=np.float64)
-        return _look(points, self.points, self.angles_deg, self.starts)
+        return _look_at(points, self.points, self.angles_deg, self.starts)
 
 
 @compiled
-def _find_corners(
+def _find_nearest_by_quadrant(
     p: np.ndarray,
     angles: np.ndarray,
     starts: np.ndarray,
@@ -241,7 +243,7 @@ def _length(p: np.ndarray) -> float:
 
 
 @compiled
-def _look(
+def _look_at(
     others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns whether M points are shown, hidden or neither; and clearances.
@@ -256,7 +258,7 @@ def _look(
     for i in range(len(others)):
         p = others[i]
         distance = _length(p)
-        _find_corners(p, angles, starts, corners, away)
+        _find_nearest_by_quadrant(p, angles, starts, corners, away)
         farthest = 0.0
         nearest = math.inf
         count = 0

@@ -11,7 +11,7 @@ import numpy as np
 from evaluation.drives.sampling import travelled
 
 
-def along_the_way(
+def sequence_scores(
     scores: np.ndarray,
     is_known: np.ndarray,
     p_WQs: np.ndarray,

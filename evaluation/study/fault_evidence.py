@@ -17,7 +17,7 @@ from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import track
 from evaluation.drives.sampling import within_range
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
 from evaluation.recognition.fault_kinds import PairEvidence
@@ -202,7 +202,7 @@ class _Shown:
     @cached_property
     def standing(self) -> np.ndarray:
         """(M, 3) centroids of the points on upright objects, per voxel [m]."""
-        return thin(
+        return downsample(
             self.points[self.points[:, 2] > _least_standing_height()], _CELL
         )
 

@@ -415,7 +415,7 @@ class FeatureExtraction(Step):
         def inputs(
             roles: Set[description.Role], protocol: RetrievalProtocol
         ) -> dict[str, object]:
-            options = protocol.described(queries="queries" in roles)
+            options = protocol.descriptor_options(queries="queries" in roles)
             return self.made_of(
                 {
                     "drive": drive,

@@ -111,9 +111,11 @@ def repeats_of(
         ours = replace(protocol.of(method), exclude_recent=None)
         if (
             published != ours
-            and ours.asked_like(published).of(method) == published
+            and ours.with_queries_of(published).of(method) == published
         ):
-            places = ours.described(queries=False)
-            shares_places = places == published.described(queries=False)
+            places = ours.descriptor_options(queries=False)
+            shares_places = places == published.descriptor_options(
+                queries=False
+            )
             found.append(Repeat(choice, published, shares_places))
     return found

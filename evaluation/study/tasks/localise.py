@@ -292,7 +292,7 @@ def localise_among_others(
     """
     drive = source()
     X_WS = drive.X_WS
-    R_WT = localise.way_axes(X_WS[:, :3, 3], X_WS)
+    R_WT = localise.path_axes(X_WS[:, :3, 3], X_WS)
     made = [
         (make_estimator(one, settings), settings)
         for one in map(str, methods)

@@ -411,7 +411,7 @@ def job_name(part: Part) -> str:
 def _description_name(
     drive: NamedDrive, role: Role, protocol: RetrievalProtocol
 ) -> str:
-    options = protocol.described(queries=role == "queries")
+    options = protocol.descriptor_options(queries=role == "queries")
     return f"{drive.name} {role} {fingerprint(options)[:6]}"
 
 

@@ -5,12 +5,12 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from evaluation.alignment.registration import make_surface, register
-from evaluation.maps.voxel_maps import thin
+from evaluation.maps.voxel_maps import downsample
 
 
 def surface(points, reach=40.0):
     near = np.hypot(points[:, 0] - 40.0, points[:, 1]) < reach
-    return make_surface(thin(points[near] - [40.0, 0.0, 1.6], 0.7))
+    return make_surface(downsample(points[near] - [40.0, 0.0, 1.6], 0.7))
 
 
 @pytest.fixture(scope="module")

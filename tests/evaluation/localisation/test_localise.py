@@ -28,7 +28,7 @@ from evaluation.localisation.localise import (
     Localiser,
     localise,
     mapped_frames,
-    way_axes,
+    path_axes,
 )
 from evaluation.localisation.results import (
     COLUMNS,
@@ -37,7 +37,7 @@ from evaluation.localisation.results import (
     note_sparse,
     summary,
 )
-from evaluation.localisation.robust import _step
+from evaluation.localisation.robust import _gauss_newton_step
 from evaluation.localisation.settings import METHODS, Settings, default_settings
 from evaluation.recognition.auroc import auroc
 
@@ -189,7 +189,7 @@ def test_a_step_is_that_of_weighted_least_squares(method):
     )
     # The step is held by a little, where nothing else holds it.
     np.testing.assert_allclose(
-        _step(surface, scan, X, width, spread), least, atol=1e-6
+        _gauss_newton_step(surface, scan, X, width, spread), least, atol=1e-6
     )
 
 
@@ -200,7 +200,7 @@ def test_a_pair_is_within_the_width(p, width, aligned):
     surface = make_surface(sheet((0, 0, 0), (9, 0, 0), (0, 9, 0), 1, 20.0))
     scan = surface.points[:40]
     X = poses.make_pose(np.eye(3), np.array([0.0, 0.0, p]))
-    step = _step(surface, scan, X, width, None)
+    step = _gauss_newton_step(surface, scan, X, width, None)
     assert (np.abs(step).max() > 1.0) == aligned
 
 
@@ -211,7 +211,7 @@ def test_the_search_is_narrowed_to_the_last_width(monkeypatch):
         widths.append(width)
         return np.array([0, 0, 0, 0.3, 0, 0]) * (len(widths) == 1)
 
-    monkeypatch.setattr(robust, "_step", still)
+    monkeypatch.setattr(robust, "_gauss_newton_step", still)
     surface = make_surface(street())
     start = np.eye(4)
     end, steps = robust.align_robustly(
@@ -309,7 +309,7 @@ def test_starts_lie_on_a_sphere_and_depend_on_seed_and_frame_alone():
 def test_axes_of_a_way():
     p_WS = np.array([[0.0, 0, 0], [0, 2, 0], [0, 4, 2], [0, 4, 2], [0, 4, 2]])
     X_WS = np.tile(np.eye(4), (5, 1, 1))
-    axes = way_axes(p_WS, X_WS)
+    axes = path_axes(p_WS, X_WS)
     assert np.allclose(axes[0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     slope = np.array([0.0, 2.0, 1.0]) / math.sqrt(5.0)
     assert np.allclose(axes[1][:, 0], slope)

@@ -14,7 +14,7 @@ from cns_drake.command_line.cli import main
 from evaluation.map_update.baselines import by_distance
 from evaluation.map_update.free_space import by_free_space
 from evaluation.map_update.labels import Label, Labels
-from evaluation.map_update.map_builder import THINNED, MapBuilder
+from evaluation.map_update.map_builder import CELL, MapBuilder
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
     Pair,
@@ -262,7 +262,7 @@ def test_a_map_has_the_first_point_of_each_cell():
     seen = set()
     expected = []
     for point in whole.tolist():
-        cell = tuple(np.floor(np.array(point[:3]) / THINNED))
+        cell = tuple(np.floor(np.array(point[:3]) / CELL))
         if cell not in seen:
             seen.add(cell)
             expected.append(point)

@@ -10,7 +10,13 @@ from scipy import ndimage
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.methods.learned import FEATURES, LAYERS, SHIPPED, TURNS, _infer
+from evaluation.methods.learned import (
+    FEATURES,
+    LAYERS,
+    SHIPPED,
+    TURNS,
+    _feature_map,
+)
 from evaluation.methods.polar_images import RINGS, SECTORS, polar_image
 
 RNG = np.random.default_rng(7)
@@ -95,7 +101,7 @@ def test_the_network_by_correlations():
         if number < len(LAYERS) - 1:
             cells = np.maximum(cells, 0.0)
     expected = cells.transpose(1, 0, 2).reshape(TURNS, FEATURES)
-    assert _infer(values, image) == pytest.approx(expected, abs=1e-4)
+    assert _feature_map(values, image) == pytest.approx(expected, abs=1e-4)
 
 
 def test_scores_do_not_depend_on_the_heading(method):

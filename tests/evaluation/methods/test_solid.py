@@ -128,7 +128,7 @@ class TestDescribe:
         # One voxel reaches from 9.5 to 10.5 m, the next one to 11.5 m.
         x = np.array([10.0, 10.4, 10.6, 11.4])
         scan = np.stack([x, np.full(4, 20.0), np.full(4, 7.3)], axis=1)
-        thinned = solid()._prepare(scan)
+        thinned = solid()._downsampled_within_range(scan)
         np.testing.assert_allclose(
             thinned, [[10.2, 20.0, 7.3], [11.0, 20.0, 7.3]]
         )
@@ -138,7 +138,7 @@ class TestDescribe:
         scan = make_scene(1)
         over_range = np.zeros((40, 32))
         over_azimuth = np.zeros((60, 32))
-        for x, y, z in method._prepare(scan):
+        for x, y, z in method._downsampled_within_range(scan):
             r = math.sqrt(x * x + y * y)
             row = (math.degrees(math.atan2(z, r)) + 22.5) / (45.0 / 32)
             row = min(max(math.floor(row), 0), 31)

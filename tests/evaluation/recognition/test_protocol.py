@@ -157,4 +157,4 @@ def test_the_gate_is_said():
     assert (open_gate.gate_radius, shut.gate_radius) == (None, 7.5)
     assert "gate" in PROTOCOL_COLUMNS
     # Descriptions of a drive do not depend on this option.
-    assert shut.described() == open_gate.described()
+    assert shut.descriptor_options() == open_gate.descriptor_options()

@@ -127,10 +127,18 @@ def test_places_are_described_as_ever(drives):
             one.queries.descriptors[0], one.places.descriptors[0]
         )
     plain = RetrievalProtocol()
-    assert TURNED.described(queries=False) == plain.described(queries=False)
-    assert TURNED.described() != plain.described()
-    assert replace(plain, seed=3).described() == plain.described()
-    assert replace(TURNED, seed=3).described() != TURNED.described()
+    assert TURNED.descriptor_options(queries=False) == plain.descriptor_options(
+        queries=False
+    )
+    assert TURNED.descriptor_options() != plain.descriptor_options()
+    assert (
+        replace(plain, seed=3).descriptor_options()
+        == plain.descriptor_options()
+    )
+    assert (
+        replace(TURNED, seed=3).descriptor_options()
+        != TURNED.descriptor_options()
+    )
 
 
 def test_points_are_cropped_where_the_turned_sensor_has_them(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evaluation import make_method, open_drive, retrieve
-from evaluation.recognition.sequences import along_the_way
+from evaluation.recognition.sequences import sequence_scores
 
 
 def on_a_line(*places):
@@ -17,7 +17,7 @@ def test_the_votes_of_a_way_are_averaged():
     scores = np.array(
         [[9.0, 1, 1, 1, 1], [1.0, 2, 3, 4, 5], [10.0, 20, 30, 40, 50]]
     )
-    found = along_the_way(scores, scores > 0, p_WQs, p_WPs, 10.0)
+    found = sequence_scores(scores, scores > 0, p_WQs, p_WPs, 10.0)
     # Forwards, place k has the vote of place k - 2; backwards, of k + 2.
     forth = [10.0, 20.0, (30 + 1) / 2, (40 + 2) / 2, (50 + 3) / 2]
     back = [(10 + 3) / 2, (20 + 4) / 2, (30 + 5) / 2, 40.0, 50.0]
@@ -31,7 +31,7 @@ def test_the_votes_of_a_way_are_averaged():
 def test_the_length_counts_up_to_itself(length, voting):
     way = on_a_line(0, 10, 20, 30)
     scores = np.diag([8.0, 4.0, 2.0, 1.0])
-    found = along_the_way(scores, scores >= 0, way, way, length)
+    found = sequence_scores(scores, scores >= 0, way, way, length)
     diagonal = np.diag(scores)
     assert found[3, 3] == diagonal[4 - voting :].mean()
 
@@ -40,17 +40,17 @@ def test_missing_scores_count_as_the_least_and_empty_queries_not_at_all():
     way = on_a_line(0, 5)
     nan = np.nan
     known = np.ones((2, 2), bool)
-    partly = along_the_way(
+    partly = sequence_scores(
         np.array([[nan, 3.0], [1.0, 7.0]]), known, way, way, 5
     )
     # Place 1 by the first query's place 0, which is missing: the least is 3.
     assert partly[1, 1] == max((7.0 + 3.0) / 2, 7.0)
-    empty = along_the_way(
+    empty = sequence_scores(
         np.array([[nan, nan], [1.0, 2.0]]), known, way, way, 5
     )
     np.testing.assert_array_equal(empty, [[nan, nan], [1.0, 2.0]])
     known[1, 1] = False
-    hidden = along_the_way(
+    hidden = sequence_scores(
         np.array([[0.0, 0.0], [1.0, nan]]), known, way, way, 5
     )
     assert np.isnan(hidden[1, 1])
@@ -67,7 +67,7 @@ def test_a_way_tells_twins_apart(turn):
     right = np.arange(len(looks))[::turn]
     alone = scores.argmax(axis=1)
     assert (alone != right).any()
-    found = along_the_way(scores, known, way, places, 10.0)
+    found = sequence_scores(scores, known, way, places, 10.0)
     np.testing.assert_array_equal(found.argmax(axis=1)[2:], right[2:])
 
 
@@ -82,7 +82,7 @@ def test_a_setting_of_every_method_asks_for_it(towns):
             (drives[0], alone.database_frames),
         )
     )
-    expected = along_the_way(alone.scores, alone.is_known, p_WQs, p_WPs, 20.0)
+    expected = sequence_scores(alone.scores, alone.is_known, p_WQs, p_WPs, 20.0)
     np.testing.assert_array_equal(found.scores, expected)
     assert (found.scores != alone.scores).any()
     np.testing.assert_array_equal(found.distances, alone.distances)
@@ -97,7 +97,7 @@ def test_votes_stay_within_a_drive(gap):
     queries = on_a_line(*range(0, 30, 5))
     first = on_a_line(*range(0, 25, 5))
     second = on_a_line(*(20 + gap + np.arange(0, 20, 5)))
-    found = along_the_way(
+    found = sequence_scores(
         scores,
         known,
         queries,
@@ -106,7 +106,7 @@ def test_votes_stay_within_a_drive(gap):
         np.repeat([0, 1], [5, 4]),
     )
     for columns, way in ((slice(0, 5), first), (slice(5, 9), second)):
-        alone = along_the_way(
+        alone = sequence_scores(
             scores[:, columns], known[:, columns], queries, way, 20.0
         )
         np.testing.assert_array_equal(found[:, columns], alone)

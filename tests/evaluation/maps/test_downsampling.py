@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from cns_drake.base.points import from_xyz
-from evaluation.maps.voxel_maps import thin, voxelise
+from evaluation.maps.voxel_maps import downsample, voxelise
 
 
 def test_thin():
     points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [-0.1, 0.1, 0.1]])
     np.testing.assert_allclose(
-        thin(points, 0.5), [[-0.1, 0.1, 0.1], [0.2, 0.1, 0.1]], atol=1e-12
+        downsample(points, 0.5), [[-0.1, 0.1, 0.1], [0.2, 0.1, 0.1]], atol=1e-12
     )
 
 
@@ -25,19 +25,21 @@ def test_centroids_are_those_of_a_map(number, voxel_size):
     points[4::50, 2] = np.inf
     points[5::900, 0] = 1e12
     voxels, _ = voxelise(from_xyz(points), voxel_size)
-    assert thin(points, voxel_size).tobytes() == voxels.centroids_W.tobytes()
+    assert (
+        downsample(points, voxel_size).tobytes() == voxels.centroids_W.tobytes()
+    )
 
 
 def test_voxels_too_far_apart_to_be_numbered():
     points = 4e8 * np.random.default_rng(3).normal(size=(300, 3))
     voxels, _ = voxelise(from_xyz(points), 0.5)
     assert len(voxels) > 200
-    assert thin(points, 0.5).tobytes() == voxels.centroids_W.tobytes()
+    assert downsample(points, 0.5).tobytes() == voxels.centroids_W.tobytes()
 
 
 def test_any_memory_order_and_type():
     points = np.random.default_rng(5).normal(0.0, 3.0, (400, 3))
     points = points.astype(np.float32)
-    expected = thin(points.astype(np.float64), 0.5)
+    expected = downsample(points.astype(np.float64), 0.5)
     for same in (points, np.asfortranarray(points)):
-        assert thin(same, 0.5).tobytes() == expected.tobytes()
+        assert downsample(same, 0.5).tobytes() == expected.tobytes()
