@@ -1,7 +1,6 @@
 """Drives recorded as MCAP by cns-drake, or by other programs on its topics."""
 
 from collections.abc import Mapping
-import contextlib
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,24 @@ import numpy as np
 from cns_drake.base import points as point_arrays
 from cns_drake.base.drives import mcap_messages, point_layouts, ros_types
 from cns_drake.base.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
-from cns_drake.base.drives.mcap_file import McapFile
+from cns_drake.base.drives.lidar_topics import (
+    LIDAR_TOPIC,
+    choose_lidar_topic,
+    cloud_topics,
+    lidar_name,
+)
+from cns_drake.base.drives.mcap_images import McapImages
 from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
+from cns_drake.base.drives.mcap_topics import McapTopics
 from cns_drake.base.drives.message_rows import (
     MessageRows,
+    check_agreement,
     transform_row,
     vehicle_frames,
 )
-from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.json_text import parse_json
+from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
 
-_LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_TOPIC = "/tf"
@@ -73,36 +78,25 @@ class McapDrive(Drive):
             InputError: if there is no complete recording at `path`, or no
                 such LiDAR in it.
         """
-        self._file = McapFile(_mcap_path(Path(path)))
-        self._path = self._file.path
+        self._topics = McapTopics(_mcap_path(Path(path)))
+        self._file = self._topics.file
+        self._path = self._topics.path
         self.name = _drive_name(Path(path))
-        self._lidar_topic = self._find_lidar_topic(lidar)
-        self._message_types = {
-            self._lidar_topic: ros_types.POINT_CLOUD,
-            _ODOMETRY_TOPIC: ros_types.ODOMETRY,
-            _TF_STATIC_TOPIC: ros_types.TF,
-        }
+        self._lidar_topic = choose_lidar_topic(
+            self._file.topics, lidar, self._path
+        )
+        self._topics.require(self._lidar_topic, ros_types.POINT_CLOUD)
+        self._topics.require(_ODOMETRY_TOPIC, ros_types.ODOMETRY)
+        self._topics.require(_TF_STATIC_TOPIC, ros_types.TF)
         labels = self._lidar_topic.removesuffix("points") + "labels"
         self._labels_topic = labels if labels in self._file.topics else None
         if self._labels_topic is not None:
-            self._message_types[labels] = ros_types.POINT_CLOUD
+            self._topics.require(labels, ros_types.POINT_CLOUD)
         if _IMU_TOPIC in self._file.topics:
-            self._message_types[_IMU_TOPIC] = ros_types.IMU
-        for topic, message_type in self._message_types.items():
-            self._check_topic(topic, message_type)
-        if self._file.topics.get(_TF_TOPIC) == [f"{ros_types.TF} in cdr"]:
-            self._message_types[_TF_TOPIC] = ros_types.TF
+            self._topics.require(_IMU_TOPIC, ros_types.IMU)
+        self._has_tf = _TF_TOPIC in self._topics.find(ros_types.TF)
         self._all_scans = self._file.locate(self._lidar_topic)
-        # `image_transport` adds compressedDepth to the names of depth images.
-        self._camera_topics = [
-            topic
-            for topic, kinds in self._file.topics.items()
-            if kinds == [f"{ros_types.COMPRESSED_IMAGE} in cdr"]
-            and not topic.endswith("/compressedDepth")
-        ]
-        self._message_types.update(
-            dict.fromkeys(self._camera_topics, ros_types.COMPRESSED_IMAGE)
-        )
+        self._images = McapImages(self._topics)
 
     def __len__(self) -> int:
         return len(self._scans)
@@ -130,15 +124,15 @@ class McapDrive(Drive):
 
         They are records of `ODOMETRY_DTYPE` with velocities of zero.
         """
-        if _TF_TOPIC not in self._message_types:
+        if not self._has_tf:
             return np.zeros(0, ODOMETRY_DTYPE)
         last = self._file.locate(_ODOMETRY_TOPIC)[-1]
-        odometry = self._message(_ODOMETRY_TOPIC, last)
+        odometry = self._topics.message(_ODOMETRY_TOPIC, last)
         places = self._file.locate(_TF_TOPIC)
         found = [
             transform_row(edge)
             for place in places[places["log_time_ns"] > last["log_time_ns"]]
-            for edge in self._message(_TF_TOPIC, place).transforms
+            for edge in self._topics.message(_TF_TOPIC, place).transforms
             if vehicle_frames(edge) == vehicle_frames(odometry)
         ]
         rows = np.array(found, ODOMETRY_DTYPE)
@@ -147,14 +141,14 @@ class McapDrive(Drive):
     @property
     def lidar_names(self) -> tuple[str, ...]:
         """Names of the LiDARs; the first is the one that is read by default."""
-        clouds = self._cloud_topics()
-        clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
-        return tuple(map(_lidar_name, clouds))
+        clouds = cloud_topics(self._file.topics)
+        clouds.sort(key=lambda topic: topic != LIDAR_TOPIC)
+        return tuple(map(lidar_name, clouds))
 
     @property
     def lidar_name(self) -> str:
         """Name of the LiDAR whose scans are read."""
-        return _lidar_name(self._lidar_topic)
+        return lidar_name(self._lidar_topic)
 
     @cached_property
     def lidar_section(self) -> Mapping:
@@ -164,7 +158,7 @@ class McapDrive(Drive):
 
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
-        return self._first(_ODOMETRY_TOPIC).header.frame_id
+        return self._topics.first(_ODOMETRY_TOPIC).header.frame_id
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -212,7 +206,7 @@ class McapDrive(Drive):
 
     @property
     def scenario(self) -> Mapping | None:
-        scenario = self._json("scenario.json")
+        scenario = self._topics.json("scenario.json")
         if scenario is not None and not isinstance(scenario, dict):
             raise InputError(
                 f"{self._path}: attachment scenario.json: not a JSON object"
@@ -226,12 +220,12 @@ class McapDrive(Drive):
         The digests are the value of `inputs_sha256` in the attachment
         `provenance.json`; None if the recording lacks this value.
         """
-        found = self._json("provenance.json")
+        found = self._topics.json("provenance.json")
         return found.get("inputs_sha256") if isinstance(found, dict) else None
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        table = self._json("structures.json")
+        table = self._topics.json("structures.json")
         if table is None:
             return None
         return index_instances(
@@ -242,9 +236,9 @@ class McapDrive(Drive):
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
         place = self._scans[index]
-        message = self._message(self._lidar_topic, place)
+        message = self._topics.message(self._lidar_topic, place)
         stamp_ns = mcap_messages.stamp_ns(message.header)
-        with self._faults(
+        with self._topics.faults(
             f"{self._lidar_topic}: scan {index} at {stamp_ns} ns"
         ):
             self._check_frame(message.header.frame_id)
@@ -267,7 +261,7 @@ class McapDrive(Drive):
         topic = self._labels_topic
         if topic is None:
             return None
-        message = self._message(topic, self._file.locate(topic)[index])
+        message = self._topics.message(topic, self._file.locate(topic)[index])
         if message.header.stamp != cloud.header.stamp:
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
@@ -295,16 +289,9 @@ class McapDrive(Drive):
 
     @cached_property
     def imu(self) -> np.ndarray | None:
-        if _IMU_TOPIC not in self._message_types:
+        if _IMU_TOPIC not in self._topics:
             return None
-        places = self._file.locate(_IMU_TOPIC)
-        rows = MessageRows(ros_types.IMU, len(places))
-        with self._faults(_IMU_TOPIC):
-            for index, data in self._file.visit(places):
-                rows.add(index, data)
-        imu = rows.rows()
-        self._check_agreement(_IMU_TOPIC, imu)
-        return imu
+        return self._topics.rows(_IMU_TOPIC)
 
     @property
     def image_stamps_ns(self) -> np.ndarray:
@@ -313,29 +300,10 @@ class McapDrive(Drive):
         The times are the stamps of the images. Images that were recorded in
         another order are sorted by their stamps.
         """
-        return self._images[0]
+        return self._images.stamps_ns
 
     def image(self, index: int) -> bytes:
-        topic = self._camera_topics[0]
-        return self._message(topic, self._images[1][index]).data.tobytes()
-
-    @cached_property
-    def _images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stamps (M,) [ns] and places of the first camera's images."""
-        if not self._camera_topics:
-            return super().image_stamps_ns, self._all_scans[:0]
-        topic = self._camera_topics[0]
-        places = self._file.locate(topic)
-        stamps_ns = self._read_logged_stamps(topic)
-        if stamps_ns is None:
-            stamps_ns = np.zeros(len(places), np.int64)
-            with self._faults(topic):
-                for index, data in self._file.visit(places):
-                    stamps_ns[index] = mcap_messages.read_stamp(data) or 0
-        if (stamps_ns == 0).any():
-            raise InputError(f"{self._path}: {topic}: an image has no stamp")
-        order = np.argsort(stamps_ns, kind="stable")
-        return stamps_ns[order], places[order]
+        return self._images.image(index)
 
     @cached_property
     def _scans(self) -> np.ndarray:
@@ -363,7 +331,7 @@ class McapDrive(Drive):
         wanted, _ = self._read_cloud_header(self._file.read(scan))
         backward = odometry[0]["log_time_ns"] > odometry[-1]["log_time_ns"]
         for place in odometry:
-            header = self._message(_ODOMETRY_TOPIC, place).header
+            header = self._topics.message(_ODOMETRY_TOPIC, place).header
             later = mcap_messages.stamp_ns(header) - wanted
             if later == 0:
                 return True
@@ -408,12 +376,12 @@ class McapDrive(Drive):
         for index, data in self._file.visit(np.concatenate([clouds, places])):
             if index < len(clouds):
                 stamps_ns[index], frame = self._read_cloud_header(data)
-                with self._faults(
+                with self._topics.faults(
                     f"{self._lidar_topic}: at {stamps_ns[index]} ns"
                 ):
                     self._check_frame(frame)
             else:
-                with self._faults(_ODOMETRY_TOPIC):
+                with self._topics.faults(_ODOMETRY_TOPIC):
                     rows.add(index - len(clouds), data)
         odometry = rows.rows()
         disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
@@ -422,26 +390,14 @@ class McapDrive(Drive):
                 f"{self._path}: {self._lidar_topic}: the stamp of scan"
                 f" {disorder[0] + 1} is not later than the one before"
             )
-        self._check_agreement(_ODOMETRY_TOPIC, odometry)
+        with self._topics.faults(_ODOMETRY_TOPIC):
+            check_agreement(odometry)
         return stamps_ns, odometry
 
     @cached_property
     def _logged_stamps_ns(self) -> np.ndarray | None:
         """Stamps (N,) of all scans from the file's index; None if not there."""
-        return self._read_logged_stamps(self._lidar_topic)
-
-    def _read_logged_stamps(self, topic: str) -> np.ndarray | None:
-        """Returns a topic's log times [ns], if the file calls them stamps."""
-        places = self._file.locate(topic)
-        records = self._file.metadata(mcap_messages.STAMPED_RECORD)
-        if [one.get(topic) for one in records] != [str(len(places))]:
-            return None
-        for place in places[[0, -1]]:
-            with self._faults(topic):
-                stamp_ns = mcap_messages.read_stamp(self._file.read(place))
-            if stamp_ns != place["log_time_ns"]:
-                return None
-        return places["log_time_ns"].astype(np.int64)
+        return self._topics.logged_stamps_ns(self._lidar_topic)
 
     @cached_property
     def X_BS(self) -> np.ndarray:
@@ -451,39 +407,25 @@ class McapDrive(Drive):
     @cached_property
     def X_BI(self) -> np.ndarray | None:
         """Pose of the IMU I on the vehicle B, (4, 4); None without an IMU."""
-        if _IMU_TOPIC not in self._message_types:
+        if _IMU_TOPIC not in self._topics:
             return None
-        return self._mount(self._first(_IMU_TOPIC).header.frame_id)
+        return self._mount(self._topics.first(_IMU_TOPIC).header.frame_id)
 
     def _mount(self, frame: str) -> np.ndarray:
         """Returns the pose (4, 4) of a sensor's frame on the vehicle."""
-        base = self._first(_ODOMETRY_TOPIC).child_frame_id
+        base = self._topics.first(_ODOMETRY_TOPIC).child_frame_id
         return self._transforms.pose(base, frame)
 
     @cached_property
     def _transforms(self) -> StaticTransforms:
         topic = _TF_STATIC_TOPIC
         places = self._file.locate(topic)
-        messages = (self._message(topic, place) for place in places)
+        messages = (self._topics.message(topic, place) for place in places)
         return StaticTransforms(messages, f"{self._path}: {topic}")
-
-    def _first(self, topic: str) -> Any:
-        return self._message(topic, self._file.locate(topic)[0])
-
-    def _message(self, topic: str, place: np.void) -> Any:
-        return self._decode(topic, self._file.read(place))
-
-    def _decode(self, topic: str, data: memoryview) -> Any:
-        with self._faults(topic):
-            return mcap_messages.decode(data, self._message_types[topic])
-
-    def _faults(self, where: str) -> contextlib.AbstractContextManager[None]:
-        """Turns a ValueError into an InputError that names file and place."""
-        return value_errors(f"{self._path}: {where}")
 
     @cached_property
     def _lidar_frame(self) -> str:
-        return self._first(self._lidar_topic).header.frame_id
+        return self._topics.first(self._lidar_topic).header.frame_id
 
     def _check_frame(self, frame: str) -> None:
         """Refuses a scan in another frame than the first.
@@ -498,65 +440,8 @@ class McapDrive(Drive):
 
     def _read_cloud_header(self, data: memoryview) -> tuple[int, str]:
         """Returns the stamp [ns] and the frame of a scan."""
-        with self._faults(self._lidar_topic):
+        with self._topics.faults(self._lidar_topic):
             return mcap_messages.read_cloud_header(data)
-
-    def _check_agreement(self, topic: str, rows: np.ndarray) -> None:
-        """Refuses two different messages with one stamp."""
-        order = np.argsort(rows["stamp_ns"], kind="stable")
-        twice = np.flatnonzero(np.diff(rows["stamp_ns"][order]) == 0)
-        for one, other in zip(order[twice], order[twice + 1], strict=True):
-            for name in rows.dtype.names or ():
-                old, new = rows[name][one], rows[name][other]
-                if not np.array_equal(old, new, equal_nan=True):
-                    raise InputError(
-                        f"{self._path}: {topic}: {name} at"
-                        f" {rows['stamp_ns'][one]} ns: {old} and {new}"
-                    )
-
-    def _find_lidar_topic(self, lidar: str | None) -> str:
-        """Returns the named LiDAR's topic, /lidar/points, or the only one."""
-        clouds = self._cloud_topics()
-        topics = self._file.topics
-        wanted = _LIDAR_TOPIC
-        if lidar is not None:
-            wanted = f"/{lidar}/points"
-            named = (lidar, wanted, f"/{lidar}")
-            wanted = next((one for one in named if one in topics), wanted)
-        elif _LIDAR_TOPIC not in topics and len(clouds) == 1:
-            wanted = clouds[0]
-        if wanted not in topics and clouds:
-            advice = "" if lidar else "; --lidar takes one of them"
-            raise InputError(
-                f"{self._path}: no topic {wanted} (point clouds:"
-                f" {' '.join(clouds)}{advice})"
-            )
-        return wanted
-
-    def _cloud_topics(self) -> list[str]:
-        return [
-            topic
-            for topic, kinds in self._file.topics.items()
-            if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
-            and not topic.endswith("/labels")
-        ]
-
-    def _check_topic(self, topic: str, message_type: str) -> None:
-        found = self._file.topics.get(topic)
-        if found is None:
-            raise InputError(f"{self._path}: no topic {topic}")
-        if found != [f"{message_type} in cdr"]:
-            raise InputError(
-                f"{self._path}: {topic}: {' and '.join(found)} instead of"
-                f" {message_type} in cdr"
-            )
-        if len(self._file.locate(topic)) == 0:
-            raise InputError(f"{self._path}: {topic}: no message")
-
-    def _json(self, name: str) -> Any:
-        data = self._file.attachment(name)
-        with self._faults(f"attachment {name}"):
-            return None if data is None else parse_json(data)
 
 
 def holds_mcap(path: Path) -> bool:
@@ -581,9 +466,3 @@ def _drive_name(path: Path) -> str:
     return (
         resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
     )
-
-
-def _lidar_name(topic: str) -> str:
-    """Returns NAME for the topic /NAME/points, and other topics as they are."""
-    name = topic.removeprefix("/").removesuffix("/points")
-    return name if topic == f"/{name}/points" else topic

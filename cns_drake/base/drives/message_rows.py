@@ -195,3 +195,23 @@ class MessageRows:
         """
         self._rows[self._copied] = self._convert(self._bytes)
         return self._rows
+
+
+def check_agreement(rows: np.ndarray) -> None:
+    """Refuses two different messages with one stamp.
+
+    Args:
+        rows: (N,) rows of `MessageRows`.
+
+    Raises:
+        ValueError: two rows with the same stamp differ.
+    """
+    order = np.argsort(rows["stamp_ns"], kind="stable")
+    twice = np.flatnonzero(np.diff(rows["stamp_ns"][order]) == 0)
+    for one, other in zip(order[twice], order[twice + 1], strict=True):
+        for name in rows.dtype.names or ():
+            old, new = rows[name][one], rows[name][other]
+            if not np.array_equal(old, new, equal_nan=True):
+                raise ValueError(
+                    f"{name} at {rows['stamp_ns'][one]} ns: {old} and {new}"
+                )
