@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 import functools
 import inspect
+import math
 import re
 import textwrap
 from typing import Annotated, Any
@@ -11,7 +12,6 @@ import typer
 from typer.core import TyperCommand
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.terminal import check_finite
 
 Jobs = Annotated[
     int | None,
@@ -159,6 +159,24 @@ def former_options(
         return command
 
     return decorate
+
+
+def check_finite(values: Mapping[str, object]) -> None:
+    """Raises an error if an option's value is not a finite number.
+
+    Typer lets NaN pass any bound.
+
+    Args:
+        values: name of an option's parameter -> value, or tuple of values.
+
+    Raises:
+        InputError: a value is infinite or NaN; the message names the option.
+    """
+    for name, value in values.items():
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, float) and not math.isfinite(one):
+                option = name.replace("_", "-")
+                raise InputError(f"--{option}: {one} is not a finite number")
 
 
 def given_options(context: typer.Context) -> list[str]:

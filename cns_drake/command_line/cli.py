@@ -6,10 +6,10 @@ Each command imports the slow modules that it needs only when it runs, so that
 
 from collections.abc import Callable
 
-from cns_drake.base import terminal
+from cns_drake.base import program
 from cns_drake.base.commands import Command
+from cns_drake.base.program import example
 from cns_drake.base.progress_display import show_progress
-from cns_drake.base.terminal import example
 from cns_drake.command_line import exporting, learning, simulating, studying
 from cns_drake.command_line.maps import age, city, import_city, list_drives
 
@@ -45,7 +45,7 @@ _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {
 # Commands whose names differ from the names of their functions.
 _NAMES = {list_drives: "list", import_city: "import"}
 
-app = terminal.make_program(
+app = program.make_program(
     "cns-drake",
     "Cities that change, driven and recorded by simulated LiDAR.",
     example("cns-drake simulate metropolis_01 --output drives"),
@@ -82,7 +82,7 @@ for _command, (_first, *_rest) in _EXAMPLES.items():
 
 def main() -> None:
     """Runs the command line."""
-    terminal.run(app, "cns-drake", show_progress())
+    program.run(app, "cns-drake", show_progress())
 
 
 if __name__ == "__main__":

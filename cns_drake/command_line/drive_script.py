@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
 
-from cns_drake.base import progress_display, terminal
+from cns_drake.base import program, progress_display, terminal
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line import options
 
@@ -175,11 +175,11 @@ def run_script(name: str, description: str) -> None:
             overwrite=overwrite,
         )
 
-    app = terminal.plain_app(add_completion=False)
-    epilog = terminal.example(f"python diagrams/{name}.py --frames 200")
+    app = program.plain_app(add_completion=False)
+    epilog = program.example(f"python diagrams/{name}.py --frames 200")
     app.command(
         help=description,
         epilog=epilog,
-        context_settings=terminal.WIDE_HELP,
+        context_settings=program.WIDE_HELP,
     )(script)
-    terminal.run(app, Path(sys.argv[0]).name, progress_display.show_progress())
+    program.run(app, Path(sys.argv[0]).name, progress_display.show_progress())

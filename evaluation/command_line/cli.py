@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import commands, terminal
+from cns_drake.base import commands, program, terminal
 from cns_drake.base.commands import Command
+from cns_drake.base.program import example
 from cns_drake.base.progress_display import show_progress
-from cns_drake.base.terminal import example, number
+from cns_drake.base.terminal import number
 from evaluation.command_line import options
 from evaluation.command_line.localising import localise
 from evaluation.command_line.map_updating import map_update
@@ -58,7 +59,7 @@ _WITH_SCORES = (
 )
 _NOT_FINITE = "points are not finite, and left out"
 
-app = terminal.make_program(
+app = program.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
     example("cns-eval tcr before.pcd after.pcd"),
@@ -507,7 +508,7 @@ app.command(
 
 def main() -> None:
     """Runs the command line and exits with its status."""
-    terminal.run(app, "cns-eval", show_progress())
+    program.run(app, "cns-eval", show_progress())
 
 
 def _write_scores(

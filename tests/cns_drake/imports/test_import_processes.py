@@ -15,7 +15,7 @@ from cns_drake.command_line.cli import app
 # The program, which says at once what it does, however short it takes.
 PROGRAM = """
 import sys
-from cns_drake.base import terminal
+from cns_drake.base import program
 from cns_drake.base.progress import Listener, heard_by
 from cns_drake.command_line.cli import app
 
@@ -23,7 +23,7 @@ class Printing(Listener):
     def doing(self, activity, done=0, total=0, unit=""):
         print(activity, file=sys.stderr, flush=True)
 
-terminal.run(app, "cns-drake", heard_by(Printing()))
+program.run(app, "cns-drake", heard_by(Printing()))
 """
 
 
