@@ -11,7 +11,9 @@ from cns_drake.base.commands import Command
 from cns_drake.base.program import example
 from cns_drake.base.progress_display import show_progress
 from cns_drake.command_line import exporting, learning, simulating, studying
-from cns_drake.command_line.maps import age, city, import_city, list_drives
+from cns_drake.command_line.ageing import age
+from cns_drake.command_line.importing import import_city
+from cns_drake.command_line.maps import city, list_drives
 
 # Command -> its example, line by line.
 _EXAMPLES: dict[Callable[..., None], tuple[str, ...]] = {

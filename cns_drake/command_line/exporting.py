@@ -1,10 +1,12 @@
 """The command `export`: drives in the formats of other programs."""
 
-from collections.abc import Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 import re
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,8 +15,13 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import next_command, note, show
 from cns_drake.command_line import options
-from cns_drake.command_line.simulating import varied_drives
+from cns_drake.command_line.experiment_drives import varied_drives
 from evaluation.recognition.protocol import RetrievalProtocol
+
+if TYPE_CHECKING:
+    from cns_drake.base.drives.drive import Drive
+    from cns_drake.base.jobs.cluster import Cluster
+    from cns_drake.scenarios.scenario import Scenario
 
 
 class Format(str, Enum):
@@ -37,8 +44,8 @@ class Format(str, Enum):
 _CONVERTED = (Format.CNS, Format.KITTI, Format.MULRAN, Format.TUM)
 _PAIRS = (Format.POINTNETVLAD, Format.OVERLAP, Format.OVERLAP_TABLE)
 _MAPS = (Format.MAP_TRUTH, Format.MAP_SESSIONS)
-# Option -> the formats that it belongs to.
-_BELONGS: Mapping[str, tuple[Format, ...]] = {
+# Option -> the formats with which it has an effect.
+_FORMATS: Mapping[str, tuple[Format, ...]] = {
     "lidar": (*_CONVERTED, Format.MAP_SESSIONS, Format.BEV_IMAGES),
     "columns": (Format.MAP_SESSIONS, Format.BEV_IMAGES),
     "absent_in": (Format.KITTI,),
@@ -55,8 +62,9 @@ _BELONGS: Mapping[str, tuple[Format, ...]] = {
     "start_time": (Format.FILM,),
     "traffic": (Format.FILM,),
 }
-# Distance between two clouds of training data, and two scans of a map [m].
+# Distance between two clouds of training data [m].
 _PAIR_SPACING = 10.0
+# Distance between two scans of a map [m].
 _MAP_SPACING = 1.0
 
 
@@ -173,25 +181,8 @@ def export(
             scenario has no traffic, up to 60 vehicles, as many as the streets
             have room for.
     """
-    values: dict[str, Any] = {
-        "lidar": lidar,
-        "columns": columns,
-        "absent_in": absent_in,
-        "sequence": sequence,
-        "vary": vary,
-        "held_out": held_out,
-        "spacing": spacing,
-        "scans": scans,
-        "max_range": max_range,
-        "jobs": jobs,
-        "scheduler": scheduler,
-        "seconds": seconds,
-        "size": size,
-        "start_time": start_time,
-        "traffic": traffic,
-    }
     for name in commands.given_options(context):
-        formats = _BELONGS.get(name, (layout,))
+        formats = _FORMATS.get(name, (layout,))
         if layout not in formats:
             raise InputError(
                 f"--{name.replace('_', '-')}: not with --format {layout.value};"
@@ -199,7 +190,27 @@ def export(
             )
     words = drives or []
     if layout in _PAIRS:
-        _export_pairs(words, layout, output, values, json=json)
+        with uninterrupted():
+            from cns_drake.base.jobs.cluster import choose_cluster
+
+        cluster = choose_cluster(jobs, scheduler)
+        learned = _learned_drives(words, vary, output, cluster)
+        spacing = spacing or _PAIR_SPACING
+        if layout == Format.OVERLAP_TABLE:
+            max_range = max_range or 100.0
+            _write_overlap_table(learned, output, spacing, max_range, json=json)
+            return
+        _write_training_data(
+            learned,
+            held_out or (),
+            output,
+            layout,
+            spacing=spacing,
+            num_scans=scans,
+            max_range=max_range or 50.0,
+            cluster=cluster,
+            json=json,
+        )
         return
     number = 2 if layout in _MAPS else 1
     if len(words) != number:
@@ -208,26 +219,49 @@ def export(
             f"--format {layout.value}: give {wanted}, not {len(words)}"
         )
     first = words[0]
-    if layout in _MAPS:
-        _write_maps(first, words[1], layout, output, values, json=json)
+    if layout == Format.MAP_TRUTH:
+        spacing = spacing or _MAP_SPACING
+        _write_truth(first, words[1], output, spacing, json=json)
+    elif layout == Format.MAP_SESSIONS:
+        opened = _open_drives(words, lidar, columns)
+        _write_sessions(opened, output, spacing or _MAP_SPACING, json=json)
     elif layout == Format.MCAP:
         _repair(first, output, json=json)
     elif layout == Format.BEV_IMAGES:
-        _write_images(first, output, values, json=json)
+        _write_images(_open_drives(words, lidar, columns)[0], output, json=json)
     elif layout == Format.FILM:
-        _film(first, output, values, json=json)
+        _film(
+            first,
+            output,
+            seconds=seconds,
+            size=size,
+            start=start_time,
+            traffic=traffic,
+            json=json,
+        )
     else:
-        _convert(first, layout, output, values, json=json)
+        _convert(
+            first,
+            layout,
+            output,
+            lidar=lidar,
+            absent_in=absent_in,
+            sequence=sequence,
+            json=json,
+        )
 
 
 def _convert(
     recording: str,
     layout: Format,
     output: Path,
-    values: Mapping[str, Any],
     *,
+    lidar: str | None,
+    absent_in: str | None,
+    sequence: int | None,
     json: bool,
 ) -> None:
+    """Converts a recording to the layout of a data set."""
     with uninterrupted():
         from cns_drake.export.exporting import export_drive
 
@@ -235,9 +269,9 @@ def _convert(
         Path(recording),
         layout.value,
         output,
-        lidar=values["lidar"],
-        absent_in=values["absent_in"],
-        sequence=values["sequence"],
+        lidar=lidar,
+        absent_in=absent_in,
+        sequence=sequence,
         on_note=note,
     )
     show({"output": str(path)}, str(path), json=json)
@@ -255,6 +289,7 @@ def _convert(
 
 
 def _repair(file: str, output: Path, *, json: bool) -> None:
+    """Writes the readable part of a damaged recording."""
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap
 
@@ -280,14 +315,21 @@ def _repair(file: str, output: Path, *, json: bool) -> None:
 
 
 def _film(
-    scenario: str, output: Path, values: Mapping[str, Any], *, json: bool
+    scenario: str,
+    output: Path,
+    *,
+    seconds: float,
+    size: str,
+    start: float | None,
+    traffic: int | None,
+    json: bool,
 ) -> None:
+    """Makes a film of a drive in each stage of its city."""
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.film import make_film, with_some_traffic
 
     drive = load_scenario(scenario)
-    size = values["size"]
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", size)
     width, height = map(int, match.groups()) if match else (0, 0)
     if not (32 <= width <= 1920 and 32 <= height <= 1920):
@@ -295,16 +337,16 @@ def _film(
             f"--size: '{size}' is not of the form WxH with 32 to 1920 pixels, "
             "such as 640x360"
         )
-    if values["traffic"] is None:
+    if traffic is None:
         drive = with_some_traffic(drive)
     else:
-        drive = drive.with_traffic(values["traffic"])
+        drive = drive.with_traffic(traffic)
     number = make_film(
         drive,
         output,
-        seconds=values["seconds"],
+        seconds=seconds,
         size=(width, height),
-        start=values["start_time"],
+        start=start,
         on_note=note,
     )
     show(
@@ -316,66 +358,88 @@ def _film(
     next_command("cns-drake", "simulate", scenario, *words)
 
 
-def _export_pairs(
-    names: list[str],
-    layout: Format,
+def _learned_drives(
+    names: list[str], vary: str | None, output: Path, cluster: Cluster
+) -> list[Scenario]:
+    """Returns the drives of training data, except those held out.
+
+    These are the named drives and the drives of the experiment `vary`, or all
+    shipped drives if neither is given.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.scenarios.shipped import recordable_drives
+
+    if not names and vary is None:
+        names = list(recordable_drives())
+    learned = [load_scenario(name) for name in names]
+    if vary is not None:
+        varied = varied_drives(vary, output, cluster)
+        learned += [one for one in varied if one not in learned]
+    return learned
+
+
+def _write_overlap_table(
+    drives: Sequence[Scenario],
     output: Path,
-    values: Mapping[str, Any],
+    spacing: float,
+    max_range: float,
     *,
     json: bool,
 ) -> None:
-    """Writes training data of simulated drives."""
+    """Writes the overlaps between a database and a query drive."""
     with uninterrupted():
-        from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.scenarios.shipped import recordable_drives
         from cns_drake.studies import pair_export
 
-    cluster = choose_cluster(values["jobs"], values["scheduler"])
-    spacing = values["spacing"] or _PAIR_SPACING
-    tested = [load_scenario(name) for name in values["held_out"] or ()]
-    if not names and values["vary"] is None:
-        names = list(recordable_drives())
-    learned = [load_scenario(name) for name in names]
-    if values["vary"] is not None:
-        varied = varied_drives(values["vary"], output, cluster)
-        learned += [one for one in varied if one not in learned]
-    if layout == Format.OVERLAP_TABLE:
-        if len(learned) != 2:
-            raise InputError(
-                "--format overlap-table: give two drives, database and query"
-            )
-        protocol = RetrievalProtocol(
-            query_spacing=spacing, max_range=values["max_range"] or 100.0
+    if len(drives) != 2:
+        raise InputError(
+            "--format overlap-table: give two drives, database and query"
         )
-        table = pair_export.write_overlap_table(
-            learned[0], learned[1], output, protocol
-        )
-        show({"output": [str(table)]}, str(table), json=json)
-        next_command(
-            "cns-eval",
-            "pr",
-            *(f"drives/{one.name}" for one in learned),
-            "--method",
-            "solid",
-            "--truth",
-            "overlap:0.5",
-            "--exact-overlaps",
-            table,
-        )
-        return
+    protocol = RetrievalProtocol(query_spacing=spacing, max_range=max_range)
+    table = pair_export.write_overlap_table(
+        drives[0], drives[1], output, protocol
+    )
+    show({"output": [str(table)]}, str(table), json=json)
+    next_command(
+        "cns-eval",
+        "pr",
+        *(f"drives/{one.name}" for one in drives),
+        "--method",
+        "solid",
+        "--truth",
+        "overlap:0.5",
+        "--exact-overlaps",
+        table,
+    )
+
+
+def _write_training_data(
+    learned: Sequence[Scenario],
+    held_out: Sequence[str],
+    output: Path,
+    layout: Format,
+    *,
+    spacing: float,
+    num_scans: int,
+    max_range: float,
+    cluster: Cluster,
+    json: bool,
+) -> None:
+    """Writes clouds of simulated drives with positives or overlaps.
+
+    `held_out` names the drives for evaluation, which are not learned from.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.scenario_files import load_scenario
+        from cns_drake.studies import pair_export
+
+    tested = [load_scenario(name) for name in held_out]
     taken = {one.name for one in tested}
-    learned = [one for one in learned if one.name not in taken]
     paths = pair_export.export_pairs(
-        learned,
+        [one for one in learned if one.name not in taken],
         tested,
         output,
-        pair_export.ExportOptions(
-            layout.value,
-            spacing,
-            values["scans"],
-            values["max_range"] or 50.0,
-        ),
+        pair_export.ExportOptions(layout.value, spacing, num_scans, max_range),
         cluster,
         note,
     )
@@ -383,30 +447,18 @@ def _export_pairs(
     show({"output": texts}, "\n".join(texts), json=json)
 
 
-def _write_maps(
-    a: str,
-    b: str,
-    layout: Format,
-    output: Path,
-    values: Mapping[str, Any],
-    *,
-    json: bool,
+def _write_truth(
+    a: str, b: str, output: Path, spacing: float, *, json: bool
 ) -> None:
-    """Writes maps of two drives, with labels of what changed if they are known.
+    """Writes maps of two drives with exact labels of what changed.
 
     Args:
         a: older drive.
         b: newer drive.
-        layout: the format: `map-truth` (maps with labels) or `map-sessions`
-            (maps without labels).
         output: folder to write.
-        values: options by name.
+        spacing: distance between two scans of a map [m].
         json: whether to print the counts of labels as JSON.
     """
-    spacing = values["spacing"] or _MAP_SPACING
-    if layout == Format.MAP_SESSIONS:
-        _write_sessions(a, b, output, spacing, values, json=json)
-        return
     with uninterrupted():
         from cns_drake.base.files import check_new_folder
         from cns_drake.studies.map_truth import open_labelled, write_truth
@@ -439,27 +491,25 @@ def _write_maps(
     next_command("cns-eval", "map-update", output)
 
 
+def _open_drives(
+    paths: Sequence[str], lidar: str | None, columns: int | None
+) -> list[Drive]:
+    with uninterrupted():
+        from evaluation.drives import open_drive
+
+    return [open_drive(Path(path), lidar, columns) for path in paths]
+
+
 def _write_sessions(
-    a: str,
-    b: str,
-    output: Path,
-    spacing: float,
-    values: Mapping[str, Any],
-    *,
-    json: bool,
+    drives: Sequence[Drive], output: Path, spacing: float, *, json: bool
 ) -> None:
-    """Writes maps of two recordings without labels."""
+    """Writes maps of two drives without labels."""
     with uninterrupted():
         from cns_drake.base.drives.drive import check_same_world
         from cns_drake.base.files import draft_folder
-        from evaluation.drives import open_drive
         from evaluation.map_update.labels import SIDES
         from evaluation.map_update.sessions import write_session
 
-    drives = [
-        open_drive(Path(path), values["lidar"], values["columns"])
-        for path in (a, b)
-    ]
     for text in (one for drive in drives for one in drive.notes):
         note(text)
     check_same_world(*drives)
@@ -469,14 +519,10 @@ def _write_sessions(
     show({"output": str(output)}, str(output), json=json)
 
 
-def _write_images(
-    path: str, output: Path, values: Mapping[str, Any], *, json: bool
-) -> None:
+def _write_images(drive: Drive, output: Path, *, json: bool) -> None:
     """Writes bird's-eye images of a drive."""
     with uninterrupted():
-        from evaluation.drives import open_drive
         from evaluation.real.image_sequences import write_images
 
-    drive = open_drive(Path(path), values["lidar"], values["columns"])
     write_images(drive, output, note)
     show({"output": str(output)}, str(output), json=json)

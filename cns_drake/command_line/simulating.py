@@ -1,4 +1,4 @@
-"""Commands that simulate drives, and commands on recordings."""
+"""The commands `simulate`, `scan` and `generate`."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
 from cns_drake.base.terminal import next_command, note, show
 from cns_drake.command_line import options
+from cns_drake.command_line.experiment_drives import varied_drives
 
 if TYPE_CHECKING:
-    from cns_drake.base.jobs.cluster import Cluster
-    from cns_drake.scenarios.scenario import Scenario
     from cns_drake.sensors.lidar.config import WeatherConfig
 
-Kind = Literal["ideal", "calibrated"]
+ReturnsModel = Literal["ideal", "calibrated"]
 Returns = Annotated[
-    Kind | None,
+    ReturnsModel | None,
     typer.Option(
         help="Model of the LiDAR's returns. ideal returns are exact; "
         "calibrated returns have the noise, the losses and the intensities of "
@@ -65,47 +64,12 @@ Snowfall = Annotated[
 ]
 
 
-def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
-    """Returns the drives of an experiment, and writes their scenario files.
-
-    The scenario files are written to `<output>/scenarios`, and cities that the
-    experiment makes to `<output>/cities`.
-
-    Args:
-        vary: name of a shipped experiment, or an experiment file.
-        output: folder of the recordings.
-        cluster: runs the jobs that make cities.
-
-    Raises:
-        InputError: the experiment cannot be used.
-    """
-    from cns_drake.base.yaml_files import read_yaml
-    from cns_drake.scenarios.scenario_files import write_scenarios
-    from cns_drake.studies.experiment_files import (
-        load_experiment,
-        shipped_experiments,
-    )
-    from cns_drake.studies.study import Study
-
-    if vary not in shipped_experiments():
-        values = read_yaml(Path(vary))
-        if isinstance(values, dict) and "base" in values:
-            raise InputError(
-                f"{vary}: base: --vary reads an experiment now, with `maps`,"
-                " and the fields that vary below `database` and `query`"
-            )
-    # Nothing is measured, and no program of the experiment runs.
-    unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
-    experiment = load_experiment(vary, list(unused.items()), on_note=note)
-    study = Study(experiment, output.absolute(), vary, cluster, note)
-    members = study.drives()
-    write_scenarios(members, output / "scenarios")
-    return members
-
-
 def choose_returns(
-    returns: Kind | None, fog: float | None, rain: float, snowfall: float
-) -> tuple[Kind | None, WeatherConfig | None]:
+    returns: ReturnsModel | None,
+    fog: float | None,
+    rain: float,
+    snowfall: float,
+) -> tuple[ReturnsModel | None, WeatherConfig | None]:
     """Returns the model of LiDAR returns and the weather, from options.
 
     Args:
@@ -202,7 +166,7 @@ def simulate(
         returns=chosen,
         weather=weather,
         traffic=traffic,
-        transient=_switches(transient or ()),
+        transient=_transient_switches(transient or ()),
         driver=driver,
         ride=ride,
         imu_rate=imu_rate,
@@ -225,7 +189,7 @@ def _camera_fields(text: str) -> dict[str, int]:
     return {"width": width, "height": height, "rate": rate}
 
 
-def _switches(texts: Iterable[str]) -> dict[str, str]:
+def _transient_switches(texts: Iterable[str]) -> dict[str, str]:
     """Returns the switches of `--transient` by name."""
     found: dict[str, str] = {}
     for text in texts:

@@ -1,7 +1,10 @@
 """The commands `reproduce` and `study`, which run studies of methods."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,6 +15,9 @@ from cns_drake.base.terminal import note, resumable
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
+
+if TYPE_CHECKING:
+    from cns_drake.studies.experiment import Experiment
 
 
 @commands.former_options({"--quick": "--no-recordings"})
@@ -145,26 +151,12 @@ def study(
         path = shipped_experiments().get(name, Path(name))
         typer.echo(path.read_text("utf-8"), nl=False)
         return
-    with uninterrupted():
-        from evaluation.study.chosen_methods import with_standard
-
-    overrides = override or ()
-    experiment = load_experiment(name, overrides, quick=quick, on_note=note)
-    chosen: list[str | tuple[str, Any]] = list(overrides)
-    for field, names in (
-        ("tasks", task),
-        ("methods", with_standard(method or ())),
-    ):
-        if names:
-            # Methods of the experiment keep their settings.
-            given = getattr(experiment, field) or {}
-            chosen.append((field, {one: given.get(one, {}) for one in names}))
-    experiment = load_experiment(name, chosen, quick=quick)
+    experiment = _chosen_experiment(name, override or (), task, method, quick)
     if output is None:
         raise InputError("--output: missing")
     if not allow_code:
         # Others may have written the file; the words are the user's own.
-        own = named_programs([method, *map(parse_override, overrides)])
+        own = named_programs([method, *map(parse_override, override or ())])
         for field in ("methods", "tasks"):
             for file in named_programs(getattr(experiment, field)):
                 if file not in own:
@@ -188,3 +180,39 @@ def study(
         )
     typer.echo(page)
     suggest_comparison(output)
+
+
+def _chosen_experiment(
+    name: str,
+    overrides: Sequence[str],
+    tasks: list[str] | None,
+    methods: list[str] | None,
+    quick: bool,
+) -> Experiment:
+    """Returns an experiment with the tasks, methods and values of options.
+
+    Args:
+        name: name of a shipped experiment, or an experiment file.
+        overrides: `--set`.
+        tasks: `--task`; None keeps the tasks of the experiment.
+        methods: `--method`; None keeps the methods of the experiment.
+        quick: `--quick`.
+
+    Raises:
+        InputError: the experiment or an option cannot be used.
+    """
+    with uninterrupted():
+        from cns_drake.studies.experiment import load_experiment
+        from evaluation.study.chosen_methods import with_standard
+
+    experiment = load_experiment(name, overrides, quick=quick, on_note=note)
+    chosen: list[str | tuple[str, Any]] = list(overrides)
+    for field, names in (
+        ("tasks", tasks),
+        ("methods", with_standard(methods or ())),
+    ):
+        if names:
+            # Methods of the experiment keep their settings.
+            given = getattr(experiment, field) or {}
+            chosen.append((field, {one: given.get(one, {}) for one in names}))
+    return load_experiment(name, chosen, quick=quick)

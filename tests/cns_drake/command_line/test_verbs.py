@@ -101,9 +101,9 @@ def test_a_word_after_two_dashes_is_no_option(capsys):
     assert err == "cns-drake: error: --sensor: no recording (.mcap) there\n"
 
 
-@pytest.mark.parametrize("option", exporting._BELONGS)
+@pytest.mark.parametrize("option", exporting._FORMATS)
 def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
-    formats = exporting._BELONGS[option]
+    formats = exporting._FORMATS[option]
     words = ["export", "a", "--output", tmp_path / "out"]
     spelled = f"--{option.replace('_', '-')}"
     # The least value of some numbers is 1; others are names.

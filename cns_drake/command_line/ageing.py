@@ -1,0 +1,141 @@
+"""The command `age`, which simulates years of change in a city."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.base import commands
+from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.number_text import whole_number
+from cns_drake.base.terminal import show
+from cns_drake.command_line.suggestions import suggest_reproduction
+
+Years = Annotated[
+    list[int],
+    typer.Option(
+        "--years",
+        metavar="YEAR ...",
+        help="Years for which to make stages, counted from today, in ascending "
+        "order and at most 200. Negative years lie in the past; they need a "
+        "map whose buildings have years of construction.",
+    ),
+]
+
+RateFactor = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        metavar="FACTOR",
+        help="Factor by which all yearly rates are multiplied. With 2, the "
+        "city changes twice as fast.",
+    ),
+]
+RatesFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.yaml",
+        help="File with your own rates. Each line has the form event: rate, "
+        "where the rate is the probability per year, from 0 to 1. All other "
+        "events have their default rates.",
+    ),
+]
+
+
+def _maps_and_years(
+    words: list[str], first: list[int]
+) -> tuple[list[str], tuple[int, ...]]:
+    """Separates the maps from the years in a command such as `a b --years 5 9`.
+
+    The parser takes only the first year after --years as the option's value.
+    The parser appends all further years to the arguments, after the names of
+    the maps.
+
+    Args:
+        words: the arguments of the command: names of maps, then the further
+            years.
+        first: the values that the parser has already read for --years, one per
+            occurrence of the option.
+
+    Returns:
+        The names of the maps, and all years.
+
+    Raises:
+        InputError: a word begins like an option.
+    """
+    maps = []
+    years = list(first)
+    for word in words:
+        if word.removeprefix("-").isdecimal():
+            years.append(whole_number(word, "--years"))
+        elif word.startswith("-"):
+            raise InputError(f"{word}: no such option")
+        else:
+            maps.append(word)
+    return maps, tuple(years)
+
+
+def age(
+    source: Annotated[list[str], typer.Argument(metavar="MAP")],
+    output: Annotated[Path, typer.Option()],
+    years: Years,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    rate: RateFactor = 1.0,
+    rates: RatesFile = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures")] = True,
+    json: commands.Json = False,
+) -> None:
+    """Simulate years of change in a city.
+
+    Every year, each lot, tree and street object may change, with a given
+    probability: buildings are built, torn down and replaced, trees die, lamps
+    and signs move. Writes a map with a stage for today and a stage for each
+    given year, a table of all events, the observed rates, and pictures.
+
+    Args:
+        source: Name of a shipped map, or folder of a map.
+        output: Folder of the map to write; its name becomes the map's name.
+        seed: Seed of all random events. Another seed gives another realisation
+            of the city's ageing.
+        pictures: Draw pictures of the city from the air and of three streets.
+    """
+    maps, wanted = _maps_and_years(source, years)
+    if len(maps) != 1:
+        raise InputError(f"give one map, not {' '.join(maps) or 'none'}")
+    with uninterrupted():
+        from cns_drake.ageing.aged_map import age_map
+        from cns_drake.ageing.aged_pictures import draw_pictures
+        from cns_drake.ageing.rates import read_rates
+        from cns_drake.scenarios.shipped import shipped_maps
+
+    folder = shipped_maps().get(maps[0], Path(maps[0]))
+    if not folder.is_dir():
+        raise InputError(
+            f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
+            f"nor a folder{did_you_mean(maps[0], shipped_maps())}"
+        )
+    aged = age_map(
+        folder,
+        wanted,
+        seed,
+        read_rates(rates, rate),
+        output,
+        finish=lambda draft, one: (
+            draw_pictures(draft, one) if pictures else None
+        ),
+    )
+    rows = [
+        (f"stage {stage}", f"year {year}" if year else "today")
+        for stage, year in aged.years.items()
+    ]
+    rows += [(event, str(number)) for event, number in aged.events.items()]
+    values = {
+        "output": str(output),
+        "years": dict(aged.years),
+        "events": dict(aged.events),
+    }
+    show(values, [*rows, ("written", str(output))], json=json)
+    suggest_reproduction(output)

@@ -1,0 +1,51 @@
+"""The drives of an experiment, which the option `--vary` adds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.terminal import note
+
+if TYPE_CHECKING:
+    from cns_drake.base.jobs.cluster import Cluster
+    from cns_drake.scenarios.scenario import Scenario
+
+
+def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
+    """Returns the drives of an experiment, and writes their scenario files.
+
+    The scenario files are written to `<output>/scenarios`, and cities that the
+    experiment makes to `<output>/cities`.
+
+    Args:
+        vary: name of a shipped experiment, or an experiment file.
+        output: folder of the recordings.
+        cluster: runs the jobs that make cities.
+
+    Raises:
+        InputError: the experiment cannot be used.
+    """
+    from cns_drake.base.yaml_files import read_yaml
+    from cns_drake.scenarios.scenario_files import write_scenarios
+    from cns_drake.studies.experiment_files import (
+        load_experiment,
+        shipped_experiments,
+    )
+    from cns_drake.studies.study import Study
+
+    if vary not in shipped_experiments():
+        values = read_yaml(Path(vary))
+        if isinstance(values, dict) and "base" in values:
+            raise InputError(
+                f"{vary}: base: --vary reads an experiment now, with `maps`,"
+                " and the fields that vary below `database` and `query`"
+            )
+    # Nothing is measured, and no program of the experiment runs.
+    unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
+    experiment = load_experiment(vary, list(unused.items()), on_note=note)
+    study = Study(experiment, output.absolute(), vary, cluster, note)
+    members = study.drives()
+    write_scenarios(members, output / "scenarios")
+    return members

@@ -1,0 +1,202 @@
+"""The command `import`, which makes a map from data of a real city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+import shlex
+from typing import Annotated
+
+import typer
+
+from cns_drake.base import commands
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.listing import natural_key
+from cns_drake.base.number_text import whole_number
+from cns_drake.base.terminal import note, show
+from cns_drake.imports.options import (
+    REPORT_NAME,
+    DriveOn,
+    ImportOptions,
+    ImportReport,
+    Undated,
+)
+
+# Default share of the buildings that change between an added first stage and
+# today.
+_CHANGED_SHARE = 0.3
+# Kinds of structures and of faults that a report names.
+_SHOWN = 5
+
+
+def import_city(
+    source: Annotated[list[str], typer.Argument(metavar="FILE")],
+    output: Annotated[Path, typer.Option()],
+    years: Annotated[list[int] | None, typer.Option(metavar="YEAR ...")] = None,
+    year_attribute: Annotated[str | None, typer.Option(metavar="NAME")] = None,
+    undated: Undated = "first",
+    lod: float | None = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    along: Annotated[Path | None, typer.Option(metavar="WAYPOINTS")] = None,
+    within: Annotated[
+        float | None, typer.Option(min=1.0, metavar="METRES")
+    ] = None,
+    drive_on: DriveOn | None = None,
+    grow: Annotated[
+        float | None, typer.Option(min=0.01, max=0.9, metavar="PART")
+    ] = None,
+    plain: Annotated[bool, typer.Option("--plain")] = False,
+    json: commands.Json = False,
+) -> None:
+    """Make a map from data of a real city.
+
+    Writes the stages of the map, two drives along its streets and a picture of
+    the map from above.
+
+    Args:
+        source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
+            (.jsonl), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr).
+        output: Folder of the map to write; its name becomes the map's name.
+        years: Years for which to make stages. Each stage contains the buildings
+            that were built by its year.
+        year_attribute: Name of the attribute in the file that contains each
+            building's year of construction. By default the command tries the
+            usual names.
+        undated: Stages that contain the buildings without a year of
+            construction: all stages (first), only the last stage (last), or no
+            stage (never).
+        lod: Level of detail (LoD) at which buildings are read from CityJSON,
+            such as 1.2; by default the highest level that each building has.
+        seed: Seed of all random choices: which buildings change between the
+            first stage and today (--grow), and which details are added to
+            buildings and streets. For an OpenDRIVE file, which has no
+            buildings, the whole city depends on the seed.
+        along: CSV file with the path of a drive of your own: columns x and y in
+            the frame of the map [m]. This drive replaces the two drives that
+            the command otherwise makes.
+        within: Greatest distance of structures from the drives [m]. Structures
+            beyond this distance are left out, to save memory. By default, no
+            structure is left out.
+        drive_on: Side of the street on which cars drive; by default the side
+            that the file names, or right if the file names none.
+        grow: Share of the buildings that change between an added first stage
+            and today, from 0.01 to 0.9; by default 0.3. In the first stage,
+            these buildings, sampled at random, are missing or lower than today.
+            For an OpenDRIVE file, the buildings in the east are missing
+            instead, and the default is 0.35. Not with --years or --plain, which
+            add no such stage.
+        plain: Do not add windows, lamps, parked cars and other details that the
+            file does not contain. Only OpenDRIVE files, which contain no
+            buildings, still get buildings along their roads.
+    """
+    # The years that follow the first of --years come as arguments.
+    paths = [word for word in source if not word.isdecimal()]
+    more = [
+        whole_number(word, "--years") for word in source if word.isdecimal()
+    ]
+    if len(paths) != 1 or (more and not years):
+        raise InputError(f"give one file, not {' '.join(source)}")
+    path = Path(paths[0])
+    stages = tuple(sorted([*(years or ()), *more]))
+    if plain and grow is not None:
+        raise InputError(
+            "--grow: not with --plain, which adds nothing at random"
+        )
+    if not plain and not stages and path.suffix != ".xodr" and grow is None:
+        grow = _CHANGED_SHARE
+    options = ImportOptions(
+        stages,
+        year_attribute,
+        undated,
+        lod,
+        seed,
+        along,
+        within,
+        drive_on,
+        grow,
+        dressed=not plain,
+    )
+    with uninterrupted():
+        from cns_drake.imports import import_map
+        from cns_drake.scenarios.drive_table import write_table
+
+    report = import_map.import_city(
+        path,
+        output,
+        options,
+        finish=write_table,
+    )
+    for line in _shortcomings(report, output, options):
+        note(f"{output}: {line}")
+    values = {
+        "output": str(output),
+        "structures": report.kinds,
+        "triangles": report.triangles,
+        "stages": report.stages,
+        "undated": report.undated,
+        "drives": list(report.drives),
+        "faults": {kind: count for kind, count, _ in report.faults},
+    }
+    show(values, _report_rows(report, output, options.years), json=json)
+
+
+def _shortcomings(
+    report: ImportReport, output: Path, options: ImportOptions
+) -> Iterator[str]:
+    """Yields advice on what a study of the map would lack."""
+    waypoints = (
+        f"draw waypoints on {output / 'from_above.png'} (docs/imports.md)"
+    )
+    if not report.drives:
+        yield f"no street wide and long enough was found; {waypoints}"
+    elif len(report.drives) == 1 and options.along is None:
+        yield f"no second route shares a part of the first; {waypoints}"
+    if len(report.stages) == 1:
+        yield "there is only one stage; give --years or --grow to study change"
+    elif options.years and (
+        report.undated > report.dated or len(set(report.stages.values())) == 1
+    ):
+        numbers = ", ".join(map(str, report.stages.values()))
+        yield (
+            f"{report.dated} of {report.dated + report.undated} buildings have"
+            f" a year, and the stages {numbers} structures; in place of"
+            " --years, --grow samples a change at random"
+        )
+
+
+def _report_rows(
+    report: ImportReport, output: Path, years: tuple[int, ...]
+) -> Iterator[tuple[str, str]]:
+    """Yields lines with the most important numbers, and the next command."""
+    kinds = sorted(report.kinds.items(), key=lambda item: -item[1])
+    parts = [f"{number} {kind}" for kind, number in kinds]
+    yield "structures", _shortened(parts)
+    yield "triangles", str(report.triangles)
+    for k, (stage, number) in enumerate(report.stages.items()):
+        when = f" ({years[k]})" if years else ""
+        yield f"stage {stage}{when}", f"{number} structures"
+    if years:
+        yield "without a year", str(report.undated)
+    for letter, length in zip("ab", report.drives, strict=False):
+        yield f"drive {letter}", f"{length:.0f} m"
+    if report.faults:
+        parts = [f"{kind} ({number})" for kind, number, _ in report.faults]
+        yield "left out or repaired", _shortened(parts)
+    yield "written", f"{output}, with all counts in {REPORT_NAME}"
+    if not report.drives:
+        return
+    if len(report.stages) > 1:
+        words = ["reproduce", str(output), "--output", "study"]
+    else:
+        drive = str(
+            output / f"sequence_{min(report.stages, key=natural_key)}.yaml"
+        )
+        words = ["simulate", drive, "--output", "recordings"]
+    yield "next", shlex.join(["cns-drake", *words])
+
+
+def _shortened(kinds: Sequence[str]) -> str:
+    more = len(kinds) - _SHOWN
+    rest = [f"{more} kinds more"] if more > 0 else []
+    return "; ".join([*kinds[:_SHOWN], *rest])
