@@ -6,7 +6,7 @@ The subfolder of a drive is written under a name ending in `.part`, and gets its
 final name when it is complete.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import os
 from pathlib import Path
 import shutil
@@ -17,17 +17,15 @@ from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing, track
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.export.layouts import (
-    CNS,
-    KITTI,
-    MULRAN,
-    TUM,
-    Layout,
-    kitti_layout,
-)
+from cns_drake.export.cns_layout import CNS
+from cns_drake.export.kitti_layout import KITTI, kitti_layout
+from cns_drake.export.layout import Layout
+from cns_drake.export.mulran_layout import MULRAN
+from cns_drake.export.tum_layout import TUM
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI, "mulran": MULRAN, "tum": TUM}
+# File that shows that an export wrote a folder of drives.
 _MARKER = "export.yaml"
 
 
@@ -71,13 +69,7 @@ def export_drive(
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
     doing(f"opening {recording}")
-    if absent_in is None:
-        drive = McapDrive(recording, lidar)
-    else:
-        # Loading Drake takes a while, and only marks need it.
-        from cns_drake.export.marked_drive import MarkedDrive
-
-        drive = MarkedDrive(recording, lidar, absent_in)
+    drive = _open_recording(recording, lidar, absent_in)
     if sequence is not None:
         layout = kitti_layout(f"{sequence:02d}")
     folder = output / layout.drive_folder(drive)
@@ -91,14 +83,7 @@ def export_drive(
             "folder"
         )
     if layout.shared_outer_files:
-        for path, text in outer.items():
-            with files.user_errors(path):
-                is_other = path.is_file() and path.read_bytes() != text.encode()
-            if is_other:
-                raise InputError(
-                    f"{path}: differs: the drives there have another sensor"
-                    " mount; give another folder"
-                )
+        _check_shared_files(outer)
     part = files.part_path(folder)
     with files.sole_writer(folder):
         try:
@@ -113,6 +98,33 @@ def export_drive(
         finally:
             shutil.rmtree(part, ignore_errors=True)
     return folder
+
+
+def _open_recording(
+    recording: Path, lidar: str | None, absent_in: str | None
+) -> McapDrive:
+    if absent_in is None:
+        return McapDrive(recording, lidar)
+    # Loading Drake takes a while, and only marks need it.
+    from cns_drake.export.marked_drive import MarkedDrive
+
+    return MarkedDrive(recording, lidar, absent_in)
+
+
+def _check_shared_files(texts: Mapping[Path, str]) -> None:
+    """Checks that existing files of all drives have the given texts.
+
+    Raises:
+        InputError: a file differs.
+    """
+    for path, text in texts.items():
+        with files.user_errors(path):
+            is_other = path.is_file() and path.read_bytes() != text.encode()
+        if is_other:
+            raise InputError(
+                f"{path}: differs: the drives there have another sensor mount;"
+                " give another folder"
+            )
 
 
 def _notes(drive: McapDrive, layout: Layout) -> Iterator[str]:

@@ -15,12 +15,9 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cns_drake.base.files import write_text
 from cns_drake.base.jpeg_images import to_jpeg
-from cns_drake.pictures.drive_page import (
-    DriveRecord,
-    ShownStages,
-    make_drive_page,
-    moving_frames,
-)
+from cns_drake.pictures.drive_page import make_drive_page, moving_frames
+from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.page_panel import ShownStages
 from cns_drake.scene.world import World
 
 # These limits keep the page of any drive below 25 MB.
@@ -120,7 +117,7 @@ class MeshcatRecorder(LeafSystem):
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
 
-    def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
+    def add_moving_object(self, name: str, frames: Sequence[FrameId]) -> None:
         """Adds a moving object to the page.
 
         The object moves as a rigid body: only the motion of the first frame is

@@ -211,7 +211,7 @@ def make_station(
         measured["objects"] = moving.GetOutputPort("objects")
     if page is not None:
         for body in () if moving is None else moving.bodies:
-            page.show_too(body.name, body.frames)
+            page.add_moving_object(body.name, body.frames)
 
     recorders = {"meshcat_recorder": page}
     if bag is not None:

@@ -9,16 +9,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake import load_scenario
-from cns_drake.pictures.drive_page import (
-    DriveRecord,
-    ShownStages,
-    make_drive_page,
-    moving_frames,
-)
+from cns_drake.pictures.drive_page import make_drive_page, moving_frames
+from cns_drake.pictures.drive_record import DriveRecord
 from cns_drake.pictures.meshcat_recorder import (
     _MAX_POINTS_PER_SCAN,
     _MAX_SCANS,
 )
+from cns_drake.pictures.page_panel import ShownStages
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scene.world import load_world
 from cns_drake.simulation.loaded_drive import load_drive

@@ -7,13 +7,9 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 import pytest
 
-from cns_drake.pictures.drive_page import (
-    DriveRecord,
-    Plot,
-    ShownStages,
-    make_panel,
-    motion_plots,
-)
+from cns_drake.pictures.drive_record import DriveRecord
+from cns_drake.pictures.motion_plots import Plot, motion_plots
+from cns_drake.pictures.page_panel import ShownStages, make_panel
 
 
 def points(plot):

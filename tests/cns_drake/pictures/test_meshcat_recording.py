@@ -18,8 +18,8 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.pictures.drive_page import ShownStages
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
+from cns_drake.pictures.page_panel import ShownStages
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE

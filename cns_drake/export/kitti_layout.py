@@ -1,0 +1,128 @@
+"""The layout of KITTI odometry, with the labels of SemanticKITTI."""
+
+from pathlib import PurePosixPath
+import re
+
+import numpy as np
+
+from cns_drake.base import poses
+from cns_drake.base.drives.mcap_drive import McapDrive
+from cns_drake.base.points import encode_bin, encode_labels
+from cns_drake.export.layout import (
+    Layout,
+    imu_files,
+    scenario_files,
+    seconds,
+    structure_files,
+)
+
+# Pose of the LiDAR S in KITTI's camera frame C: x right, y down, z ahead.
+_X_CS = np.array(
+    [
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+# Projection matrix of each camera, of which there is none.
+_PROJECTION = np.eye(4)
+
+
+def _drive_number(drive: McapDrive) -> str:
+    """Returns the number of a drive: the digits at the end of its name, or 00.
+
+    The second LiDAR of a recording adds 100, and the third 200, since tools for
+    KITTI expect numbers.
+    """
+    digits = re.findall(r"\d*$", drive.name)[0]
+    lidar = drive.lidar_names.index(drive.lidar_name)
+    return f"{100 * lidar + int(digits or 0):02d}"
+
+
+def _inner_files(drive: McapDrive) -> dict[str, str]:
+    elapsed_ns = drive.stamps_ns - drive.stamps_ns[0]
+    # LiDARs after the first one add their own name.
+    is_first = drive.lidar_name == drive.lidar_names[0]
+    lidar = drive.lidar_name.strip("/").replace("/", "_")
+    name = drive.name if is_first else f"{drive.name}_{lidar}"
+    calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
+    calibration["Tr"] = _X_CS
+    return {
+        # Readers of KITTI look for it in `poses`, and those of SemanticKITTI
+        # here.
+        "poses.txt": _poses_text(drive),
+        "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
+        "calib.txt": "".join(
+            f"{key}: {_pose_rows(X[None])}" for key, X in calibration.items()
+        ),
+        "first_pose.txt": _pose_rows(drive.X_WS[:1]),
+        **imu_files(drive),
+        **structure_files(drive),
+        **scenario_files(drive, name),
+    }
+
+
+def _with_kitti_intensities(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
+    """Returns a scan with its intensities in KITTI's scale, if known.
+
+    Calibrated intensities become a byte / 256 in hundredths, at most 0.99, as
+    in the scans of KITTI odometry 00. Ideal intensities, from 0 to 1, stay as
+    they are, and so do those of other recorders, whose unit is not known.
+    """
+    if drive.lidar_section.get("returns") != "calibrated":
+        return scan
+    # The intensities of this preset are fitted to KITTI's hundredths.
+    is_kittis = drive.lidar_section.get("preset") == "hdl-64e"
+    hundredths = scan["intensity"] * (1.0 if is_kittis else 100.0 / 256.0)
+    scaled = scan.copy()
+    scaled["intensity"] = np.minimum(np.rint(hundredths), 99.0) / 100.0
+    return scaled
+
+
+def _scan_files(
+    drive: McapDrive, frame: int, stamp_ns: int, scan: np.ndarray
+) -> dict[str, bytes]:
+    scan = _with_kitti_intensities(drive, scan)
+    files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
+    if {"label", "instance"} <= set(scan.dtype.names or ()):
+        files[f"labels/{frame:06d}.label"] = encode_labels(scan)
+    return files
+
+
+def _poses_text(drive: McapDrive) -> str:
+    """Returns the poses X_C0C of all scans, one row of text each."""
+    X_S0S = poses.inverse(drive.X_WS[0]) @ drive.X_WS
+    return _pose_rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
+
+
+def _pose_rows(X: np.ndarray) -> str:
+    """Returns the upper 3 x 4 of poses (N, 4, 4), one row of text each."""
+    rows = X[:, :3].reshape(-1, 12).tolist()
+    return "".join(f"{' '.join(map(repr, row))}\n" for row in rows)
+
+
+def kitti_layout(number: str | None = None) -> Layout:
+    """Returns the layout of KITTI odometry.
+
+    Args:
+        number: number of the sequence, as text. By default the digits at the
+            end of the drive's name; the second LiDAR of a recording adds 100,
+            the third 200.
+    """
+
+    def number_of(drive: McapDrive) -> str:
+        return number or _drive_number(drive)
+
+    return Layout(
+        lambda drive: PurePosixPath("sequences", number_of(drive)),
+        _inner_files,
+        outer_files=lambda drive: {
+            f"poses/{number_of(drive)}.txt": _poses_text(drive)
+        },
+        scan_files=_scan_files,
+        has_labels=True,
+    )
+
+
+KITTI = kitti_layout()

@@ -1,0 +1,36 @@
+"""The layout of MulRan."""
+
+from pathlib import PurePosixPath
+
+from cns_drake.base import poses
+from cns_drake.base.drives import mulran_frames
+from cns_drake.base.drives.mcap_drive import McapDrive
+from cns_drake.base.points import encode_bin
+from cns_drake.export.layout import (
+    Layout,
+    checked_name,
+    imu_files,
+    scenario_files,
+    stamped_rows,
+)
+
+
+def _inner_files(drive: McapDrive) -> dict[str, str]:
+    # The vehicle is where MulRan's mount of the LiDAR has it below this LiDAR.
+    X_UB = drive.X_WS @ poses.inverse(mulran_frames.X_BS)
+    X_UB[:, :3, 3] += mulran_frames.ORIGIN
+    rows = X_UB[:, :3].reshape(-1, 12)
+    return {
+        "global_pose.csv": stamped_rows(drive.stamps_ns.tolist(), [rows], ","),
+        **imu_files(drive),
+        **scenario_files(drive),
+    }
+
+
+MULRAN = Layout(
+    lambda drive: PurePosixPath(checked_name(drive, drive.name)),
+    _inner_files,
+    scan_files=lambda _, frame, stamp_ns, scan: {
+        f"Ouster/{stamp_ns}.bin": encode_bin(scan)
+    },
+)

@@ -1,0 +1,113 @@
+"""Plots of the speed and the IMU over the time of a drive, for its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from cns_drake.pictures.drive_record import DriveRecord
+
+# Greatest number of samples in a plot; more would not be visible.
+_MAX_SAMPLES = 400
+# Size of a plot in units of its own, which the page stretches.
+_PLOT_WIDTH = 400.0
+_PLOT_HEIGHT = 20.0
+# Unit -> least range of a plot. A smaller one would magnify noise.
+_LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
+# Possible distances of the times on the scale [s].
+_TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A curve over the time of the drive, as the page's template draws it.
+
+    Attributes:
+        name: title of the plot.
+        unit: unit of the values: `km/h`, `m/s²` or `deg/s`.
+        values: values to display as text, at evenly spaced times of the drive.
+        points: the points of the curve, in the format of SVG.
+        ticks: labels of the scale, and their positions from the top, as shares
+            of the height.
+    """
+
+    name: str
+    unit: str
+    values: str
+    points: str
+    ticks: Sequence[tuple[str, float]]
+
+    @classmethod
+    def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
+        """Returns the plot of values over the time of a drive.
+
+        Args:
+            name: title of the plot.
+            unit: unit of the values: `km/h`, `m/s²` or `deg/s`.
+            values: (F,) values, one for each of the drive's F frames, which are
+                evenly spaced in time.
+        """
+        count = min(len(values), _MAX_SAMPLES)
+        frames = np.linspace(0, len(values) - 1, count).round().astype(int)
+        values = values[frames]
+        low, high = min(values.min(), 0.0), max(values.max(), 0.0)
+        missing = max(_LEAST_RANGE[unit] - (high - low), 0.0)
+        if low < 0.0:  # Zero stays within the plot.
+            low -= missing / 2.0
+            missing /= 2.0
+        high += missing
+        x = np.linspace(0.0, _PLOT_WIDTH, count)
+        y = _PLOT_HEIGHT * (high - values) / (high - low)
+        return cls(
+            name,
+            unit,
+            # Adding 0.0 removes the sign of a negative zero.
+            ",".join(f"{value:.1f}" for value in values.round(1) + 0.0),
+            " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True)),
+            _ticks(low, high),
+        )
+
+
+def _ticks(low: float, high: float) -> list[tuple[str, float]]:
+    """Returns ticks for zero, and for a round value above and below it.
+
+    Values outside of the range are left out. Each tick has its place as a share
+    of the height, from the top.
+    """
+    reach = max(-low, high)
+    power = 10.0 ** math.floor(math.log10(reach))
+    step = max(k * power for k in (1, 2, 5) if k * power <= reach)
+    return [
+        (f"{value:g}", (high - value) / (high - low))
+        for value in (-step, 0.0, step)
+        if low <= value <= high
+    ]
+
+
+def time_scale(duration: float) -> list[tuple[str, float]]:
+    """Returns at most seven round times of a drive, and their shares of it."""
+    step = next((s for s in _TIME_STEPS if duration <= 6 * s), 3600)
+    return [
+        (f"{t // 60}:{t % 60:02d}", t / max(duration, 1.0))
+        for t in range(0, int(duration) + 1, step)
+    ]
+
+
+def motion_plots(drive: DriveRecord) -> list[Plot]:
+    """Returns the plots of the speed and the IMU.
+
+    A drive with fewer than two frames has no plots.
+    """
+    if len(drive.speeds) < 2:
+        return []
+    forces = np.array(drive.specific_forces_I)
+    turns = np.rad2deg(drive.angular_velocities_I)
+    return [
+        Plot.of("Speed", "km/h", 3.6 * np.array(drive.speeds)),
+        Plot.of("IMU, forward", "m/s²", forces[:, 0]),
+        Plot.of("IMU, left", "m/s²", forces[:, 1]),
+        Plot.of("IMU, turn", "deg/s", turns[:, 2]),
+    ]
