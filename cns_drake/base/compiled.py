@@ -45,7 +45,7 @@ def compiled(function: _Function) -> _Function:
         dispatcher = numba.njit(cache=True, **options)(function)
         name = f"{function.__module__}.{function.__qualname__}.lock"
         kept = Path(dispatcher.stats.cache_path)
-        dispatcher.compile = _for_all(dispatcher.compile, kept / name)
+        dispatcher.compile = _compiling_once(dispatcher.compile, kept / name)
         return dispatcher
     except RuntimeError:
         return numba.njit(**options)(function)
@@ -54,15 +54,16 @@ def compiled(function: _Function) -> _Function:
 
 
 class _ByContent:
-    """Where Numba keeps a function: by what its folder says, wherever it lies.
+    """Cache folder of a function, named by the contents of its source folder.
 
-    Numba's own locators name the place by the path of the source. This one has
-    the methods that Numba calls; see NUMBA_CACHE_LOCATOR_CLASSES in its manual.
+    Numba's own locators name the cache folder by the path of the source. This
+    class has the methods that Numba calls; see NUMBA_CACHE_LOCATOR_CLASSES in
+    Numba's manual.
     """
 
     def __init__(self, function: Callable, folder: Path) -> None:
         self._line = function.__code__.co_firstlineno
-        self._content = _content_of(folder)
+        self._content = _content_hash(folder)
         root = Path(numba.config.CACHE_DIR or cache_folder() / "compiled")
         self._place = root / self._content
 
@@ -92,14 +93,18 @@ class _ByContent:
         return str(self._line)
 
 
-def _for_all(
+def _compiling_once(
     compile_for: Callable[[tuple], object], file: Path
 ) -> Callable[[tuple], object]:
-    """Returns a compiling function that compiles for all, and only once.
+    """Returns a function that compiles once for all processes.
 
-    Processes that run side by side wait for the first one's result. A literal
-    number among the arguments counts by its type; numba would compile for that
-    one number.
+    Processes that run side by side wait for the result of the first process. A
+    literal number among the arguments counts by its type; numba would compile
+    for that one number.
+
+    Args:
+        compile_for: function that compiles for types of arguments.
+        file: file that is locked meanwhile.
     """
 
     def compile_once(types: tuple) -> object:
@@ -128,7 +133,7 @@ def start_compiler() -> None:
 
 
 @functools.cache
-def _content_of(folder: Path) -> str:
+def _content_hash(folder: Path) -> str:
     """Returns a short hash that changes when a module in the folder changes."""
     content = hashlib.sha256()
     for file in sorted(folder.glob("*.py")):

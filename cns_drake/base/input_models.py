@@ -18,7 +18,7 @@ class InputModel(BaseModel):
     def _check_numbers(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuses true and false where only numbers can be."""
         if info.field_name is not None:
-            kinds = _kinds(cls.model_fields[info.field_name].annotation)
+            kinds = _inner_types(cls.model_fields[info.field_name].annotation)
             takes_more = any(
                 kind in (Any, bool, object)
                 or (isinstance(kind, type) and issubclass(kind, BaseModel))
@@ -29,9 +29,9 @@ class InputModel(BaseModel):
         return value
 
 
-def _kinds(annotation: Any) -> list[Any]:
+def _inner_types(annotation: Any) -> list[Any]:
     """Returns a type and all types that it is made of."""
-    inner = [kind for one in get_args(annotation) for kind in _kinds(one)]
+    inner = [kind for one in get_args(annotation) for kind in _inner_types(one)]
     return [annotation, *inner]
 
 

@@ -47,8 +47,8 @@ class Pace:
 
 
 @dataclass
-class _Work:
-    """One job.
+class _JobState:
+    """What is known of one job.
 
     Attributes:
         cost: expected time [s].
@@ -81,7 +81,7 @@ class TimeLeft:
         Args:
             costs: name of each job -> expected time on one core [s].
         """
-        self._works = {name: _Work(cost) for name, cost in costs.items()}
+        self._works = {name: _JobState(cost) for name, cost in costs.items()}
         self._most_running = 1
         self._pace = Pace()
         self._expected = 0.0
@@ -89,11 +89,11 @@ class TimeLeft:
 
     def start(self, name: str, now: float) -> None:
         """Records that a job starts, or is started again."""
-        self._works[name] = _Work(self._works[name].cost, since=now)
+        self._works[name] = _JobState(self._works[name].cost, since=now)
         running = sum(w.since is not None for w in self._works.values())
         self._most_running = max(self._most_running, running)
 
-    def found(self, name: str, share: float) -> None:
+    def record_done_before(self, name: str, share: float) -> None:
         """Records which share of a job was done before its start, 0 to 1."""
         work = self._works[name]
         if work.first is None:

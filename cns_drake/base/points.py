@@ -2,7 +2,8 @@
 
 A cloud has at least the scalar fields `x`, `y` and `z` [m]; other fields of a
 file (intensity, ring, label) keep their names and types. All readers return
-scans and maps in this form."""
+scans and maps in this form.
+"""
 
 import numpy as np
 from numpy.typing import DTypeLike

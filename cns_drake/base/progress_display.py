@@ -141,8 +141,8 @@ class Display(Listener):
         self._streams = sys.stdout, sys.stderr
         if self._is_terminal:
             if sys.stdout is not None and sys.stdout.isatty():
-                sys.stdout = _Above(sys.stdout, self)
-            sys.stderr = _Above(sys.stderr, self)
+                sys.stdout = _StreamAbove(sys.stdout, self)
+            sys.stderr = _StreamAbove(sys.stderr, self)
         threading.Thread(target=self._keep_telling, daemon=True).start()
         return self
 
@@ -320,7 +320,7 @@ class _JobsDisplay(JobsListener):
         if name not in self._tasks:
             return
         if total:
-            self._left.found(name, done / total)
+            self._left.record_done_before(name, done / total)
         task = self._tasks[name]
         task.update(activity, done, total, unit, self._now())
         self._display.refresh()
@@ -350,7 +350,7 @@ class _JobsDisplay(JobsListener):
         return f"{self._num_ended} of {self._num_jobs} {self._unit} done"
 
 
-class _Above:
+class _StreamAbove:
     """A stream to the terminal whose text appears above the display."""
 
     def __init__(self, stream: TextIO, display: Display):

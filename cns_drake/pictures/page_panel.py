@@ -14,13 +14,14 @@ from cns_drake.scene.world import World
 
 Rgb = tuple[float, float, float]
 
-# Kind of change -> its colour, and its text in the legend.
+# Kind of change -> its colour.
 CHANGE_RGB: dict[str, Rgb] = {
     "absent": (0.86, 0.08, 0.20),
     "lower": (0.96, 0.50, 0.05),
     "additional": (0.60, 0.42, 0.92),
 }
-_CHANGES = {
+# Kind of change -> its text in the legend.
+_CHANGE_TEXTS = {
     "absent": "not here, but in {other}",
     "lower": "higher in {other}",
     "additional": "not in {other}, or lower there",
@@ -82,7 +83,7 @@ def make_panel(
         colours={name: _hex(rgb) for name, rgb in CHANGE_RGB.items()},
         changes={
             name: words.format(other=shown.other_name)
-            for name, words in _CHANGES.items()
+            for name, words in _CHANGE_TEXTS.items()
             if name in changes
         },
         shown_points=_shown_points(drive),

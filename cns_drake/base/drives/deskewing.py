@@ -13,9 +13,10 @@ from cns_drake.base.errors import InputError
 # The splines have free ends; the error that this causes falls to about a
 # quarter with each pose.
 _REACH = 4
-# Largest ratio between the duration of a scan and the time between scans. The
-# two are about equal; in a wrong unit of time they differ by a factor of 1,000.
-_MOST_OFF = 300.0
+# Largest ratio between the duration of a scan and the time between scans, or
+# its inverse. The two times are about equal; in a wrong unit of time they
+# differ by a factor of 1,000.
+_MOST_RATIO = 300.0
 
 
 def _known_distortion(drive: Drive) -> str | None:
@@ -86,7 +87,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
     near = drive.stamps_ns[max(0, index - _REACH) : index + _REACH + 2]
     step_s = np.diff(near).mean() * 1e-9
     if points["t"].dtype.kind not in "iu" or (
-        scan_s > 0.0 and not 1.0 / _MOST_OFF < scan_s / step_s < _MOST_OFF
+        scan_s > 0.0 and not 1.0 / _MOST_RATIO < scan_s / step_s < _MOST_RATIO
     ):
         raise InputError(
             f"{drive.name}: scan {index}: t: from {t_ns[0]:g} to {t_ns[-1]:g};"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base.drives import mcap_messages, point_layouts, ros_types
+from cns_drake.base.drives import mcap_messages, ros_types
 from cns_drake.base.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
 from cns_drake.base.drives.lidar_topics import (
     LIDAR_TOPIC,
@@ -25,6 +25,8 @@ from cns_drake.base.drives.message_rows import (
     transform_row,
     vehicle_frames,
 )
+from cns_drake.base.drives.point_clouds import to_points, to_records
+from cns_drake.base.drives.point_layouts import from_layout
 from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
 
@@ -248,9 +250,9 @@ class McapDrive(Drive):
                     f"its log time is {logged_ns} ns, though the file states"
                     " that log times are stamps"
                 )
-            points = point_layouts.to_points(message)
+            points = to_points(message)
             point_arrays.check_range(points, point_arrays.FARTHEST_RETURN)
-            return point_layouts.from_layout(
+            return from_layout(
                 points,
                 self._labels(index, message),
                 lambda: self.lidar_section.get("returns") == "calibrated",
@@ -266,7 +268,7 @@ class McapDrive(Drive):
             raise ValueError(
                 f"{topic}: number {index} has another stamp than the scan"
             )
-        return point_layouts.to_records(message)
+        return to_records(message)
 
     @property
     def kalibr(self) -> str | None:

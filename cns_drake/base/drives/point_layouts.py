@@ -1,4 +1,4 @@
-"""Layouts (fields) of the points of PointCloud2 messages.
+"""Conversion of points between the layouts (fields) of several programs.
 
 `cns` is the layout of this project. `ouster` is the layout of Ouster's driver
 with `ring` as uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is
@@ -8,17 +8,11 @@ instances are recorded in a second message.
 """
 
 from collections.abc import Callable
-import itertools
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-# Datatype constant of sensor_msgs/msg/PointField -> NumPy type, without the
-# order of bytes.
-_DATATYPES = dict(
-    enumerate(["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"], start=1)
-)
 LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
 _NS_PER_S = 1e9
@@ -31,117 +25,6 @@ _NS_OF_A_SCAN = (1e6, 1e9)
 _SINGLE_STRONGEST = 1
 # The greatest intensity of calibrated returns, and of a byte.
 _FULL = 255.0
-
-
-def point_field_datatype(dtype: np.dtype) -> int:
-    """Returns PointField's constant for a scalar type of NumPy.
-
-    Raises:
-        ValueError: if PointField has none.
-    """
-    for constant, name in _DATATYPES.items():
-        if dtype == np.dtype(f"<{name}"):
-            return constant
-    raise ValueError(f"a point cloud cannot hold numbers of type {dtype}")
-
-
-def to_points(message: Any) -> np.ndarray:
-    """Returns a PointCloud2's points as an array, without copying them.
-
-    Args:
-        message: a deserialised PointCloud2, with any fields and padding.
-
-    Returns:
-        Structured array of shape (height * width,) under the message's field
-        names.
-
-    Raises:
-        ValueError: if the message contradicts itself, or has no adjacent scalar
-            floating-point fields `x`, `y` and `z`.
-    """
-    dtype = _record_type(message)
-    for name in "xyz":
-        if name not in (dtype.names or ()) or dtype[name].kind != "f":
-            raise ValueError(f"the point cloud has no field {name} of floats")
-    _check_apart(dtype)
-    return _records(message, dtype)
-
-
-def to_records(message: Any) -> np.ndarray:
-    """Returns the points of a message sensor_msgs/msg/PointCloud2 as records.
-
-    The points need not have coordinates.
-
-    Returns:
-        (height * width,) structured array with the fields of the message.
-
-    Raises:
-        ValueError: if the message contradicts itself.
-    """
-    return _records(message, _record_type(message))
-
-
-def _records(message: Any, dtype: np.dtype) -> np.ndarray:
-    data = np.frombuffer(message.data, dtype=np.uint8)
-    if message.row_step < message.width * message.point_step:
-        raise ValueError("the point cloud's rows overlap")
-    if len(data) != message.height * message.row_step:
-        raise ValueError(
-            f"the point cloud has {len(data)} bytes instead of"
-            f" {message.height} x {message.row_step}"
-        )
-    rows = data.reshape(message.height, message.row_step)
-    used = rows[:, : message.width * message.point_step]
-    return np.ascontiguousarray(used).reshape(-1).view(dtype)
-
-
-def _check_apart(dtype: np.dtype) -> None:
-    """Refuses coordinates that share bytes."""
-    assert dtype.fields is not None  # There are x, y and z.
-    places = sorted((dtype.fields[n][1], n, dtype[n].itemsize) for n in "xyz")
-    for (start, name, size), (following, other, _) in itertools.pairwise(
-        places
-    ):
-        if start + size > following:
-            raise ValueError(
-                f"the point cloud's fields {name} at byte {start} and {other}"
-                f" at byte {following} overlap"
-            )
-
-
-def _record_type(message: Any) -> np.dtype:
-    order = ">" if message.is_bigendian else "<"
-    names: list[str] = []
-    formats: list[tuple] = []
-    for field in message.fields:
-        if field.datatype not in _DATATYPES:
-            raise ValueError(
-                f"the point cloud's field {field.name} has the unknown"
-                f" datatype {field.datatype}"
-            )
-        scalar = order + _DATATYPES[field.datatype]
-        if field.name in names:
-            raise ValueError(
-                f"the point cloud's field {field.name} is there twice"
-            )
-        names.append(field.name)
-        # Some writers leave the count of a scalar at zero.
-        shape = (field.count,) if field.count > 1 else ()
-        formats.append((scalar, shape))
-        end = field.offset + np.dtype(formats[-1]).itemsize
-        if end > message.point_step:
-            raise ValueError(
-                f"the point cloud's field {field.name} ends at byte {end} of"
-                f" points of {message.point_step}"
-            )
-    return np.dtype(
-        {
-            "names": names,
-            "formats": formats,
-            "offsets": [field.offset for field in message.fields],
-            "itemsize": message.point_step,
-        }
-    )
 
 
 def _make_dtype(

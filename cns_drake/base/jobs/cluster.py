@@ -182,7 +182,7 @@ class DaskWorkers:
     def submit(self, name: str, job: bytes, priority: float) -> None:
         self._count += 1
         future = self._client.submit(
-            work,
+            run_on_worker,
             name,
             job,
             self._id,
@@ -281,7 +281,7 @@ def _check_answer(address: str) -> None:
         raise InputError(f"{fault} ({error})") from error
 
 
-def work(name: str, job: bytes, topic: str) -> None:
+def run_on_worker(name: str, job: bytes, topic: str) -> None:
     """Runs a job on a worker of Dask.
 
     Raises:

@@ -15,9 +15,9 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.progress import doing
 
-# The yardstick: so many points are looked for in a tree of as many. It takes
-# this time on the machine to which the costs of jobs belong [s].
+# Number of points in the KD-tree of the benchmark, and of its queries.
 _POINTS = 100_000
+# Time of the benchmark on the machine to which the costs of jobs refer [s].
 _REFERENCE = 0.29
 _REPEATS = 3
 # Most memory of a job [bytes].
@@ -25,7 +25,7 @@ _JOB_MEMORY = 1.2e9
 
 
 def measure_slowness() -> float:
-    """Returns how much slower this machine is than that of the job costs.
+    """Returns the ratio of this machine's time to the time of the job costs.
 
     A fixed piece of work is timed, which takes about a second. Other load on
     the machine during this second makes the result greater.

@@ -127,7 +127,7 @@ class _Run:
         self._submit_ready()
         try:
             while self._submitted:
-                self._take_in(_LOOK_INTERVAL)
+                self._receive(_LOOK_INTERVAL)
         except KeyboardInterrupt:
             self._stop()
             raise
@@ -168,7 +168,8 @@ class _Run:
         step = pickle.dumps(self._jobs[name].step)
         self._workers.submit(name, step, self._urgency[name])
 
-    def _take_in(self, timeout: float) -> None:
+    def _receive(self, timeout: float) -> None:
+        """Acts on the next message of a job, if one comes in time [s]."""
         try:
             kind, name, *values = self._messages.get(timeout=timeout)
         except queue.Empty:
@@ -222,4 +223,4 @@ class _Run:
         self._workers.stop()
         deadline = time.monotonic() + processes.PATIENCE
         while self._running and (left := deadline - time.monotonic()) > 0:
-            self._take_in(min(left, _LOOK_INTERVAL))
+            self._receive(min(left, _LOOK_INTERVAL))

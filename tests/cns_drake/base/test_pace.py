@@ -93,11 +93,11 @@ def test_what_was_done_before_gives_no_pace():
     # Half of these two was done by an earlier run.
     for name in "cd":
         left.start(name, now)
-        left.found(name, 0.5)
-        left.found(name, 0.9)
+        left.record_done_before(name, 0.5)
+        left.record_done_before(name, 0.9)
         left.end(name, now + 60.0)
     assert left.seconds(now + 60.0) == 0.0
     left.start("c", now)
-    left.found("c", 0.5)
+    left.record_done_before("c", 0.5)
     # 120 s for 100 s of work; 50 s of it is left.
     assert left.seconds(now) == pytest.approx(60.0)

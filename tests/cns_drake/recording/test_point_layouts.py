@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
+from cns_drake.base.drives.point_clouds import to_points, to_records
 from cns_drake.base.drives.point_layouts import (
     from_layout,
     to_labels,
     to_layout,
-    to_points,
-    to_records,
 )
 from cns_drake.base.drives.ros_types import POINT_CLOUD, deserialize
 from cns_drake.recording.messages import encode_point_cloud
