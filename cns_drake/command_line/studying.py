@@ -202,7 +202,7 @@ def _chosen_experiment(
         InputError: the experiment or an option cannot be used.
     """
     with uninterrupted():
-        from cns_drake.studies.experiment import load_experiment
+        from cns_drake.studies.experiment_files import load_experiment
         from evaluation.study.chosen_methods import with_standard
 
     experiment = load_experiment(name, overrides, quick=quick, on_note=note)
