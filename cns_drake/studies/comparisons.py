@@ -29,7 +29,7 @@ from cns_drake.studies.side_fields import (
 from cns_drake.studies.unique_names import UniqueNames
 from cns_drake.studies.viewpoints import VIEWPOINTS, with_lidars_beside
 from evaluation.map_update.upkeep import NOT_MAINTAINED
-from evaluation.recognition.keeping import KEEP_ALL, checked_keep
+from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.table import CAUSE, OWN
 from evaluation.study.tasks.task import USUAL_LENGTH
@@ -51,7 +51,7 @@ class Compared:
             sector.
         beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
-            `evaluation.recognition.keeping.kept_places`.
+            `evaluation.recognition.kept_places.kept_places`.
         maintain: what updates the maps of older drives by newer drives, see
             `evaluation.map_update.upkeep`.
         ages: the years by which the city has aged at the time of each of

@@ -6,7 +6,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.studies.conditions import Condition
 from cns_drake.studies.experiment import SESSIONS, SIDES
 from cns_drake.studies.protocol_fields import condition_protocol
-from evaluation.recognition.keeping import KEEP_ALL, checked_keep
+from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
 from evaluation.results.table import CAUSE, LAST, OWN, STAGE
 from evaluation.study.collection import MapDrives, RecordingInfo
 from evaluation.study.recorded import RecordedCondition, chosen_sessions

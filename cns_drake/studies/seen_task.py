@@ -21,7 +21,7 @@ from cns_drake.simulation.simulated_drive import (
 )
 from cns_drake.studies.map_upkeep import UpkeptSource
 from evaluation.drives.sampling import sample_frames
-from evaluation.recognition.number import Number
+from evaluation.recognition.result_number import Number
 from evaluation.study.sources import DriveSource
 from evaluation.study.tasks.task import (
     OPENING_COST,

@@ -18,7 +18,7 @@ class JoinedDrive(Drive):
         starts: (P + 1,) first frame of each of the P drives, and last the
             number of all frames.
         keep: which frames are kept in a map, see
-            `evaluation.recognition.keeping.kept_places`.
+            `evaluation.recognition.kept_places.kept_places`.
     """
 
     def __init__(self, sources: Sequence[Callable[[], Drive]], keep: str | int):

@@ -30,7 +30,7 @@ from evaluation.localisation.localisation_map import (
     LocalisationMap,
     voxel_shift,
 )
-from evaluation.localisation.robust import MAX_RANGE, align_robustly
+from evaluation.localisation.robust_icp import MAX_RANGE, align_robustly
 from evaluation.localisation.settings import (
     KISS_MATCHER,
     METHODS,

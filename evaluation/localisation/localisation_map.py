@@ -18,12 +18,12 @@ from evaluation.clouds.cloud_files import read_blocks
 from evaluation.clouds.notes import OnNote, no_note
 from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import sample_frames, within_range
-from evaluation.localisation.robust import MAX_RANGE
+from evaluation.localisation.robust_icp import MAX_RANGE
 from evaluation.localisation.settings import (
     Settings,
 )
 from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.recognition.keeping import kept_places
+from evaluation.recognition.kept_places import kept_places
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0

@@ -29,7 +29,7 @@ from evaluation.localisation.localisation_map import (
     LocalisationMap,
 )
 from evaluation.localisation.results import COLUMNS, QUERY
-from evaluation.localisation.robust import MAX_RANGE
+from evaluation.localisation.robust_icp import MAX_RANGE
 from evaluation.localisation.settings import Settings
 from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.pose_errors import (

@@ -13,11 +13,11 @@ from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
 )
 from evaluation.recognition.auroc import auroc
-from evaluation.recognition.number import Number
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
 )
+from evaluation.recognition.result_number import Number
 
 # Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3

@@ -13,7 +13,7 @@ from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.initial_poses import Starts
 from evaluation.localisation.localise import Localiser, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
-from evaluation.recognition.number import Number
+from evaluation.recognition.result_number import Number
 
 # Distance driven between two aligned scans [m].
 SPACING = 2.0

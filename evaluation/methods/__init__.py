@@ -1,4 +1,18 @@
-"""Place-recognition methods: one per file, all with the same interface."""
+"""Place-recognition methods, all with the same interface.
+
+`method` is the interface, `registry` knows the methods by name, and `own_files`
+loads a method from a user's file. Each method is a module of its own. Modules
+that only some methods need:
+
+- BTC: `btc_planes`, `btc_voxel_order`, `btc_keypoints`, `btc_triangles`,
+  `btc_verification`.
+- RING++: `radon`, `local_features`.
+- Layered overlap: `overlap_layers`, `overlap_maps`.
+- The learned descriptor: `polar_images`.
+- Networks with the weights of their authors: `published_networks`,
+  `pointnetvlad_clouds`, `network_layers`, `sparse_convolution`,
+  `torch_weights`, `torch_pickles`.
+"""
 
 from evaluation.methods import (  # noqa: F401  (register themselves)
     btc,

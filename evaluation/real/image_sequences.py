@@ -35,7 +35,7 @@ from evaluation.clouds.count_images import (
 from evaluation.clouds.notes import OnNote
 from evaluation.drives.scan_files import FileDrive
 from evaluation.drives.text_tables import read_poses
-from evaluation.recognition.description import Role
+from evaluation.recognition.describing import Role
 from evaluation.study.tasks.task import NamedDrive
 
 # Name of the folder with a folder for each sequence.

@@ -39,13 +39,13 @@ from evaluation.real.image_sequences import (
 )
 from evaluation.real.sessions import FOLDER as SESSIONS
 from evaluation.real.sessions import draw_sessions, read_sessions
-from evaluation.recognition.description import Role
-from evaluation.recognition.number import Number
+from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     RECORDED_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.recognition.result_number import Number
 from evaluation.results.table import QueryRows, Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.engine import Engine

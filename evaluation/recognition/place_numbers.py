@@ -13,11 +13,11 @@ from evaluation.recognition.bootstrap import (
     percentile_interval,
 )
 from evaluation.recognition.faults import FAULTS
-from evaluation.recognition.number import Number
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import (
     is_accepted,
 )
+from evaluation.recognition.result_number import Number
 from evaluation.recognition.visible_change import (
     mean_visible_change,
     visible_change_added,

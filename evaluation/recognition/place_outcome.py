@@ -23,7 +23,6 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
     evaluate,
 )
-from evaluation.recognition.number import Number
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     PoseMetrics,
@@ -33,6 +32,7 @@ from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.ranking import ranked_places
+from evaluation.recognition.result_number import Number
 from evaluation.recognition.retrieval import Retrieval
 
 # Further radii of a match for which AUC is computed [m].

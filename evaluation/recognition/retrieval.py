@@ -11,7 +11,7 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive, check_same_world
 from evaluation.methods.method import Method
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.geometric_verification import (
     gated_by_poses,
@@ -22,7 +22,7 @@ from evaluation.recognition.pose_errors import PoseErrors, pose_error
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
 from evaluation.recognition.ranking import ranked_places
 from evaluation.recognition.search import Search
-from evaluation.recognition.sequences import sequence_scores
+from evaluation.recognition.sequence_matching import sequence_scores
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ from cns_drake.base.files import read_bytes, write_text
 from cns_drake.base.repetitions import repeated
 from cns_drake.base.terminal import note
 from cns_drake.base.version import __version__
-from evaluation.recognition.number import Number
 from evaluation.recognition.protocol import PROTOCOL_NAMES, RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.result_number import Number
 from evaluation.results.ranges import Range, checked, range_of
 
 RESULTS = "results.csv"

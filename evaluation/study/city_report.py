@@ -7,7 +7,7 @@ from functools import partial
 
 from cns_drake.base.drives.drive import check_same_world
 from cns_drake.base.jobs.running import Job
-from evaluation.recognition.description import Role
+from evaluation.recognition.describing import Role
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import page, result_tables

@@ -26,7 +26,7 @@ from evaluation.maps.voxel_maps import (
     map_drive,
 )
 from evaluation.methods import MethodConfig
-from evaluation.recognition import description
+from evaluation.recognition import describing
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
@@ -38,7 +38,7 @@ from evaluation.study.study_files import FeatureFiles
 PICTURE_DIVISIONS = 2
 # A method, and what it describes of a drive by a second protocol.
 Further: TypeAlias = (
-    "tuple[MethodChoice, frozenset[description.Role], RetrievalProtocol]"
+    "tuple[MethodChoice, frozenset[describing.Role], RetrievalProtocol]"
 )
 # Fields of the points of kept scans, where a drive has them.
 _KEPT_FIELDS = ("x", "y", "z", "instance")
@@ -199,8 +199,8 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
 
 def extract_features(
     recording: Drive,
-    roles: Set[description.Role],
-    asked: Mapping[str, description.Request],
+    roles: Set[describing.Role],
+    asked: Mapping[str, describing.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     *,
     with_scans: bool = False,
@@ -281,8 +281,8 @@ def map_source(
 
 def describe_recording(
     recording: Drive,
-    roles: Set[description.Role],
-    asked: Mapping[str, description.Request],
+    roles: Set[describing.Role],
+    asked: Mapping[str, describing.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
 ) -> ExtractedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
@@ -300,19 +300,19 @@ def describe_recording(
     return ExtractedFeatures(DriveNames.of(recording), described, seen)
 
 
-def _most_scans(asked: Mapping[str, description.Request]) -> int:
+def _most_scans(asked: Mapping[str, describing.Request]) -> int:
     """Returns the greatest number of scans that a method merges."""
     return max((p.scans(method) for method, _, p in asked.values()), default=1)
 
 
 def _described(
     drive: Drive,
-    roles: Set[description.Role],
-    asked: Mapping[str, description.Request],
+    roles: Set[describing.Role],
+    asked: Mapping[str, describing.Request],
     protocol: RetrievalProtocol,
     visit: Callable[[int, np.ndarray], None],
 ) -> dict[str, DriveDescriptors]:
-    found = description.describe_drive(
+    found = describing.describe_drive(
         drive, (), roles, protocol, visit, asked.values()
     )
     return dict(zip(asked, found, strict=True))
@@ -341,7 +341,7 @@ class FeatureExtraction(Step):
     """
 
     source: DriveSource
-    roles: frozenset[description.Role]
+    roles: frozenset[describing.Role]
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     files: FeatureFiles
@@ -413,7 +413,7 @@ class FeatureExtraction(Step):
         drive = self.source.identity()
 
         def inputs(
-            roles: Set[description.Role], protocol: RetrievalProtocol
+            roles: Set[describing.Role], protocol: RetrievalProtocol
         ) -> dict[str, object]:
             options = protocol.descriptor_options(queries="queries" in roles)
             return self.made_of(

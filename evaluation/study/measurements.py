@@ -14,9 +14,9 @@ from evaluation.drives import check_same_world
 from evaluation.drives.sampling import gather
 from evaluation.methods.method import Method
 from evaluation.recognition.costs import query_ms
-from evaluation.recognition.description import Role
+from evaluation.recognition.describing import Role
 from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
-from evaluation.recognition.keeping import KEEP_ALL, kept_places
+from evaluation.recognition.kept_places import KEEP_ALL, kept_places
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -13,8 +13,8 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.listing import natural_key
 from cns_drake.base.repetitions import repeated
-from evaluation.recognition.description import Role
-from evaluation.recognition.keeping import KEEP_ALL
+from evaluation.recognition.describing import Role
+from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import OWN
 from evaluation.study.collection import MapDrives, RecordingInfo
@@ -46,7 +46,7 @@ class RecordedCondition(NamedTuple):
         protocol: protocol of place recognition.
         sessions: the recordings of the database, if there are several.
         keep: which places of these recordings are kept, see
-            `evaluation.recognition.keeping.kept_places`.
+            `evaluation.recognition.kept_places.kept_places`.
     """
 
     factors: Mapping[str, Any]

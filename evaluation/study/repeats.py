@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from evaluation.recognition.description import Role
+from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice

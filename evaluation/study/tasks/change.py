@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeReport, change_between
-from evaluation.recognition.number import Number
+from evaluation.recognition.result_number import Number
 from evaluation.study.feature_extraction import DriveSummary
 from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
 

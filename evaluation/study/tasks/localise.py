@@ -26,8 +26,8 @@ from evaluation.localisation.settings import (
     default_settings,
 )
 from evaluation.maps.voxel_maps import map_drive
-from evaluation.recognition.number import Number
 from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.result_number import Number
 from evaluation.study.sources import (
     DriveSource,
     JoinedSource,

@@ -9,10 +9,10 @@ from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
-from evaluation.recognition.keeping import KEEP_ALL
-from evaluation.recognition.number import Number
+from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.place_numbers import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.result_number import Number
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.measurements import (
     measure_method,
@@ -231,7 +231,7 @@ def measure_costs(
         beside: for each further drive in the same world, files with the
             descriptors of its places, one file for each method.
         keep, cell: which places in this world are kept, see
-            `evaluation.recognition.keeping.kept_places`.
+            `evaluation.recognition.kept_places.kept_places`.
     """
     found = {}
     for k, choice in enumerate(

@@ -13,10 +13,10 @@ from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.repetitions import repeated
-from evaluation.recognition.description import Role
-from evaluation.recognition.keeping import KEEP_ALL
-from evaluation.recognition.number import Number
+from evaluation.recognition.describing import Role
+from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.result_number import Number
 from evaluation.results.table import FROZEN_REDRAW
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import (
@@ -121,7 +121,7 @@ class Pair:
         beside: further drives in the same world, whose places are added to the
             database, from older to newer.
         keep: which places of these drives and of the database drive are kept,
-            see `evaluation.recognition.keeping.kept_places`.
+            see `evaluation.recognition.kept_places.kept_places`.
         ages: for an aged city, the years that it has aged by at each drive of
             the database and at the query; empty if the city does not age.
         leaves_out_itself: whether a drive is compared with itself, and each

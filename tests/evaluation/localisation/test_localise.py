@@ -19,7 +19,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
 from evaluation.alignment.registration import make_surface
 from evaluation.drives import open_drive
-from evaluation.localisation import robust
+from evaluation.localisation import robust_icp
 from evaluation.localisation.estimators import Estimate, make_estimator
 from evaluation.localisation.fit import fit_at
 from evaluation.localisation.initial_poses import Starts
@@ -37,7 +37,7 @@ from evaluation.localisation.results import (
     note_sparse,
     summary,
 )
-from evaluation.localisation.robust import _gauss_newton_step
+from evaluation.localisation.robust_icp import _gauss_newton_step
 from evaluation.localisation.settings import METHODS, Settings, default_settings
 from evaluation.recognition.auroc import auroc
 
@@ -211,10 +211,10 @@ def test_the_search_is_narrowed_to_the_last_width(monkeypatch):
         widths.append(width)
         return np.array([0, 0, 0, 0.3, 0, 0]) * (len(widths) == 1)
 
-    monkeypatch.setattr(robust, "_gauss_newton_step", still)
+    monkeypatch.setattr(robust_icp, "_gauss_newton_step", still)
     surface = make_surface(street())
     start = np.eye(4)
-    end, steps = robust.align_robustly(
+    end, steps = robust_icp.align_robustly(
         surface, street(), start, (6.0, 0.5), 50, (1e-4, 1e-5)
     )
     # Three times a deviation of 0.3 m, then of none.

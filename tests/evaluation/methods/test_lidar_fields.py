@@ -11,7 +11,7 @@ from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.describing import describe_drive
 
 POINTS = np.random.default_rng(2).uniform(-40.0, 40.0, (3000, 3))
 

@@ -18,7 +18,7 @@ from evaluation.methods import (
     make_method,
 )
 from evaluation.methods.btc_verification import align
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,

@@ -9,7 +9,7 @@ from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
 from evaluation.drives.sampling import gather, sample_frames, within_range
 from evaluation.methods import Method, MethodConfig, make_method
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, joined_scans
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol

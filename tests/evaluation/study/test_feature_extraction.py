@@ -14,7 +14,7 @@ from cns_drake.base.points import xyz
 from evaluation.change.drive_maps import read_map
 from evaluation.drives import Drive, open_drive
 from evaluation.drives.sampling import within_range
-from evaluation.recognition.description import describe_drive
+from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.feature_extraction import (
