@@ -56,7 +56,7 @@ from cns_drake.sensors.returns.calibrated import (
     CalibratedReturns as CalibratedReturns,
 )
 from cns_drake.sensors.returns.weather import Weather as Weather
-from cns_drake.simulation.loaded_drive import (
+from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic as plan_scenario_traffic,
 )
 from cns_drake.simulation.sensor_recording import (

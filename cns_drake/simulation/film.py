@@ -1,7 +1,6 @@
 """A film of one drive, repeated in every stage of its city."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 import math
 from pathlib import Path
 import pickle
@@ -11,10 +10,7 @@ import tempfile
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
-from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram
-from pydrake.systems.sensors import CameraInfo
+from PIL import Image
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_writable, completing
@@ -23,17 +19,14 @@ from cns_drake.base.jobs.processes import (
     ProcessDiedError,
     run_process,
 )
-from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.pictures.meshcat_drawing import height_rgb
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.simulation.loaded_drive import load_drive, load_ways
-from cns_drake.simulation.station import make_station
+from cns_drake.simulation.film_stage import FilmStage
+from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.traffic.vehicles import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 
@@ -48,12 +41,11 @@ _VIEWS = {
         xyz=(-28.0, 0.0, 40.0), rpy_deg=(0.0, math.degrees(0.8), 0.0)
     ),
 }
-# A point is drawn unless it lies farther than this behind the visible surface
-# [m].
-_BEHIND = 0.4
-# Interval of the times at which a shot may begin [s].
-_PLACES = 0.5
+# Interval between the times at which a shot may begin [s].
+_START_INTERVAL = 0.5
+# Quality of a WebP image, from 0 to 100.
 _QUALITY = 50
+# Number of vehicles, and of pedestrians, in a film of a drive without traffic.
 _TRAFFIC = 60
 
 
@@ -136,7 +128,7 @@ def make_film(
     )
     of_view = max(1, round(seconds * RATE / len(stages) / len(views)))
     doing("planning the drive")
-    times = _times(plan_drive(scenario), of_view, start)
+    times = _shot_times(plan_drive(scenario), of_view, start)
     total = of_view * len(stages) * len(views)
     with tempfile.TemporaryDirectory() as folder:
         for k, stage in enumerate(stages):
@@ -165,68 +157,16 @@ def make_film(
             except (JobError, ProcessDiedError) as error:
                 raise InputError(str(error)) from None
         doing("writing the film")
-        _write(path, sorted(Path(folder).iterdir()))
+        _write_film(path, sorted(Path(folder).iterdir()))
     return total
 
 
-@dataclass(frozen=True)
-class FilmStage(Step):
-    """Takes the images of one stage of a film, as files `<number>.png`.
-
-    Attributes:
-        scenario: the drive in that stage, with the cameras of the film.
-        times: times at which images are taken [s].
-        folder: folder to which the images are written.
-        first: for each camera, the number of the camera's first image in the
-            film; further images of the camera follow.
-    """
-
-    scenario: Scenario
-    times: np.ndarray
-    folder: Path
-    first: tuple[int, ...]
-
-    @property
-    def output(self) -> None:
-        return None
-
-    def is_done(self) -> bool:
-        return False
-
-    def run(self, reporter: Reporter) -> None:
-        scenario = self.scenario
-        title = (
-            scenario.name
-            if scenario.stage is None
-            else f"{scenario.folder.name.capitalize()}, stage {scenario.stage}"
-        )
-        drive = load_drive(scenario)
-        for text in drive.world.notes:
-            reporter.note(text)
-        diagram = make_station(drive, cameras_see_vehicle=True)
-        context = diagram.CreateDefaultContext()
-        for k, time in enumerate(self.times):
-            context.SetTime(time)
-            points = np.concatenate(
-                [
-                    _world_points(diagram, context, name)
-                    for name in scenario.lidars
-                ]
-            )
-            for (name, camera), first in zip(
-                scenario.cameras.items(), self.first, strict=True
-            ):
-                pixels = _picture(diagram, context, name, camera, points)
-                _titled(pixels, title).save(
-                    self.folder / f"{first + k:06d}.png", compress_level=1
-                )
-            doing("filming", k + 1, len(self.times), "images")
-
-
-def _times(
+def _shot_times(
     trajectory: Trajectory, number: int, start: float | None
 ) -> np.ndarray:
-    """Returns the (N,) times of a shot [s].
+    """Returns the times (N,) of the images of a shot [s].
+
+    If `start` is None, the shot begins where the car gets farthest during it.
 
     Raises:
         InputError: the start is not within the drive.
@@ -234,7 +174,9 @@ def _times(
     end = trajectory.duration
     moments = np.arange(number) / RATE
     if start is None:
-        starts = np.arange(0.0, max(end - moments[-1], _PLACES), _PLACES)
+        starts = np.arange(
+            0.0, max(end - moments[-1], _START_INTERVAL), _START_INTERVAL
+        )
         ends = np.minimum(starts + moments[-1], end)
         way = trajectory.positions(ends) - trajectory.positions(starts)
         start = float(starts[np.argmax(np.linalg.norm(way, axis=1))])
@@ -245,75 +187,7 @@ def _times(
     return np.minimum(start + moments, end)
 
 
-def _picture(
-    diagram: Diagram,
-    context: Context,
-    name: str,
-    camera: CameraSection,
-    p_WQset: np.ndarray,
-) -> np.ndarray:
-    """Returns a camera's image with points p_WQset (N, 3) drawn into it."""
-    eye = diagram.GetSubsystemByName(f"{name}-colours")
-    depth = eye.depth_image_32F_output_port().Eval(
-        eye.GetMyContextFromRoot(context)
-    )
-    X_WB = RigidTransform(diagram.GetOutputPort("odometry").Eval(context).X_WB)
-    image = diagram.GetOutputPort(f"{name}_image").Eval(context)
-    pixels = image.data[:, :, :3].copy()
-    _draw_points(
-        pixels,
-        depth.data[:, :, 0],
-        X_WB @ optical_pose(camera),
-        camera,
-        p_WQset,
-    )
-    return pixels
-
-
-def _world_points(diagram: Diagram, context: Context, name: str) -> np.ndarray:
-    """Returns the (N, 3) points of a LiDAR's scan in the world [m]."""
-    scan = diagram.GetOutputPort(f"{name}_world_points").Eval(context)
-    lidar = diagram.GetSubsystemByName(name)
-    X_WS = lidar.GetOutputPort("X_WS").Eval(lidar.GetMyContextFromRoot(context))
-    return (X_WS @ np.stack([scan["x"], scan["y"], scan["z"]])).T
-
-
-def _draw_points(
-    pixels: np.ndarray,
-    depth: np.ndarray,
-    X_WC: RigidTransform,
-    camera: CameraSection,
-    p_WQset: np.ndarray,
-) -> None:
-    """Draws the points that a camera sees, coloured by height."""
-    # Drake renders with this K if pixel (0, 0) begins at the origin.
-    K = CameraInfo(
-        camera.width, camera.height, math.radians(camera.fov_y_deg)
-    ).intrinsic_matrix()
-    x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
-    column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
-    seen = (z > 0.1) & (column >= 0) & (row >= 0)
-    seen &= (column < camera.width) & (row < camera.height)
-    seen[seen] = z[seen] < depth[row[seen], column[seen]] + _BEHIND
-    rgb = np.round(255 * height_rgb(p_WQset[seen, 2]))
-    pixels[row[seen], column[seen]] = rgb
-
-
-def _titled(pixels: np.ndarray, title: str) -> Image.Image:
-    image = Image.fromarray(pixels)
-    size = max(image.height // 16, 8)
-    ImageDraw.Draw(image).text(
-        (size // 2, size // 3),
-        title,
-        "white",
-        ImageFont.load_default(size=size),
-        stroke_width=max(size // 12, 1),
-        stroke_fill="#303030",
-    )
-    return image
-
-
-def _write(path: Path, files: Sequence[Path]) -> None:
+def _write_film(path: Path, files: Sequence[Path]) -> None:
     """Writes a film from images; the file gets its name when it is complete."""
     with completing(path) as part:
         if path.suffix == ".webp":

@@ -36,9 +36,9 @@ from cns_drake.sensors.lidar.config import describe_unit
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
-    load_stage,
     structure_list,
 )
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
 
 # Reports how many frames of how many are done.

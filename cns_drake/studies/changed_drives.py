@@ -16,7 +16,7 @@ from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
-from cns_drake.simulation.loaded_drive import load_ways
+from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.studies.named_stages import find_stage
 from cns_drake.studies.nested_fields import Changes
 from cns_drake.studies.sampled_drives import DrawnRoute

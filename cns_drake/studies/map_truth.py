@@ -43,12 +43,12 @@ from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario, load_scenario
-from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.scanning import still_scene
 from cns_drake.simulation.simulated_drive import (
     SimulatedDrive,
     SimulationSource,
 )
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.studies.exact_overlap import Sight, sights_of
 from evaluation.drives.sampling import sample_frames
 from evaluation.map_update.labels import SIDES, Label

@@ -16,11 +16,8 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.structure_names import structure_name
-from cns_drake.simulation.loaded_drive import (
-    EGO_BOX,
-    load_drive,
-    plan_scenario_traffic,
-)
+from cns_drake.simulation.loaded_drive import load_drive
+from cns_drake.simulation.scenario_traffic import EGO_BOX, plan_scenario_traffic
 from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 

@@ -19,12 +19,12 @@ from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.simulation.film import (
     _VIEWS,
-    _draw_points,
-    _times,
+    _shot_times,
     check_film,
     make_film,
     with_some_traffic,
 )
+from cns_drake.simulation.film_stage import _draw_points
 
 SIZE = (96, 54)
 # A scan costs little with it.
@@ -130,7 +130,7 @@ class TestTimes:
         return plan_drive(tiny_scenario(tmp_path))
 
     def test_shot_is_straight(self, trajectory):
-        times = _times(trajectory, 30, None)
+        times = _shot_times(trajectory, 30, None)
         np.testing.assert_allclose(np.diff(times), 0.1)
         yaw = [trajectory.pose(t).rotation().matrix()[1, 0] for t in times]
         assert np.ptp(yaw) < 0.01
@@ -138,18 +138,20 @@ class TestTimes:
         assert travelled > 0.99 * 2.9 * 6.0  # At full speed.
 
     def test_shot_longer_than_the_drive_ends_with_it(self, trajectory):
-        times = _times(trajectory, 100_000, None)
+        times = _shot_times(trajectory, 100_000, None)
         assert times[0] == 0.0
         assert times[-1] == trajectory.duration
 
     def test_start(self, trajectory):
         end = trajectory.duration
-        assert _times(trajectory, 3, end)[0] == end
-        np.testing.assert_allclose(_times(trajectory, 3, 2.0), [2, 2.1, 2.2])
+        assert _shot_times(trajectory, 3, end)[0] == end
+        np.testing.assert_allclose(
+            _shot_times(trajectory, 3, 2.0), [2, 2.1, 2.2]
+        )
         with pytest.raises(
             InputError, match=r"--start-time: .*the drive takes"
         ):
-            _times(trajectory, 3, end + 1e-6)
+            _shot_times(trajectory, 3, end + 1e-6)
 
 
 def write_ffmpeg(folder, script, monkeypatch):

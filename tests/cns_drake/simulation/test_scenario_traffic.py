@@ -11,7 +11,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.sections import TrafficConfig
-from cns_drake.simulation.loaded_drive import load_drive, plan_scenario_traffic
+from cns_drake.simulation.loaded_drive import load_drive
+from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
 
 
 @pytest.fixture

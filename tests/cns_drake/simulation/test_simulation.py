@@ -16,8 +16,8 @@ from cns_drake.scenarios.scenario_files import (
     make_scenario,
 )
 from cns_drake.simulation import loaded_drive, simulation
-from cns_drake.simulation.loaded_drive import load_stage
 from cns_drake.simulation.simulation import simulate
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.studies.recording import is_recorded, record_all
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")

@@ -12,7 +12,7 @@ import shapely
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.simulation.loaded_drive import (
+from cns_drake.simulation.scenario_traffic import (
     EGO_BOX,
     load_ways,
     plan_scenario_traffic,

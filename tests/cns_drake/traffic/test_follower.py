@@ -11,7 +11,8 @@ from cns_drake.roads.lane_path import LanePath, Speeds
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.sections import DriverConfig, TrafficConfig
-from cns_drake.simulation.loaded_drive import load_stage, plan_scenario_traffic
+from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic.follower import Follower, find_runs
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.streets import STEP, EgoBox, make_streets

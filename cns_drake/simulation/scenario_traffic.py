@@ -1,0 +1,237 @@
+"""The traffic of a scenario: its plan, and its structures in the world."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+import functools
+from pathlib import Path
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.elementary import arctan2
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.recording.schedule import FRAME_PERIOD
+from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios.planning import DrivePlan, count_frames
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import check_files
+from cns_drake.scenarios.sections import TrafficConfig
+from cns_drake.scene.map_folder import MapFolder
+from cns_drake.scene.world import World
+from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.traffic import lane_graph, queues, traffic_plan
+from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
+from cns_drake.traffic.lane_file import LaneFile, read_lanes
+from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
+from cns_drake.traffic.streets import EgoBox
+from cns_drake.traffic.traffic_motion import traffic_structures
+from cns_drake.traffic.traffic_plan import EgoPath
+from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
+from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.walkers import room_for_walkers
+from cns_drake.traffic.walkway_clearing import kept_clear
+from cns_drake.transient.ground_surface import GROUND_CLASSES
+from cns_drake.transient.loaded_structures import read_structures
+
+# Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
+EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+# A car that follows others takes at most this multiple of the time that it
+# would need alone, plus a wait.
+_SLOWEST_RATIO = 6.0
+# This wait [s].
+_LONGEST_WAIT = 600.0
+
+
+def plan_scenario_traffic(
+    scenario: Scenario, trajectory: Trajectory, world: World | None = None
+) -> traffic_plan.TrafficPlan:
+    """Returns the motion of all vehicles and pedestrians of a scenario.
+
+    Args:
+        scenario: scenario with traffic.
+        trajectory: motion of the scenario's vehicle.
+        world: world of the scenario's stage, if already loaded. The world must
+            not be part of a diagram yet.
+
+    Raises:
+        InputError: the map has no roads or sidewalks, or no room for that many
+            vehicles or pedestrians, or a SUMO trace cannot be replayed on this
+            map.
+
+    Example:
+        from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
+
+        scenario = load_scenario("metropolis_04").with_traffic(60)
+        plan = plan_scenario_traffic(scenario, plan_drive(scenario))
+    """
+    wanted = scenario.traffic
+    if world is None:
+        check_files(scenario)
+    graph, walkways, _ = load_ways(scenario.folder)
+    ego = _ego_path(trajectory)
+    if wanted.fcd is not None:
+        trace = Path(wanted.fcd)
+        num_frames = count_frames(scenario, trajectory)
+        return play_trace(
+            read_fcd(trace),
+            trace,
+            graph,
+            walkways,
+            seed=wanted.seed,
+            duration=(num_frames - 1) * scenario.frame_period,
+            end=trajectory.duration,
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
+    if wanted.queues:
+        return queues.plan_queues(
+            graph,
+            seed=wanted.seed,
+            duration=trajectory.duration,
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
+    _check_room(wanted, _source(scenario), graph, walkways)
+    if wanted.walkers:
+        world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
+        things = _sidewalk_obstacles(world)
+        walkways = kept_clear(walkways, things)
+        graph, walkways = with_unmarked_crossings(graph, walkways, things)
+    return _plan_moving_traffic(scenario, trajectory, ego, graph, walkways)
+
+
+def _ego_path(trajectory: Trajectory) -> EgoPath:
+    """Returns the function of times (N,) that supplies the car's motion.
+
+    The function returns positions (N, 2) [m] and yaws (N,) [rad] in the world.
+    After the end of the trajectory, the car stays where it is.
+    """
+
+    def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
+        return p_WB[:, :2], np.unwrap(arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
+
+    return ego
+
+
+def _source(scenario: Scenario) -> str:
+    """Returns the start of the message of an error in the traffic's fields."""
+    return f"{scenario.source}: traffic"
+
+
+def _plan_moving_traffic(
+    scenario: Scenario,
+    trajectory: Trajectory,
+    ego: EgoPath,
+    graph: lane_graph.LaneGraph,
+    walkways: Sequence[lane_graph.Walkway],
+) -> traffic_plan.TrafficPlan:
+    """Plans vehicles and pedestrians that move by their own rules.
+
+    Raises:
+        InputError: there is no room for a vehicle, or the car that follows
+            other vehicles never arrives.
+    """
+    wanted = scenario.traffic
+    follows = scenario.driver.follows
+    plan = traffic_plan.plan_traffic(
+        graph,
+        walkways,
+        vehicles=wanted.vehicles,
+        walkers=wanted.walkers,
+        seed=wanted.seed,
+        # Traffic is planned for the whole drive, not only for its frames.
+        duration=_SLOWEST_RATIO * trajectory.duration + _LONGEST_WAIT
+        if follows
+        else trajectory.duration + FRAME_PERIOD,
+        ego=(lambda t: ego(0.0 * t)) if follows else ego,
+        ego_box=EGO_BOX,
+        drive=trajectory if follows else None,
+    )
+    if wanted.vehicles and not plan.kinds:
+        raise InputError(
+            f"{_source(scenario)}: the car leaves no room for vehicles"
+        )
+    if follows and plan.positions is None:
+        raise InputError(
+            f"{scenario.source}: driver: follows: the car is held up for ever; "
+            "take fewer vehicles"
+        )
+    return plan
+
+
+def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
+    """Returns footprints of objects that can stand on sidewalks [m].
+
+    Buildings are left out, because walkways lead along them.
+    """
+    passed = GROUND_CLASSES | {"building"}
+    things = read_structures(
+        world, lambda name: world.structures[name].semantic_class not in passed
+    )
+    return [thing.footprint for thing in things.values()]
+
+
+def load_ways(folder: MapFolder) -> LaneFile:
+    """Returns the lanes and walkways that traffic follows on a map.
+
+    Raises:
+        InputError: the map has neither roads nor lanes.
+    """
+    if not folder.roads.is_file():
+        return read_lanes(folder.lanes)
+    with user_errors(folder.roads):
+        content = folder.roads.read_bytes()
+    return _ways_along(folder.roads, content)
+
+
+@functools.lru_cache(maxsize=1)
+def _ways_along(roads: Path, content: bytes) -> LaneFile:
+    """Returns lanes and walkways along roads; cached for repeated use."""
+    network = load_road_network(roads)
+    graph = make_lane_graph(network)
+    return LaneFile(graph, make_walkways(network, graph))
+
+
+def _check_room(
+    wanted: TrafficConfig,
+    where: str,
+    graph: lane_graph.LaneGraph,
+    walkways: Sequence[lane_graph.Walkway],
+) -> None:
+    """Checks that roads and sidewalks have room for the traffic."""
+    room = room_for_vehicles(graph)
+    if wanted.vehicles > room:
+        raise InputError(
+            f"{where}: vehicles: {wanted.vehicles} are too many; the roads "
+            f"hold {room}"
+        )
+    room = room_for_walkers(walkways)
+    if wanted.walkers and not room:
+        raise InputError(
+            f"{where}: walkers: the map has no sidewalks; leave walkers out"
+        )
+    if wanted.walkers > room:
+        raise InputError(
+            f"{where}: walkers: {wanted.walkers} are too many; the sidewalks "
+            f"hold {room}"
+        )
+
+
+def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
+    """Returns a world whose structure table and notes include the traffic.
+
+    Raises:
+        InputError: there are more structures than ids.
+    """
+    table = world.structures
+    entries = traffic_structures(plan, table.last_instance + 1)
+    notes = world.notes + plan.notes
+    if plan.left_out:
+        notes += (
+            f"traffic: {plan.left_out} left out: they would have met others "
+            "or the car",
+        )
+    return replace(world, structures=table.joined(entries), notes=notes)

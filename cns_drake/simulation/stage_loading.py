@@ -1,0 +1,63 @@
+"""The world of a drive's stage, with its temporary changes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.progress import doing
+from cns_drake.scenarios.planning import DrivePlan
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scene.world import World, load_world
+from cns_drake.traffic.lane_file import read_lanes
+from cns_drake.transient.changing import change_world
+
+# Distance from the car's middle line to its sides, with a margin [m].
+_HALF_WIDTH = 1.3
+
+
+def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
+    """Loads the world of a drive's stage, with its temporary changes.
+
+    Args:
+        plan: the plan of the drive, near which the temporary changes (field
+            `transient`) are made.
+        with_vehicle: whether the world contains the vehicle.
+
+    Raises:
+        InputError: the scenario's files cannot be used.
+    """
+    scenario = plan.scenario
+    doing("reading the stage")
+    in_the_way = _in_the_way(scenario)
+    world = load_world(
+        scenario.world_file,
+        vehicle=vehicle_file() if with_vehicle else None,
+        without=(*scenario.without, *in_the_way),
+    )
+    if in_the_way:
+        note = f"traffic: {len(in_the_way)} things in its lanes left out"
+        world = replace(world, notes=(*world.notes, note))
+    if scenario.transient.is_off:
+        return world
+    trajectory = plan.trajectory
+    doing("making the temporary changes")
+    times = np.arange(0.0, trajectory.duration, 0.1)
+    drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
+    driven: BaseGeometry = drive.buffer(_HALF_WIDTH)
+    if plan.network is not None:
+        driven = driven.union(plan.network.areas.lane_area)
+    return change_world(world, scenario.transient, drive, driven)
+
+
+def _in_the_way(scenario: Scenario) -> Sequence[str]:
+    """Returns the names of structures that stand where traffic drives."""
+    if scenario.traffic.is_off or scenario.map is None:
+        return ()
+    folder = scenario.folder
+    if folder.roads.is_file() or not folder.lanes.is_file():
+        return ()
+    return read_lanes(folder.lanes).in_the_way
