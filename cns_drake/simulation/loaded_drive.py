@@ -4,7 +4,9 @@ from dataclasses import dataclass
 import functools
 
 from pydrake.math import RigidTransform
+from pydrake.multibody.tree import RigidBody
 
+from cns_drake.base.drives.sensor_names import BASE_FRAME
 from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import DrivePlan, count_frames
@@ -53,6 +55,11 @@ class LoadedDrive:
         """Number of frames to record."""
         assert self.scenario.frames is not None
         return self.scenario.frames
+
+    @property
+    def base_link(self) -> RigidBody:
+        """The vehicle's body B."""
+        return self.world.plant.GetBodyByName(BASE_FRAME, self.world.vehicle)
 
     @property
     def X_BSs(self) -> dict[str, RigidTransform]:

@@ -97,7 +97,7 @@ class SimulatedDrive(Drive):
         self._context = self._diagram.CreateDefaultContext()
         # The station would compute the vehicle's motion and its wheels; here
         # the motion is known beforehand.
-        self._base = world.plant.GetBodyByName("base_link", world.vehicle)
+        self._base = drive.base_link.index()
         poses = self._diagram.GetSubsystemByName("frame_poses")
         context = poses.GetMyMutableContextFromRoot(self._context)
         port = poses.GetInputPort("body_poses")
@@ -173,6 +173,6 @@ class SimulatedDrive(Drive):
     def _context_at(self, index: int) -> Context:
         """Returns the LiDAR's Context at the time of a scan."""
         self._context.SetTime(index * self.period)
-        self._X_WBodies[self._base.index()] = self.X_WBs[index]
+        self._X_WBodies[self._base] = self.X_WBs[index]
         self._fixed_poses.GetMutableData().set_value(self._X_WBodies)
         return self._lidar.GetMyContextFromRoot(self._context)

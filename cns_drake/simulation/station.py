@@ -1,29 +1,24 @@
 """The Diagram of a scenario: the only place where systems are connected."""
 
-import numpy as np
-from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, SceneGraph
+from collections.abc import Mapping
+
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import (
-    Context,
     Diagram,
     DiagramBuilder,
-    LeafSystem,
+    OutputPort,
 )
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.motion.vehicle_sweep import VehicleSweep
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
-from cns_drake.ray_casting.moving_groups import KnownPoses
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.world import World
 from cns_drake.sensors.camera.camera import add_cameras
 from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.carriers import sensor_pose
@@ -31,6 +26,7 @@ from cns_drake.sensors.imu.imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry
+from cns_drake.simulation.frame_poses import FramePoses
 from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.simulation.sensor_recording import connect_by_name
 from cns_drake.traffic.traffic_motion import (
@@ -87,17 +83,65 @@ def make_station(
     """
     if isinstance(drive, Scenario):
         drive = load_drive(drive)
-    scenario, world, traffic = drive.scenario, drive.world, drive.traffic
-    trajectory = drive.trajectory
-    plant = world.plant
-    base = plant.GetBodyByName("base_link", world.vehicle)
-
+    scenario, world = drive.scenario, drive.world
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    motion = _add_vehicle_motion(builder, drive)
+    traffic = _add_traffic(builder, drive)
+    poses = _add_frame_poses(builder, drive, motion, traffic)
+    # Measurements by name, which is also the name of the exported port.
+    measured = {"geometry_query": scene_graph.get_query_output_port()}
+    measured |= _add_lidars(builder, drive, poses, traffic, num_threads)
+    measured |= add_described_imu(
+        scenario.imu,
+        builder,
+        drive.base_link,
+        trajectory=drive.trajectory,
+        motion=motion,
+        scan_rate=scenario.fastest_rate,
+        seed=scenario.seed,
+    )
+    odometry = add_odometry(builder, drive.base_link, motion=motion)
+    measured["odometry"] = odometry.GetOutputPort("odometry")
+    further = _add_further_sensors(builder, drive, motion)
+    further |= _add_cameras(builder, drive, poses, cameras_see_vehicle)
+    measured |= {name: port for name, (port, _) in further.items()}
+    if traffic is not None:
+        measured["objects"] = traffic.GetOutputPort("objects")
+    if page is not None:
+        for body in () if traffic is None else traffic.bodies:
+            page.add_moving_object(body.name, body.frames)
+        builder.AddNamedSystem("meshcat_recorder", page)
+        connect_by_name(builder, measured, page)
+    if bag is not None:
+        recorder = _make_recorder(
+            drive,
+            bag,
+            {name: recorded for name, (_, recorded) in further.items()},
+            with_imu_samples="imu_samples" in measured,
+        )
+        builder.AddNamedSystem("mcap_recorder", recorder)
+        connect_by_name(builder, measured, recorder)
+    for name, port in measured.items():
+        builder.ExportOutput(port, name)
+    diagram = builder.Build()
+    diagram.set_name(scenario.name)
+    return diagram
+
+
+def _add_vehicle_motion(
+    builder: DiagramBuilder, drive: LoadedDrive
+) -> VehicleMotion:
+    """Adds the motion of the vehicle, and passes it to the SceneGraph."""
+    world = drive.world
+    plant = world.plant
     motion = builder.AddNamedSystem(
         "vehicle_motion",
         VehicleMotion(
-            plant, world.vehicle, trajectory, period=scenario.frame_period
+            plant,
+            world.vehicle,
+            drive.trajectory,
+            period=drive.scenario.frame_period,
         ),
     )
     to_pose = builder.AddNamedSystem(
@@ -106,40 +150,73 @@ def make_station(
     builder.Connect(motion.GetOutputPort("position"), to_pose.get_input_port())
     builder.Connect(
         to_pose.get_output_port(),
-        scene_graph.get_source_pose_port(plant.get_source_id()),
+        world.scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+    return motion
+
+
+def _add_traffic(
+    builder: DiagramBuilder, drive: LoadedDrive
+) -> TrafficMotion | None:
+    """Adds the traffic of a drive, if it has any."""
+    if drive.traffic is None:
+        return None
+    return add_traffic(
+        builder,
+        drive.world.scene_graph,
+        drive.traffic,
+        seed=drive.scenario.traffic.seed,
+        structures=drive.world.structures,
+        turn=drive.scenario.frame_period,
     )
 
-    moving = None
-    if traffic is not None:
-        moving = add_traffic(
-            builder,
-            scene_graph,
-            traffic,
-            seed=scenario.traffic.seed,
-            structures=world.structures,
-            turn=scenario.frame_period,
-        )
-    poses = builder.AddNamedSystem("frame_poses", _FramePoses(plant, moving))
+
+def _add_frame_poses(
+    builder: DiagramBuilder,
+    drive: LoadedDrive,
+    motion: VehicleMotion,
+    traffic: TrafficMotion | None,
+) -> OutputPort:
+    """Adds the system that joins all poses; returns the port with the poses."""
+    poses = builder.AddNamedSystem(
+        "frame_poses", FramePoses(drive.world.plant, traffic)
+    )
     builder.Connect(
         motion.GetOutputPort("body_poses"), poses.GetInputPort("body_poses")
     )
-    if moving is not None:
+    if traffic is not None:
         builder.Connect(
-            moving.GetOutputPort("frame_poses"),
+            traffic.GetOutputPort("frame_poses"),
             poses.GetInputPort("traffic_poses"),
         )
-    # Measurements by name, which is also the name of the exported port.
-    measured = {"geometry_query": scene_graph.get_query_output_port()}
+    return poses.get_output_port()
+
+
+def _add_lidars(
+    builder: DiagramBuilder,
+    drive: LoadedDrive,
+    poses: OutputPort,
+    traffic: TrafficMotion | None,
+    num_threads: int,
+) -> dict[str, OutputPort]:
+    """Adds the LiDARs of a drive; returns the ports with their scans.
+
+    Returns:
+        `<lidar>_scan` -> the port.
+    """
+    scenario, world = drive.scenario, drive.world
+    plant = world.plant
+    ports = {}
     for name, config in scenario.lidars.items():
         moving_bodies = None
-        if moving is not None and config.motion_distortion:
-            # These frames keep moving during a turn.
-            moving_bodies = moving.moving_frames
+        if traffic is not None and config.motion_distortion:
+            # These frames keep moving during a revolution.
+            moving_bodies = traffic.moving_frames
         lidar = add_described_lidar(
             config,
             builder,
-            scene_graph,
-            base,
+            world.scene_graph,
+            drive.base_link,
             sensor_pose(config),
             name=name,
             seed=scenario.seed,
@@ -152,167 +229,126 @@ def make_station(
             anchored_frames=world.anchored_frames(),
             num_threads=num_threads,
         )
-        builder.Connect(
-            poses.get_output_port(), lidar.GetInputPort("frame_poses")
-        )
+        builder.Connect(poses, lidar.GetInputPort("frame_poses"))
         if config.motion_distortion:
             sweep = builder.AddNamedSystem(
                 f"{name}_sweep",
-                VehicleSweep(trajectory, lidar.pattern.column_t_ns * 1e-9),
+                VehicleSweep(
+                    drive.trajectory, lidar.pattern.column_t_ns * 1e-9
+                ),
             )
             builder.Connect(
                 sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
             )
-        if moving is not None:
-            connect_traffic(builder, moving, lidar, config.motion_distortion)
-        measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
-    measured |= add_described_imu(
-        scenario.imu,
-        builder,
-        base,
-        trajectory=trajectory,
-        motion=motion,
-        scan_rate=scenario.fastest_rate,
-        seed=scenario.seed,
-    )
-    odometry = add_odometry(builder, base, motion=motion)
-    measured["odometry"] = odometry.GetOutputPort("odometry")
-    for name, sensor in scenario.further_sensors.items():
-        measured[name] = sensor.add(
-            builder,
-            scene_graph,
-            base,
-            motion=motion,
-            name=name,
-            seed=scenario.seed,
-        )
+        if traffic is not None:
+            connect_traffic(builder, traffic, lidar, config.motion_distortion)
+        ports[f"{name}_scan"] = lidar.GetOutputPort("scan")
+    return ports
 
-    further = {
-        name: RecordedSensor(
-            sensor.topic(name), sensor_pose(sensor), sensor.make_message
+
+def _add_further_sensors(
+    builder: DiagramBuilder, drive: LoadedDrive, motion: VehicleMotion
+) -> dict[str, tuple[OutputPort, RecordedSensor]]:
+    """Adds the sensors of kinds that a user has defined.
+
+    Returns:
+        Name of a sensor -> its port, and how the port is recorded.
+    """
+    scenario = drive.scenario
+    return {
+        name: (
+            sensor.add(
+                builder,
+                drive.world.scene_graph,
+                drive.base_link,
+                motion=motion,
+                name=name,
+                seed=scenario.seed,
+            ),
+            RecordedSensor(
+                sensor.topic(name), sensor_pose(sensor), sensor.make_message
+            ),
         )
         for name, sensor in scenario.further_sensors.items()
     }
-    if scenario.cameras:
-        scene = _copy_for_cameras(
-            scene_graph,
-            world,
-            any(one.depth or one.label for one in scenario.cameras.values()),
-            cameras_see_vehicle,
-        )
-        scene.connect(builder, poses.get_output_port())
-        frame = plant.GetBodyFrameIdOrThrow(base.index())
-        for name, (port, recorded) in add_cameras(
-            builder, scene, frame, scenario.cameras
-        ).items():
-            measured[name], further[name] = port, recorded
 
-    if moving is not None:
-        measured["objects"] = moving.GetOutputPort("objects")
-    if page is not None:
-        for body in () if moving is None else moving.bodies:
-            page.add_moving_object(body.name, body.frames)
 
-    recorders = {"meshcat_recorder": page}
-    if bag is not None:
-        recorders["mcap_recorder"] = McapRecorder(
-            bag,
-            X_BSs={n: sensor_pose(one) for n, one in scenario.lidars.items()},
-            X_BI=sensor_pose(scenario.imu),
-            further=further,
-            schedule=drive.recording.schedule,
-            layouts=drive.recording.layouts,
-            num_rings={
-                n: make_pattern(one).num_rings
-                for n, one in scenario.lidars.items()
-            },
-            calibrated=[
-                n
-                for n, one in scenario.lidars.items()
-                if one.returns == "calibrated"
-            ],
-            imu_variances=scenario.imu.noise(scenario.seed).variances(
-                scenario.imu.sample_rate(scenario.fastest_rate)
-            ),
-            with_objects=moving is not None,
-            with_imu_samples="imu_samples" in measured,
-            start_ns=START_NS,
-        )
-    for name, recorder in recorders.items():
-        if recorder is not None:
-            builder.AddNamedSystem(name, recorder)
-            connect_by_name(builder, measured, recorder)
-    for name, port in measured.items():
-        builder.ExportOutput(port, name)
-    diagram = builder.Build()
-    diagram.set_name(scenario.name)
-    return diagram
+def _add_cameras(
+    builder: DiagramBuilder,
+    drive: LoadedDrive,
+    poses: OutputPort,
+    see_vehicle: bool,
+) -> dict[str, tuple[OutputPort, RecordedSensor]]:
+    """Adds the cameras of a drive, and the scene that they see.
+
+    Returns:
+        Name of a stream of images -> its port, and how the port is recorded.
+    """
+    cameras = drive.scenario.cameras
+    if not cameras:
+        return {}
+    scene = _copy_for_cameras(
+        drive,
+        classes=any(one.depth or one.label for one in cameras.values()),
+        with_vehicle=see_vehicle,
+    )
+    scene.connect(builder, poses)
+    plant = drive.world.plant
+    frame = plant.GetBodyFrameIdOrThrow(drive.base_link.index())
+    return add_cameras(builder, scene, frame, cameras)
 
 
 def _copy_for_cameras(
-    scene_graph: SceneGraph, world: World, classes: bool, with_vehicle: bool
+    drive: LoadedDrive, *, classes: bool, with_vehicle: bool
 ) -> CameraScene:
     """Copies the scene for the cameras on the vehicle."""
+    world = drive.world
     plant = world.plant
-    inspector = scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
-    world_frame = inspector.world_frame_id()
+    world_frame = world.scene_graph.model_inspector().world_frame_id()
 
     def calc_X_WF(frame: FrameId) -> RigidTransform:
         if frame == world_frame:
             return RigidTransform()
         return plant.GetBodyFromFrameId(frame).EvalPoseInWorld(context)
 
-    base = plant.GetBodyByName("base_link", world.vehicle)
     bodies = () if with_vehicle else plant.GetBodyIndices(world.vehicle)
     return CameraScene(
-        scene_graph,
+        world.scene_graph,
         world.structures,
         calc_X_WF,
         anchored=world.anchored_frames() | {world_frame},
         vehicle={plant.GetBodyFrameIdIfExists(body) for body in bodies},
-        base=plant.GetBodyFrameIdOrThrow(base.index()),
+        base=plant.GetBodyFrameIdOrThrow(drive.base_link.index()),
         classes=classes,
     )
 
 
-class _FramePoses(LeafSystem):
-    """Joins the poses of a plant's bodies and of the traffic's parts.
-
-    With all poses at hand, a LiDAR need not ask the SceneGraph, which would
-    compute the poses of all geometry. That would take 5 % of a scan's time, and
-    a third with traffic.
-    """
-
-    def __init__(self, plant: MultibodyPlant, traffic: TrafficMotion | None):
-        """Declares the ports `body_poses` and `traffic_poses`."""
-        super().__init__()
-        bodies = range(plant.num_bodies())
-        frames = [plant.GetBodyFrameIdIfExists(BodyIndex(k)) for k in bodies]
-        self._rows = {f: k for k, f in enumerate(frames) if f is not None}
-        if traffic is not None:
-            limbs = traffic.moving_frames.items()
-            self._rows |= {f: len(frames) + k for f, k in limbs}
-        self._body_poses = self.DeclareAbstractInputPort(
-            "body_poses", AbstractValue.Make([RigidTransform()])
-        )
-        self._traffic_poses = self.DeclareAbstractInputPort(
-            "traffic_poses", Value(object())
-        )
-        self.DeclareAbstractOutputPort(
-            "frame_poses",
-            lambda: Value(object()),
-            self._calc_frame_poses,
-            {self.all_input_ports_ticket()},
-        )
-
-    def _calc_frame_poses(
-        self, context: Context, output: AbstractValue
-    ) -> None:
-        X_WFs = np.array(
-            [X_WB.GetAsMatrix4() for X_WB in self._body_poses.Eval(context)]
-        )
-        if self._traffic_poses.HasValue(context):
-            X_WLs = self._traffic_poses.Eval(context).X_WFs
-            X_WFs = np.concatenate([X_WFs, X_WLs])
-        output.set_value(KnownPoses(self._rows, X_WFs))
+def _make_recorder(
+    drive: LoadedDrive,
+    bag: BagWriter | BackgroundWriter,
+    further: Mapping[str, RecordedSensor],
+    *,
+    with_imu_samples: bool,
+) -> McapRecorder:
+    """Makes the recorder of a drive's measurements."""
+    scenario = drive.scenario
+    lidars = scenario.lidars
+    return McapRecorder(
+        bag,
+        X_BSs=drive.X_BSs,
+        X_BI=sensor_pose(scenario.imu),
+        further=further,
+        schedule=drive.recording.schedule,
+        layouts=drive.recording.layouts,
+        num_rings={n: make_pattern(one).num_rings for n, one in lidars.items()},
+        calibrated=[
+            n for n, one in lidars.items() if one.returns == "calibrated"
+        ],
+        imu_variances=scenario.imu.noise(scenario.seed).variances(
+            scenario.imu.sample_rate(scenario.fastest_rate)
+        ),
+        with_objects=drive.traffic is not None,
+        with_imu_samples=with_imu_samples,
+        start_ns=START_NS,
+    )
