@@ -22,7 +22,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.camera.camera import add_cameras
 from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.carriers import sensor_pose
-from cns_drake.sensors.imu.imu import add_described_imu
+from cns_drake.sensors.imu.vehicle_imu import add_described_imu
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry

@@ -104,7 +104,7 @@ class ImuErrors:
         self._walk = walk / np.sqrt(rate)
         self._turn_on = turn_on * self._draw(_TURN_ON, 0, 1)[0]
         # Threads may share the errors.
-        self._block = lru_cache(maxsize=4)(self.of_block)
+        self._block = lru_cache(maxsize=4)(self._calc_block)
 
     def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
         """Returns exact samples with the errors of the IMU added.
@@ -117,26 +117,18 @@ class ImuErrors:
         Returns:
             (N, 6) in the same order, limited to the ranges of the sensors.
         """
-        measured = exact + self._of_samples(first, len(exact))
+        measured = exact + self._errors_from(first, len(exact))
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
-    def at(self, sample: int) -> np.ndarray:
-        """Returns the errors of one sample, (6,).
-
-        The first three numbers are the errors of the specific force [m/s^2],
-        the last three those of the angular velocity [rad/s].
-        """
-        return self._of_samples(sample, 1)[0]
-
-    def _of_samples(self, first: int, count: int) -> np.ndarray:
-        """Returns the (count, 6) errors of consecutive samples."""
+    def _errors_from(self, first: int, count: int) -> np.ndarray:
+        """Returns the errors (count, 6) of consecutive samples."""
         parts = []
         for number in range(first // _BLOCK, (first + count - 1) // _BLOCK + 1):
             start = first - number * _BLOCK
             parts.append(self._block(number)[max(start, 0) : start + count])
         return np.concatenate(parts)
 
-    def of_block(self, number: int) -> np.ndarray:
+    def _calc_block(self, number: int) -> np.ndarray:
         """Returns the (1024, 6) errors from sample 1024 * number onwards.
 
         The columns are specific force [m/s^2] and angular velocity [rad/s].

@@ -22,9 +22,13 @@ WALK = ImuNoise(
 
 def stand(noise, duration=HOURS):
     """Returns the errors (N, 6) of an IMU at rest."""
-    errors = ImuErrors(noise, RATE)
     blocks = int(duration * RATE) // BLOCK
-    return np.concatenate([errors.of_block(k) for k in range(blocks)])
+    return ImuErrors(noise, RATE).measure(0, np.zeros((blocks * BLOCK, 6)))
+
+
+def error_at(errors, sample):
+    """Returns the errors (6,) of one sample."""
+    return errors.measure(sample, np.zeros((1, 6)))[0]
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +63,8 @@ def test_the_walk_starts_at_zero_and_spreads_as_the_root_of_time(blocks):
     ends = []
     for seed in range(200):
         errors = ImuErrors(replace(WALK, seed=seed), RATE)
-        assert not errors.at(0).any()
-        ends.append(errors.at(blocks * BLOCK + 300)[:3])
+        assert not error_at(errors, 0).any()
+        ends.append(error_at(errors, blocks * BLOCK + 300)[:3])
     time = (blocks * BLOCK + 300) / RATE
     # 600 independent numbers: 3 standard errors are 9 %.
     assert np.std(ends) == pytest.approx(2e-4 * np.sqrt(time), rel=0.09)
@@ -82,16 +86,16 @@ def test_a_sample_depends_on_its_number_alone(first):
     noise = replace(WHITE, accelerometer_random_walk=1e-3)
     samples = list(range(first, first + 6))
     ahead = ImuErrors(noise, RATE)
-    forwards = [ahead.at(sample) for sample in samples]
+    forwards = [error_at(ahead, sample) for sample in samples]
     behind = ImuErrors(noise, RATE)
-    backwards = [behind.at(sample) for sample in samples[::-1]]
+    backwards = [error_at(behind, sample) for sample in samples[::-1]]
     np.testing.assert_array_equal(forwards, backwards[::-1])
     assert len(np.unique(forwards)) == 6 * len(samples)
 
 
 def test_seed_and_name_make_a_difference():
     found = {
-        tuple(ImuErrors(noise, RATE).at(7))
+        tuple(error_at(ImuErrors(noise, RATE), 7))
         for noise in (
             WHITE,
             replace(WHITE, seed=9),
@@ -110,8 +114,10 @@ def test_turn_on_bias_stays_and_differs_between_runs():
             seed=seed,
         )
         errors = ImuErrors(noise, RATE)
-        np.testing.assert_array_equal(errors.at(0), errors.at(10**7))
-        drawn.append(errors.at(0))
+        np.testing.assert_array_equal(
+            error_at(errors, 0), error_at(errors, 10**7)
+        )
+        drawn.append(error_at(errors, 0))
     spread = np.reshape(drawn, (300, 2, 3)).std(axis=(0, 2))
     # 900 independent numbers: 3 standard errors are 7 %.
     np.testing.assert_allclose(spread, [0.2, 0.01], rtol=0.07)
@@ -127,7 +133,7 @@ def test_measurements_end_at_the_range():
 
 
 def test_an_ideal_imu_errs_by_nothing():
-    assert not ImuErrors(ImuNoise(), RATE).of_block(3).any()
+    assert not stand(ImuNoise(), 60.0).any()
 
 
 def test_variances_of_samples_are_those_of_messages(white):

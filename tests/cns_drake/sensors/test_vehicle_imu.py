@@ -22,8 +22,9 @@ from cns_drake.motion.suspension import (
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.sensors.imu.imu import VehicleImu, add_imu
+from cns_drake.sensors.imu.imu import add_imu
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
+from cns_drake.sensors.imu.vehicle_imu import VehicleImu
 
 X_BI = RigidTransform(RollPitchYaw(0.3, -0.2, 1.1), [-1.0, 0.4, 1.6])
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
