@@ -2,38 +2,37 @@
 
 For each kind of sensor there is a config class that `pydrake.common.yaml` reads
 and writes, and a function that adds the configured sensor to a diagram and
-publishes its output on LCM. The config classes share their field definitions
-with the sensor sections of scenarios.
+publishes its measurements on LCM. The sections of scenarios define which values
+the fields can have.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 import sys
 from typing import Any, TypeAlias
 
-from drake import lcmt_drake_signal, lcmt_point_cloud
 import numpy as np
 from pydantic import ValidationError
 from pydrake.common.schema import Transform
-from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import SceneGraph
-from pydrake.lcm import DrakeLcm, DrakeLcmInterface
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame
 from pydrake.perception import PointCloudToLcm
-from pydrake.systems import framework
-from pydrake.systems import lcm as drake_lcm
-from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
-from pydrake.systems.lcm import LcmBuses, LcmInterfaceSystem
-from pydrake.systems.primitives import ZeroOrderHold
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.lcm import LcmBuses
 
 from cns_drake.base.errors import describe_validation_error
-from cns_drake.scene.drake_releases import find_bus
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
+from cns_drake.sensors.lcm_publishing import (
+    Interface,
+    SignalToLcm,
+    check_publisher_names,
+    find_interface,
+    publish_measurements,
+)
 from cns_drake.sensors.lidar.adding import add_described_lidar
 from cns_drake.sensors.lidar.config import LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
@@ -41,14 +40,11 @@ from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.odometry import odometry
 from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.sensors.sensor_config import HIGHEST_RATE, Section
-from cns_drake.sensors.system_names import check_unused_names
 
-# An interface on which messages are published.
-Interface: TypeAlias = DrakeLcmInterface | LcmInterfaceSystem
-# Fields of a section that a struct leaves out: `X_PB` replaces the mount, and a
-# layout concerns recordings only.
+# Fields of a section that no config has: `X_PB` replaces the mount, and only
+# recordings have a layout.
 _LEFT_OUT = ("xyz", "rpy_deg", "layout")
-# Messages a second of an IMU or odometry that names no rate.
+# Messages per second of an IMU or odometry that names no rate.
 _RATE = 20
 
 
@@ -229,11 +225,12 @@ def ApplyLidarConfig(
 
         ApplyLidarConfig(LidarConfig(name="roof", rate=10), builder)
     """
-    section = _checked_fields(config, LidarSection, ("rate",))
+    section = _checked_section(config, LidarSection, ("rate",))
     period = LIDAR_PRESETS[section.preset].pattern.period
     if config.rate is not None:
         period = 1.0 / config.rate
     _check_timing(config, period)
+    check_publisher_names(builder, config.name)
     scene_graph = scene_graph or builder.GetSubsystemByName("scene_graph")
     lidar = add_described_lidar(
         section,
@@ -246,17 +243,16 @@ def ApplyLidarConfig(
         motion_distortion=section.motion_distortion,
         causal=config.causal,
     )
-    _publish(
+    publish_measurements(
         builder,
-        config,
-        "POINT_CLOUD",
+        config.name,
+        f"DRAKE_POINT_CLOUD_{config.name}",
         [lidar.GetOutputPort("point_cloud_W")],
         PointCloudToLcm("world"),
-        period,
-        lcm_buses,
-        lcm,
-        config.capture_offset,
-        config.output_delay,
+        _find_interface(config, builder, lcm_buses, lcm),
+        period=period,
+        offset=config.capture_offset,
+        delay=config.output_delay,
     )
     return lidar
 
@@ -293,8 +289,9 @@ def ApplyImuConfig(
 
         ApplyImuConfig(ImuConfig(rate=200), builder)
     """
-    section = _checked_fields(config, ImuSection, ("rate",))
+    section = _checked_section(config, ImuSection, ("rate",))
     rate = config.rate or section.sample_rate(_RATE)
+    check_publisher_names(builder, config.name)
     imu = add_imu(
         builder,
         *_carrier_frame(config, builder, plant),
@@ -302,12 +299,17 @@ def ApplyImuConfig(
         noise=None if section.is_ideal else section.noise(config.seed),
         name=config.name,
     )
-    ports = imu.ports()
-    axes = [f"{name}_{axis}" for name in ports for axis in "xyz"]
-    measured = list(ports.values())
-    to_lcm = _SignalToLcm(measured, axes, lambda *values: np.hstack(values))
-    _publish(
-        builder, config, "IMU", measured, to_lcm, 1.0 / rate, lcm_buses, lcm
+    measured = imu.ports()
+    ports = list(measured.values())
+    axes = [f"{name}_{axis}" for name in measured for axis in "xyz"]
+    publish_measurements(
+        builder,
+        config.name,
+        f"DRAKE_IMU_{config.name}",
+        ports,
+        SignalToLcm(ports, axes, lambda *values: np.hstack(values)),
+        _find_interface(config, builder, lcm_buses, lcm),
+        period=1.0 / rate,
     )
     return imu
 
@@ -345,25 +347,34 @@ def ApplyOdometryConfig(
 
         ApplyOdometryConfig(OdometryConfig(rate=100), builder)
     """
-    section = _checked_fields(config, OdometrySection)
-    rate = _checked_rate(config, section.rate)
+    section = _checked_section(config, OdometrySection)
+    check_publisher_names(builder, config.name)
     frame, X_PB = _carrier_frame(config, builder, plant)
     sensor = odometry.add_odometry(builder, frame, X_PB=X_PB, name=config.name)
     axes = ["qw", "qx", "qy", "qz", "x", "y", "z"]
     axes += ["wx", "wy", "wz", "vx", "vy", "vz"]
-    measured = [sensor.GetOutputPort("odometry")]
-    to_lcm = _SignalToLcm(measured, axes, _odometry_values)
-    period = 1.0 / rate
-    _publish(
-        builder, config, "ODOMETRY", measured, to_lcm, period, lcm_buses, lcm
+    ports = [sensor.GetOutputPort("odometry")]
+    publish_measurements(
+        builder,
+        config.name,
+        f"DRAKE_ODOMETRY_{config.name}",
+        ports,
+        SignalToLcm(ports, axes, _odometry_numbers),
+        _find_interface(config, builder, lcm_buses, lcm),
+        period=1.0 / (section.rate or _RATE),
     )
     return sensor
 
 
-def _checked_fields(
+def _checked_section(
     config: Config, kind: type[Section], left_out: tuple[str, ...] = ()
 ) -> Any:
-    """Returns the checked fields of a struct, without those left out.
+    """Returns the section of a scenario with the fields of a config.
+
+    Args:
+        config: the config.
+        kind: class of the section.
+        left_out: fields of the section that keep their defaults.
 
     Raises:
         ValueError: a field is out of range.
@@ -402,19 +413,30 @@ def _check_timing(config: LidarConfig, period: float) -> None:
             )
 
 
+def _find_interface(
+    config: Config,
+    builder: DiagramBuilder,
+    lcm_buses: LcmBuses | None,
+    lcm: Interface | None,
+) -> Interface:
+    """Returns the interface on which a configured sensor publishes.
+
+    Raises:
+        RuntimeError: there is no such bus.
+    """
+    return find_interface(
+        builder, config.lcm_bus, lcm_buses, lcm, _caller(config)
+    )
+
+
 def _carrier_frame(
     config: Config, builder: DiagramBuilder, plant: MultibodyPlant | None
 ) -> tuple[Frame, RigidTransform]:
-    """Returns the frame P that carries a sensor, and X_PB.
+    """Returns the frame P that carries a sensor, and the pose X_PB.
 
     Raises:
-        ValueError: X_PB is not finite, or the systems that publish would have
-            the names of others.
+        ValueError: X_PB is not finite.
     """
-    systems = ("to_lcm", "publisher", "delay")
-    check_unused_names(
-        builder, *(f"{config.name}_{system}" for system in systems)
-    )
     plant = plant or builder.GetSubsystemByName("plant")
     frame = plant.world_frame()
     if config.X_PB.base_frame is not None:
@@ -425,25 +447,13 @@ def _carrier_frame(
     return frame, X_PB
 
 
-def _checked_rate(config: Config, rate: int | None) -> int:
-    """Returns a description's messages per second; 20 if it gives no rate.
-
-    Raises:
-        ValueError: the rate is not positive, or too high.
-    """
-    rate = _RATE if rate is None else rate
-    if not 1 <= rate <= HIGHEST_RATE:
-        raise ValueError(
-            f"{_caller(config)}: rate: {rate} is not from 1 to {HIGHEST_RATE}"
-        )
-    return rate
-
-
 def _caller(config: Config) -> str:
+    """Returns the text with which errors of a configured sensor begin."""
     return f"{type(config).__name__} {config.name}"
 
 
-def _odometry_values(value: odometry.Odometry) -> np.ndarray:
+def _odometry_numbers(value: odometry.Odometry) -> np.ndarray:
+    """Returns the numbers (13,) of a message, see `ApplyOdometryConfig`."""
     X_WB, V_WB_B = value.X_WB, value.V_WB_B
     return np.hstack(
         [
@@ -453,106 +463,3 @@ def _odometry_values(value: odometry.Odometry) -> np.ndarray:
             V_WB_B.translational(),
         ]
     )
-
-
-def _publish(
-    builder: DiagramBuilder,
-    config: Config,
-    kind: str,
-    ports: list[OutputPort],
-    to_lcm: framework.System,
-    period: float,
-    lcm_buses: LcmBuses | None,
-    lcm: Interface | None,
-    offset: float = 0.0,
-    delay: float = 0.0,
-) -> None:
-    """Adds systems that convert ports to an LCM message and publish it.
-
-    Nothing is added for a bus that is null, such as in `lcm_buses: {default:
-    null}`, as for Drake's cameras.
-
-    Args:
-        builder: builder of a diagram with the sensor.
-        config: description of the sensor.
-        kind: the channel is `DRAKE_<kind>_<name>`.
-        ports: output ports of the sensor.
-        to_lcm: system that converts the ports' values to a message.
-        period: time between two messages [s].
-        lcm_buses: see `ApplyLidarConfig`.
-        lcm: see `ApplyLidarConfig`.
-        offset: time of the first conversion [s].
-        delay: time from a conversion to the publication [s].
-
-    Raises:
-        RuntimeError: there is no such bus.
-    """
-    caller = _caller(config)
-    if lcm is None and lcm_buses is not None:
-        lcm = find_bus(builder, lcm_buses, caller, config.lcm_bus)
-    if lcm is None:
-        if config.lcm_bus != "default":
-            raise RuntimeError(
-                f"{caller}: lcm_bus: there is no bus '{config.lcm_bus}' "
-                "without lcm_buses"
-            )
-        lcm = builder.AddSystem(LcmInterfaceSystem(lcm=DrakeLcm()))
-    if lcm.get_lcm_url() == LcmBuses.kLcmUrlMemqNull:
-        return
-    is_cloud = isinstance(to_lcm, PointCloudToLcm)
-    publisher = drake_lcm.LcmPublisherSystem.Make(
-        f"DRAKE_{kind}_{config.name}",
-        lcmt_point_cloud if is_cloud else lcmt_drake_signal,
-        lcm,
-        publish_period=period,
-        publish_offset=offset + delay,
-        use_cpp_serializer=is_cloud,
-    )
-    builder.AddNamedSystem(f"{config.name}_to_lcm", to_lcm)
-    for index, port in enumerate(ports):
-        builder.Connect(port, to_lcm.get_input_port(index))
-    builder.AddNamedSystem(f"{config.name}_publisher", publisher)
-    message = to_lcm.get_output_port()
-    if delay:
-        hold = builder.AddNamedSystem(
-            f"{config.name}_delay",
-            ZeroOrderHold(period, message.Allocate(), offset),
-        )
-        builder.Connect(message, hold.get_input_port())
-        message = hold.get_output_port()
-    builder.Connect(message, publisher.get_input_port())
-
-
-class _SignalToLcm(framework.LeafSystem):
-    """Converts the values of ports to an `lcmt_drake_signal`."""
-
-    def __init__(
-        self,
-        ports: list[OutputPort],
-        names: list[str],
-        values: Callable[..., np.ndarray],
-    ):
-        """Declares an input for each port."""
-        super().__init__()
-        self._names = names
-        self._values = values
-        for index, port in enumerate(ports):
-            if port.get_data_type() == framework.PortDataType.kVectorValued:
-                self.DeclareVectorInputPort(f"u{index}", port.size())
-            else:
-                self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
-        self.DeclareAbstractOutputPort(
-            "lcmt_drake_signal", lambda: Value(lcmt_drake_signal()), self._calc
-        )
-
-    def _calc(self, context: Context, output: AbstractValue) -> None:
-        inputs = [
-            self.get_input_port(index).Eval(context)
-            for index in range(self.num_input_ports())
-        ]
-        message = lcmt_drake_signal()
-        message.val = self._values(*inputs).tolist()
-        message.dim = len(message.val)
-        message.coord = self._names
-        message.timestamp = round(context.get_time() * 1e6)
-        output.set_value(message)
