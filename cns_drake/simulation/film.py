@@ -23,8 +23,8 @@ from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.sensors.camera.camera_scene import check_renderer
 from cns_drake.sensors.camera.config import CameraSection
+from cns_drake.sensors.camera.renderer import check_renderer
 from cns_drake.simulation.film_stage import FilmStage
 from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.traffic.vehicles import room_for_vehicles

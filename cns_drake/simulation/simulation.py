@@ -29,7 +29,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files, describe_scenario
 from cns_drake.scene.file_watch import FileWatch
 from cns_drake.sensors.camera.camera import optical_pose
-from cns_drake.sensors.camera.camera_scene import check_renderer
+from cns_drake.sensors.camera.renderer import check_renderer
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.imu.config import KALIBR_FILE
 from cns_drake.sensors.lidar.config import describe_unit

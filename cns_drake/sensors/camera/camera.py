@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import (
     ClippingRange,
     ColorRenderCamera,
@@ -17,9 +16,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.framework import (
-    Context,
     DiagramBuilder,
-    LeafSystem,
     OutputPort,
 )
 from pydrake.systems.sensors import (
@@ -33,9 +30,10 @@ from pydrake.systems.sensors import (
 from cns_drake.recording import messages
 from cns_drake.recording.mcap_recorder import RecordedSensor
 from cns_drake.recording.recorded_topics import camera_topic
-from cns_drake.sensors.camera.camera_scene import RENDERER, CameraScene
+from cns_drake.sensors.camera.camera_scene import CameraScene
 from cns_drake.sensors.camera.config import CameraSection
-from cns_drake.sensors.camera.looks import HORIZON_RGB, sky
+from cns_drake.sensors.camera.renderer import RENDERER
+from cns_drake.sensors.camera.sky import SkyPainter
 
 # Near clipping distance [m].
 _NEAR = 0.05
@@ -85,7 +83,7 @@ def add_cameras(
     found = {}
     # Drake warns that 16-bit depth images end at 65 m; no such images are
     # recorded.
-    logging.getLogger("drake").addFilter(_is_told)
+    logging.getLogger("drake").addFilter(_is_worth_telling)
     for name, config in cameras.items():
         info = CameraInfo(
             config.width, config.height, math.radians(config.fov_y_deg)
@@ -109,7 +107,7 @@ def add_cameras(
                 scene_graph.get_query_output_port(),
                 eyes[kind].query_object_input_port(),
             )
-        sky = builder.AddNamedSystem(f"{name}-sky", _Sky(info))
+        sky = builder.AddNamedSystem(f"{name}-sky", SkyPainter(info))
         for port in (
             eyes["colours"].color_image_output_port(),
             eyes["colours"].body_pose_in_world_output_port(),
@@ -131,47 +129,8 @@ def add_cameras(
     return found
 
 
-class _Sky(LeafSystem):
-    """Draws the sky in those pixels of an image that show no geometry.
-
-    .. pydrake_system::
-
-        name: _Sky
-        input_ports:
-        - color_image
-        - body_pose_in_world
-        output_ports:
-        - color_image
-    """
-
-    def __init__(self, info: CameraInfo):
-        """Draws into the images of a pinhole camera."""
-        super().__init__()
-        rows = np.indices((info.height(), info.width()))
-        pixels = np.stack([rows[1], rows[0], np.ones_like(rows[0])], axis=2)
-        d_C = pixels @ np.linalg.inv(info.intrinsic_matrix()).T
-        self._d_C = d_C / np.linalg.norm(d_C, axis=2, keepdims=True)
-        self._image = self.DeclareAbstractInputPort(
-            "color_image", Value(ImageRgba8U())
-        )
-        self._pose = self.DeclareAbstractInputPort(
-            "body_pose_in_world", Value(RigidTransform())
-        )
-        self.DeclareAbstractOutputPort(
-            "color_image", lambda: Value(ImageRgba8U()), self._calc
-        )
-
-    def _calc(self, context: Context, output: AbstractValue) -> None:
-        image = self._image.Eval(context)
-        R_WC = self._pose.Eval(context).rotation().matrix()
-        drawn = ImageRgba8U(image.width(), image.height())
-        drawn.mutable_data[:] = image.data
-        clear = (image.data[:, :, :3] == np.round(255 * HORIZON_RGB)).all(2)
-        drawn.mutable_data[clear, :3] = sky(self._d_C[clear] @ R_WC.T)
-        output.set_value(drawn)
-
-
-def _is_told(record: logging.LogRecord) -> bool:
+def _is_worth_telling(record: logging.LogRecord) -> bool:
+    """Returns whether a message of Drake is no warning of 16-bit depths."""
     return "depth_image_16u" not in record.getMessage()
 
 

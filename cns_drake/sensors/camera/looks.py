@@ -2,7 +2,6 @@
 
 A texture is a brightness by which the colour of a surface is multiplied. The
 mean of a texture is 1, so that the mean colour of the surface stays the same.
-Textures are repeated over a surface. On a wall, their rows are horizontal.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,10 +15,6 @@ import numpy as np
 _SIDE = 512
 # Gamma: an sRGB value is about this root of the light (IEC 61966-2-1).
 GAMMA = 2.2
-# Direction towards the sun.
-SUN_W = np.array([-0.5, 0.55, 0.75]) / np.linalg.norm([-0.5, 0.55, 0.75])
-# Colour of the sky at the horizon.
-HORIZON_RGB = np.array([204.0, 221.0, 237.0]) / 255.0
 
 
 @dataclass(frozen=True)
@@ -44,8 +39,8 @@ class Look:
     is_face: bool = False
 
 
-def _noise(rng: np.random.Generator, slope: float) -> np.ndarray:
-    """Returns (N, N, 1) noise that repeats, of mean 0 and deviation 1.
+def tiling_noise(rng: np.random.Generator, slope: float) -> np.ndarray:
+    """Returns noise (N, N, 1) that repeats, of mean 0 and deviation 1.
 
     The amplitude of a wave is proportional to its wave number to the power of
     -`slope`.
@@ -58,12 +53,14 @@ def _noise(rng: np.random.Generator, slope: float) -> np.ndarray:
 
 
 def _asphalt(rng: np.random.Generator) -> np.ndarray:
-    cracks = np.abs(_noise(rng, 1.8)) < 0.012
-    worn = 0.10 * _noise(rng, 1.4) + 0.16 * _noise(rng, 0.2)
-    return (1.0 + worn) * np.where(cracks & (_noise(rng, 1.5) > 0.6), 0.6, 1.0)
+    cracks = np.abs(tiling_noise(rng, 1.8)) < 0.012
+    worn = 0.10 * tiling_noise(rng, 1.4) + 0.16 * tiling_noise(rng, 0.2)
+    return (1.0 + worn) * np.where(
+        cracks & (tiling_noise(rng, 1.5) > 0.6), 0.6, 1.0
+    )
 
 
-def _cells(
+def _stones(
     rng: np.random.Generator,
     across: int,
     rows: int,
@@ -85,12 +82,12 @@ def _cells(
     shade = stones[row, place.astype(int) % across]
     edge = np.minimum((place % 1) / across, (y * rows % 1) / rows) < joint[0]
     shade = np.where(edge, joint[1], shade)[:, :, None]
-    return shade * (1.0 + 0.07 * _noise(rng, 0.5))
+    return shade * (1.0 + 0.07 * tiling_noise(rng, 0.5))
 
 
 def _grass(rng: np.random.Generator) -> np.ndarray:
-    blades = 1.0 + 0.28 * _noise(rng, 0.4) + 0.10 * _noise(rng, 1.5)
-    dry = 0.12 * _noise(rng, 1.2)
+    blades = 1.0 + 0.28 * tiling_noise(rng, 0.4) + 0.10 * tiling_noise(rng, 1.5)
+    dry = 0.12 * tiling_noise(rng, 1.2)
     return (
         np.maximum(blades, 0.2)
         * (1.0 + dry * (1.0, 0.2, 0.3))
@@ -99,21 +96,26 @@ def _grass(rng: np.random.Generator) -> np.ndarray:
 
 
 def _plaster(rng: np.random.Generator) -> np.ndarray:
-    streaks = _noise(rng, 1.2).mean(axis=0, keepdims=True)
+    streaks = tiling_noise(rng, 1.2).mean(axis=0, keepdims=True)
     return (
-        1.0 + 0.05 * _noise(rng, 1.5) + 0.04 * _noise(rng, 0.3) + 0.1 * streaks
+        1.0
+        + 0.05 * tiling_noise(rng, 1.5)
+        + 0.04 * tiling_noise(rng, 0.3)
+        + 0.1 * streaks
     )
 
 
 def _bark(rng: np.random.Generator) -> np.ndarray:
-    stretched = _noise(rng, 0.8)[np.arange(_SIDE) // 8]
+    stretched = tiling_noise(rng, 0.8)[np.arange(_SIDE) // 8]
     return np.maximum(1.0 + 0.3 * stretched, 0.3)
 
 
 def _panes(rng: np.random.Generator) -> np.ndarray:
     """Returns the image that panes mirror: sky, clouds, opposite houses."""
-    sky = np.clip(0.4 + 1.2 * _noise(rng, 1.8), 0.0, 4.0)
-    return (0.5 + sky * (0.85, 0.95, 1.05)) * (1.0 + 0.1 * _noise(rng, 0.8))
+    sky = np.clip(0.4 + 1.2 * tiling_noise(rng, 1.8), 0.0, 4.0)
+    return (0.5 + sky * (0.85, 0.95, 1.05)) * (
+        1.0 + 0.1 * tiling_noise(rng, 0.8)
+    )
 
 
 def _leaves(rng: np.random.Generator) -> np.ndarray:
@@ -136,7 +138,7 @@ def _leaves(rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([light * (1.05, 1.2, 0.6), light > 0.0], axis=2)
 
 
-def _face(
+def _sign_painter(
     ground: str,
     shape: Sequence[tuple[float, float]] = (),
     colour: str = "white",
@@ -158,7 +160,7 @@ def _face(
     return paint
 
 
-def _ring(radius: float) -> list[tuple[float, float]]:
+def _octagon(radius: float) -> list[tuple[float, float]]:
     turn = np.pi / 8.0 + np.arange(8) * np.pi / 4.0
     x, y = 0.5 + radius * np.cos(turn), 0.5 + radius * np.sin(turn)
     return list(zip(x.tolist(), y.tolist(), strict=True))
@@ -180,16 +182,18 @@ def _signals(_rng: np.random.Generator) -> np.ndarray:
 
 # Name of a look, as in `cns_drake/scene/materials.yaml` -> the look.
 LOOKS = {
-    "stop": Look(1.0, _face("white", _ring(0.5), "#b01818", "STOP"), 0.6, True),
+    "stop": Look(
+        1.0, _sign_painter("white", _octagon(0.5), "#b01818", "STOP"), 0.6, True
+    ),
     "yield": Look(
         1.0,
-        _face("#b01818", [(0.2, 0.12), (0.8, 0.12), (0.5, 0.72)]),
+        _sign_painter("#b01818", [(0.2, 0.12), (0.8, 0.12), (0.5, 0.72)]),
         0.6,
         True,
     ),
     "way": Look(
         1.0,
-        _face(
+        _sign_painter(
             "#164a9c",
             [
                 (0.42, 0.82),
@@ -204,14 +208,15 @@ LOOKS = {
         0.6,
         True,
     ),
-    "name": Look(1.0, _face("#164a9c", text="MAIN STREET"), 0.6, True),
+    "name": Look(1.0, _sign_painter("#164a9c", text="MAIN STREET"), 0.6, True),
     "signals": Look(1.0, _signals, 0.6, True),
     "asphalt": Look(6.0, _asphalt),
     "paving": Look(
-        4.8, lambda rng: _cells(rng, 8, 8, (0.004, 0.6), lag=0.5, spread=0.06)
+        4.8, lambda rng: _stones(rng, 8, 8, (0.004, 0.6), lag=0.5, spread=0.06)
     ),
     "brick": Look(
-        2.25, lambda rng: _cells(rng, 9, 30, (0.0055, 1.5), lag=0.5, spread=0.2)
+        2.25,
+        lambda rng: _stones(rng, 9, 30, (0.0055, 1.5), lag=0.5, spread=0.2),
     ),
     "grass": Look(5.0, _grass),
     "plaster": Look(9.0, _plaster),
@@ -253,73 +258,3 @@ def texture(name: str) -> tuple[bytes, float]:
         stream, "PNG"
     )
     return stream.getvalue(), white
-
-
-@functools.cache
-def _clouds() -> np.ndarray:
-    """Returns the (N, N) cloud cover of a sky, 0 to 1; it repeats."""
-    noise = _noise(np.random.default_rng(0), 1.6)[:, :, 0]
-    return np.clip(0.9 * noise - 0.1, 0.0, 1.0)
-
-
-def sky(d_W: np.ndarray) -> np.ndarray:
-    """Returns the colour of the sky, (N, 3) uint8, for directions (N, 3).
-
-    The directions are unit vectors in the world, z up.
-    """
-    height = np.maximum(d_W[:, 2:], 0.0)
-    blue = HORIZON_RGB + height**0.45 * ((0.23, 0.43, 0.78) - HORIZON_RGB)
-    # Clouds lie in a plane; their pattern repeats after three times its height.
-    column, row = (d_W[:, :2] / (height + 0.08)).T * _SIDE / 3.0
-    clouds = _clouds()[row.astype(int) % _SIDE, column.astype(int) % _SIDE]
-    clouds = clouds[:, None] * np.clip(4.0 * height, 0.0, 0.9)
-    sun = np.maximum(d_W @ SUN_W, 0.0)[:, None]
-    glow = 0.25 * sun**16 + 0.8 * sun**800
-    colour = blue + clouds * (0.97 - blue) + glow
-    return np.round(255.0 * np.minimum(colour, 1.0)).astype(np.uint8)
-
-
-def texture_places(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Returns the texture coordinates of the corners of N triangles.
-
-    On walls, the rows of a texture are horizontal.
-
-    Args:
-        corners: (N, 3, 3) corners of the triangles [m].
-        normals: (N, 3) unit normals of the triangles.
-
-    Returns:
-        (N, 3, 2) texture coordinates [m].
-    """
-    across = np.round(np.stack([-normals[:, 1], normals[:, 0]], axis=1), 3)
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    is_flat = length[:, 0] < 0.5
-    across = np.where(is_flat[:, None], (1.0, 0.0), across / (length + 1e-9))
-    along = np.einsum("nca,na->nc", corners[:, :, :2], across)
-    height = np.where(is_flat[:, None], corners[:, :, 1], corners[:, :, 2])
-    return np.stack([along, -height], axis=2)
-
-
-def face_places(
-    corners: np.ndarray, normals: np.ndarray, owners: np.ndarray
-) -> np.ndarray:
-    """Returns texture coordinates with which one texture covers each geometry.
-
-    Args:
-        corners: (N, 3, 3) corners of the triangles of all geometries [m].
-        normals: (N, 3) unit normals of the triangles.
-        owners: (N,) index of each triangle's geometry.
-
-    Returns:
-        (N, 3, 2) texture coordinates of the corners, which run from 0 to 1 over
-        each geometry.
-    """
-    low = np.full((owners.max() + 1, 3), np.inf)
-    high = -low
-    np.minimum.at(low, owners, corners.min(axis=1))
-    np.maximum.at(high, owners, corners.max(axis=1))
-    middle = (low + high) / 2.0
-    places = texture_places(corners - middle[owners][:, None], normals)
-    half = np.full((len(middle), 2), 1e-3)
-    np.maximum.at(half, owners, np.abs(places).max(axis=1))
-    return 0.5 + 0.5 * places / half[owners][:, None]

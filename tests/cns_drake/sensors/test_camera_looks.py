@@ -10,7 +10,11 @@ from pydrake.systems.sensors import CameraInfo, ImageRgba8U
 import pytest
 
 from cns_drake.scene.materials import MATERIALS
-from cns_drake.sensors.camera import camera_scene, looks
+from cns_drake.sensors.camera import gltf_mesh, looks, sky
+from cns_drake.sensors.camera.texture_coordinates import (
+    face_coordinates,
+    repeated_coordinates,
+)
 
 
 @pytest.mark.parametrize("name", looks.LOOKS)
@@ -51,7 +55,7 @@ def test_grey_is_twice_as_bright_as_half_of_it():
         engine = geometry.MakeRenderEngineVtk(
             geometry.RenderEngineVtkParams(lights=[lamp])
         )
-        mesh = camera_scene._as_mesh(
+        mesh = gltf_mesh.make_mesh(
             corners,
             np.zeros(3),
             np.full((2, 3), grey),
@@ -87,7 +91,7 @@ def test_walls_have_heights_in_rows_and_metres_across(heading):
     across = np.array([-ahead[1], ahead[0], 0.0])
     corners = np.array([[100 * ahead + s * across + (0, 0, h)
                          for s, h in ((0, 0), (2, 0), (2, 3))]])  # fmt: skip
-    places = looks.texture_places(corners, ahead[None])[0]
+    places = repeated_coordinates(corners, ahead[None])[0]
     step = places - places[0]
     # Seen from outside, left of a wall that looks ahead is its right hand.
     np.testing.assert_allclose(step, [(0, 0), (2, 0), (2, -3)], atol=5e-3)
@@ -95,7 +99,7 @@ def test_walls_have_heights_in_rows_and_metres_across(heading):
 
 def test_ground_has_places_of_a_map():
     corners = np.array([[(5.0, 7, 1), (6.0, 7, 1), (5.0, 9, 1)]])
-    places = looks.texture_places(corners, np.array([[0.0, 0, 1]]))[0]
+    places = repeated_coordinates(corners, np.array([[0.0, 0, 1]]))[0]
     np.testing.assert_allclose(places, [(5, -7), (6, -7), (5, -9)])
 
 
@@ -104,7 +108,7 @@ def test_faces_cover_each_owner_once():
     square = np.array([(0, -1, -1), (0, 1, -1), (0, 1, 1)], float)
     corners = np.stack([square * 0.3 + (9, 8, 2), square * 2.0])
     normals = np.tile([1.0, 0, 0], (2, 1))
-    places = looks.face_places(corners, normals, np.array([0, 1]))
+    places = face_coordinates(corners, normals, np.array([0, 1]))
     for one in places:
         np.testing.assert_allclose(one, [(0, 1), (1, 1), (1, 0)], atol=1e-9)
 
@@ -112,7 +116,7 @@ def test_faces_cover_each_owner_once():
 def test_the_sky_is_brighter_below_and_brightest_at_the_sun():
     tilt = np.deg2rad([1.0, 30.0, 85.0])
     d_W = np.stack([np.cos(tilt), 0 * tilt, np.sin(tilt)], axis=1)
-    colours = looks.sky(np.vstack([d_W, looks.SUN_W])).astype(int)
+    colours = sky.sky_rgb(np.vstack([d_W, sky.SUN_W])).astype(int)
     assert colours[0, 0] > colours[2, 0]
     assert (colours[3] == 255).all()
     assert (colours[:, 2] >= colours[:, 0]).all()

@@ -321,7 +321,7 @@ def test_imus_with_different_names_have_different_errors():
         port = imu.ports()["angular_velocity"]
         found = port.Eval(port.get_system().GetMyContextFromRoot(context))
         named = dataclasses.replace(noise, sensor_name=name)
-        expected = ImuErrors(named, 9).at(0)[3:]
+        expected = ImuErrors(named, 9).measure(0, np.zeros((1, 6)))[0, 3:]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 

@@ -23,7 +23,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.command_line.simulating import _camera_fields
 from cns_drake.recording import topic_chunks
 from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.sensors.camera import camera_scene
+from cns_drake.sensors.camera import renderer
 from cns_drake.simulation.simulation import simulate
 
 LIDARS = {
@@ -259,12 +259,12 @@ def test_there_may_be_no_renderer(tmp_path, monkeypatch):
     """Without EGL's libraries, drawing ends the process that does it."""
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent")
     monkeypatch.delenv("DISPLAY", raising=False)
-    camera_scene.check_renderer.cache_clear()
+    renderer.check_renderer.cache_clear()
     scenario = tiny_scenario(tmp_path, cameras={"c": {}}, frames=2)
     with pytest.raises(InputError, match=r"^cameras: no renderer: .*libegl1"):
         simulate(scenario, tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    camera_scene.check_renderer.cache_clear()
+    renderer.check_renderer.cache_clear()
 
 
 def test_camera_of_the_command_line():
