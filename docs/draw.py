@@ -529,11 +529,10 @@ def _allan(axes: Axes) -> None:
         seed=3,
     )
     rate = 100
-    number = 1054
-    errors = ImuErrors(noises, rate)
+    num_samples = 1054 * 1024
+    errors = ImuErrors(noises, rate).measure(0, np.zeros((num_samples, 6)))
     # The integral of what an IMU at rest measures.
-    blocks = np.concatenate([errors.of_block(k) for k in range(number)])
-    angle = np.cumsum(blocks, axis=0)
+    angle = np.cumsum(errors, axis=0)
     sizes = np.unique(np.geomspace(1, len(angle) / 9, 50).astype(int))
     taus = sizes / rate
     spreads = np.array(
