@@ -32,7 +32,6 @@ from cns_drake.sensors.lidar.adding import add_lidar as add_lidar
 from cns_drake.sensors.lidar.adding import add_lidar_view as add_lidar_view
 from cns_drake.sensors.lidar.beams import BeamPattern as BeamPattern
 from cns_drake.sensors.lidar.lidar import Lidar as Lidar
-from cns_drake.sensors.lidar.lidar import RayHits as RayHits
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
 )
@@ -49,6 +48,7 @@ from cns_drake.sensors.lidar.presets import LIDAR_PRESETS as LIDAR_PRESETS
 from cns_drake.sensors.lidar.presets import (
     make_beam_pattern as make_beam_pattern,
 )
+from cns_drake.sensors.lidar.ray_queries import RayHits as RayHits
 from cns_drake.sensors.odometry.odometry import Odometry as Odometry
 from cns_drake.sensors.odometry.odometry import OdometrySensor as OdometrySensor
 from cns_drake.sensors.odometry.odometry import add_odometry as add_odometry

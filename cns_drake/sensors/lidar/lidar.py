@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 import operator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -25,15 +25,15 @@ from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
-from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel, Returns
-from cns_drake.sensors.lidar.scan_assembly import (
-    POINT_DTYPE,
-    Revolution,
-    assemble_points,
-    shared_revolution,
+from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
+from cns_drake.sensors.lidar.ray_queries import (
+    RayHits,
+    cast_exact_rays,
+    geometry_ids,
 )
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.sensors.lidar.scanner import Scanner
 from cns_drake.sensors.lidar.seen_geometry import (
     GeometryView,
     SeenGeometry,
@@ -46,28 +46,6 @@ if TYPE_CHECKING:
 
 _WITHOUT_GREY = Fields(BaseField.kXYZs)
 _WITH_GREY = Fields(BaseField.kXYZs | BaseField.kRGBs)
-
-
-class RayHits(NamedTuple):
-    """The surfaces that N rays hit first.
-
-    Attributes:
-        ranges: (N,) float32 distances [m], inf for a miss.
-        geometry_ids: N `GeometryId`, None for a miss.
-        normals_W: (N, 3) float32 unit normals in the world that face the
-            origins of the rays, zero for a miss.
-
-    Example:
-        from cns_drake import Lidar, RayHits
-
-        def nearest(lidar: Lidar, context, p_WR, d_W) -> float:
-            hits: RayHits = lidar.CastRays(context, p_WR, d_W)
-            return hits.ranges.min()
-    """
-
-    ranges: np.ndarray
-    geometry_ids: list[GeometryId | None]
-    normals_W: np.ndarray
 
 
 class Lidar(LeafSystem):
@@ -199,12 +177,8 @@ class Lidar(LeafSystem):
                 is no thread.
         """
         super().__init__()
-        if not isinstance(role, Role) or role == Role.kUnassigned:
-            raise TypeError(
-                f"role: {role!r} is not a role of geometry; give "
-                "Role.kPerception, Role.kIllustration or Role.kProximity of "
-                "pydrake.geometry"
-            )
+        _check_role(role)
+        _check_unseen(unseen or ())
         if operator.index(num_threads) < 1:
             raise ValueError(f"num_threads: {num_threads} is less than 1")
         pattern.check()
@@ -212,27 +186,24 @@ class Lidar(LeafSystem):
         self.X_PB = RigidTransform(X_PB)
         self.pattern = pattern
         self.causal = bool(causal)
-        self._measurement = measurement
-        self._returns = returns
         self.role = role
-        for place in unseen or ():
-            if not isinstance(place, FrameId | GeometryId):
-                raise TypeError(
-                    f"unseen: {place!r} is not a FrameId or GeometryId; "
-                    "add_lidar also takes a RigidBody or Frame"
-                )
-        view = GeometryView(
-            parent_frame_id=parent_frame_id,
-            role=role,
-            unseen=None if unseen is None else frozenset(unseen),
-            structures=structures,
-            anchored_frames=frozenset(anchored_frames),
-            num_threads=num_threads,
+        self._scanner = Scanner(pattern, measurement, returns)
+        self._moving_bodies = dict(moving_bodies or {})
+        self._declare_inputs(has_velocities=moving_bodies is not None)
+        self._declare_caches(
+            GeometryView(
+                parent_frame_id=parent_frame_id,
+                role=role,
+                unseen=None if unseen is None else frozenset(unseen),
+                structures=structures,
+                anchored_frames=frozenset(anchored_frames),
+                num_threads=num_threads,
+            )
         )
-        self._first = shared_revolution(pattern.beams(0), returns)
-        # When each column fires, as a fraction of the revolution.
-        self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
+        self._declare_outputs()
 
+    def _declare_inputs(self, *, has_velocities: bool) -> None:
+        """Declares the input ports, in the order of their indices."""
         declare = self.DeclareAbstractInputPort
         self._geometry_query = declare("geometry_query", Value(QueryObject()))
         self._geometry = declare("geometry", Value(object()))
@@ -242,23 +213,25 @@ class Lidar(LeafSystem):
         self._sweep = declare("sweep", Value(object()))
         self._frame_poses = declare("frame_poses", Value(object()))
         self._velocities: InputPort | None = None
-        self._moving_bodies = dict(moving_bodies or {})
-        if moving_bodies is not None:
+        if has_velocities:
             self._velocities = declare(
                 "body_spatial_velocities",
                 AbstractValue.Make([SpatialVelocity()]),
             )
+
+    def _declare_caches(self, view: GeometryView) -> None:
+        """Declares the scenes for ray casting, and the measured scan."""
         inputs = {self.all_input_ports_ticket()}
         # Kept until the SceneGraph changes. Beams of a scan cannot hit geometry
         # beyond their range, so the scene of scans may leave such geometry at
         # an old pose.
-        self._near, self._all = (
+        self._seen_in_reach, self._seen_everywhere = (
             self.DeclareCacheEntry(
                 description=f"ray-casting scene, {what}",
                 value_producer=ValueProducer(
                     allocate=lambda: Value(SeenGeometry(view)),
                     calc=lambda context, seen, calc_ball=calc_ball: (
-                        self._update(
+                        self._update_seen(
                             context, seen.get_value(), calc_ball(context)
                         )
                     ),
@@ -270,24 +243,25 @@ class Lidar(LeafSystem):
                 ("complete", lambda context: moving_groups.EVERYWHERE),
             )
         )
-        changes = (
-            measurement.is_random or returns is not None or not pattern.repeats
-        )
+        if self._scanner.varies:
+            inputs = inputs | {self.time_ticket()}
         self._measured = self.DeclareCacheEntry(
             description="scan, with the geometry of each point",
             value_producer=ValueProducer(
                 allocate=lambda: Value(object()), calc=self._calc_measured
             ),
-            prerequisites_of_calc=(
-                inputs | ({self.time_ticket()} if changes else set())
-            ),
+            prerequisites_of_calc=inputs,
         )
+
+    def _declare_outputs(self) -> None:
+        """Declares the output ports, in the order of their indices."""
+        inputs = {self.all_input_ports_ticket()}
         scan = {self.cache_entry_ticket(self._measured.cache_index())}
         self.DeclareAbstractOutputPort(
             "scan",
             alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
             calc=lambda context, output: output.set_value(
-                self._measured.Eval(context).scan
+                self._measured.Eval(context).points
             ),
             prerequisites_of_calc=scan,
         )
@@ -295,13 +269,13 @@ class Lidar(LeafSystem):
             ("point_cloud_S", self._calc_point_cloud_S, scan, _WITH_GREY),
             (
                 "point_cloud_W",
-                self._calc_positions_W,
+                self._calc_point_cloud_W,
                 scan | inputs,
                 _WITH_GREY,
             ),
             (
                 "positions_W",
-                self._calc_positions_W,
+                self._calc_point_cloud_W,
                 scan | inputs,
                 _WITHOUT_GREY,
             ),
@@ -366,8 +340,8 @@ class Lidar(LeafSystem):
             RuntimeError: the Context does not belong to this LiDAR.
         """
         self._check_context(context)
-        _, met, geometries = self._measured.Eval(context)
-        return _ids_of(geometries, met)
+        _, geometry, geometries = self._measured.Eval(context)
+        return geometry_ids(geometries, geometry)
 
     def EvalInstances(
         self, context: Context
@@ -384,7 +358,7 @@ class Lidar(LeafSystem):
             print(plant.GetModelInstanceName(body.model_instance()))
         """
         self._check_context(context)
-        seen = _eval_seen(self._near, context)
+        seen = _eval_seen(self._seen_in_reach, context)
         found: dict[int, tuple[GeometryId, ...]] = {}
         for instance, one in zip(
             seen.instance.tolist(), seen.built, strict=True
@@ -418,35 +392,10 @@ class Lidar(LeafSystem):
             ValueError: shapes do not match, a direction has another length than
                 1, or a number is not finite (ranges may be infinite).
         """
-        p_W, d_W = np.asarray(p_WR, float), np.asarray(d_W, float)
-        ranges = np.asarray(max_range, float)
-        if (
-            d_W.shape[1:] != (3,)
-            or p_W.shape not in ((3,), d_W.shape)
-            or ranges.shape not in ((), d_W.shape[:1])
-        ):
-            raise ValueError(
-                f"p_WR {p_W.shape}, d_W {d_W.shape}, max_range {ranges.shape}: "
-                "give (N, 3) or (3,), (N, 3), and a number or (N,)"
-            )
-        length = np.linalg.norm(d_W, axis=1)
-        if not (np.abs(length - 1.0) <= 1e-6).all():
-            raise ValueError("d_W: a direction does not have the length 1")
-        if not (np.isfinite(p_W).all() and (ranges >= 0.0).all()):
-            raise ValueError("p_WR, max_range: not finite, or negative")
         seen = self._eval_all(context)
-        assert seen.scene is not None
-        hits = seen.scene.cast_rays(
-            p_W,
-            d_W,
-            ranges,
-            times=np.array([float(self.causal)]),
-            with_normals=True,
-            exact=True,
-        )
-        return RayHits(
-            hits.ranges, _ids_of(seen.built, hits.geometry), hits.normals_W
-        )
+        # The time of the output.
+        time = float(self.causal)
+        return cast_exact_rays(seen, p_WR, d_W, max_range, time)
 
     def _check_context(self, context: Context) -> None:
         """Checks that a Context is the one of this LiDAR.
@@ -474,14 +423,18 @@ class Lidar(LeafSystem):
         """
         self._check_context(context)
         is_limited = self._frame_poses.HasValue(context)
-        return _eval_seen(self._all if is_limited else self._near, context)
+        return _eval_seen(
+            self._seen_everywhere if is_limited else self._seen_in_reach,
+            context,
+        )
 
-    def _update(
+    def _update_seen(
         self, context: Context, seen: SeenGeometry, ball: moving_groups.Ball
     ) -> None:
+        """Updates the geometry that the LiDAR sees in a ball."""
         seen.update(
             self._geometry_query.Eval(context),
-            _value(self._geometry, context),
+            _optional_value(self._geometry, context),
             self._calc_motions(context),
             self._known_poses(context),
             ball,
@@ -489,17 +442,16 @@ class Lidar(LeafSystem):
         )
 
     def _known_poses(self, context: Context) -> moving_groups.KnownPoses:
-        return _value(self._frame_poses, context, moving_groups.NOTHING_KNOWN)
+        known = _optional_value(self._frame_poses, context)
+        return moving_groups.NOTHING_KNOWN if known is None else known
 
     def _calc_ball(self, context: Context) -> moving_groups.Ball:
         """Returns the ball in which beams can meet geometry.
 
-        It is everywhere if poses have to be asked of the SceneGraph anyway.
+        The ball is infinite if no poses are known without the SceneGraph.
         """
         if not self._frame_poses.HasValue(context):
             return moving_groups.EVERYWHERE
-        model = self._returns or self._measurement
-        reach = model.reach(self.pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
         middle = p_WSset[0]
         way = 0.0
@@ -507,7 +459,9 @@ class Lidar(LeafSystem):
             middle = p_WSset.mean(axis=0)
             way = np.linalg.norm(p_WSset - middle, axis=1).max()
         # A metre of margin for rounding and merged beams.
-        return moving_groups.Ball(middle, float(reach + way) + 1.0)
+        return moving_groups.Ball(
+            middle, float(self._scanner.reach() + way) + 1.0
+        )
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
         """Returns moving frame -> its motion during the revolution."""
@@ -528,76 +482,17 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
-        seen = _eval_seen(self._near, context)
-        frame, turn = self._turn_at(context.get_time())
-        p_WSset, R_WSset = self._calc_poses(context)
-        columns = turn.beams.cast_columns
-        times = self._times
-        if columns is not None:
-            times = times[columns]
-            if len(p_WSset) > 1:
-                p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
-        met, returns = self._measure(seen, turn, p_WSset, R_WSset, times, frame)
-        labels = seen.label
-        moving = _value(self._moving, context)
-        if moving is not None:
-            labels = seen.labels(moving)
-        # Zeros, so that the padding between fields is defined, too.
-        scan = np.zeros(len(returns.beams), POINT_DTYPE)
-        step = np.float32(self._measurement.resolution)
-        assemble_points(
-            scan, turn.table, returns, met, labels, seen.instance, step
-        )
-        # Other ports and methods are computed from it.
-        scan.flags.writeable = False
-        output.set_value(_Measured(scan, met, seen.built))
-
-    def _measure(
-        self,
-        seen: SeenGeometry,
-        turn: Revolution,
-        p_WSset: np.ndarray,
-        R_WSset: np.ndarray,
-        times: np.ndarray,
-        frame: int,
-    ) -> tuple[np.ndarray, Returns]:
-        """Returns the hit geometry of each return, and the returns."""
-        assert seen.scene is not None
-        if self._returns is not None:
-            assert turn.calibrated is not None
-            reported = self._returns.measure(
-                seen.scene,
-                seen.materials(self._returns),
-                self.pattern,
-                turn.calibrated,
-                p_WSset,
-                R_WSset,
-                times,
-                frame,
+        seen = _eval_seen(self._seen_in_reach, context)
+        moving = _optional_value(self._moving, context)
+        labels = seen.label if moving is None else seen.labels(moving)
+        revolution = round(context.get_time() / self.pattern.period)
+        output.set_value(
+            self._scanner.scan(
+                seen,
+                labels,
+                *self._calc_poses(context),
+                frame=revolution - self.causal,
             )
-            return reported.geometry, Returns(*reported[:3])
-        hits = seen.scene.cast_rays(
-            p_WSset,
-            turn.d_Sset_cast,
-            self._measurement.reach(self.pattern.max_range),
-            R_WSset=R_WSset,
-            times=times,
-        )
-        returns = self._measurement.measure(
-            hits.ranges.take(turn.table.place),
-            self.pattern.min_range,
-            self.pattern.max_range,
-            frame,
-        )
-        return hits.geometry.take(turn.table.place.take(returns.beams)), returns
-
-    def _turn_at(self, time: float) -> tuple[int, Revolution]:
-        """Returns number and beams of the revolution at a time [s]."""
-        frame = round(time / self.pattern.period) - self.causal
-        if self.pattern.repeats:
-            return frame, self._first
-        return frame, shared_revolution(
-            self.pattern.beams(frame), self._returns
         )
 
     def _calc_pose(self, context: Context) -> RigidTransform:
@@ -606,7 +501,7 @@ class Lidar(LeafSystem):
 
     def _calc_carrier_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of P at the time of the output."""
-        sweep = _value(self._sweep, context)
+        sweep = _optional_value(self._sweep, context)
         if sweep is not None and len(sweep.p_WPset) == 1:
             R_WP = RotationMatrix(sweep.R_WPset[0])
             return RigidTransform(R_WP, sweep.p_WPset[0])
@@ -620,7 +515,7 @@ class Lidar(LeafSystem):
 
         K is the number of columns with motion distortion, otherwise 1.
         """
-        sweep = _value(self._sweep, context)
+        sweep = _optional_value(self._sweep, context)
         if sweep is not None:
             sweep = sweep.of_frame(self.X_PB)
             return sweep.p_WPset, sweep.R_WPset
@@ -628,7 +523,7 @@ class Lidar(LeafSystem):
         X_WS = X_WP @ self.X_PB
         motion = self._calc_motions(context).get(self.parent_frame_id)
         if motion is not None:
-            R_WW0, way_P = motion.at(self._times)
+            R_WW0, way_P = motion.at(self._scanner.column_times)
             p_PS_W = X_WS.translation() - X_WP.translation()
             return (
                 X_WP.translation() + way_P + rotated(R_WW0, p_PS_W),
@@ -645,40 +540,77 @@ class Lidar(LeafSystem):
     def _calc_point_cloud_S(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._measured.Eval(context).scan
+        scan = self._measured.Eval(context).points
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
-        self._fill(output.get_mutable_value(), p_SRset, scan["intensity"])
+        greys = self._scanner.greys(scan["intensity"])
+        _set_points(output.get_mutable_value(), p_SRset, greys)
 
-    def _calc_positions_W(
+    def _calc_point_cloud_W(
         self, context: Context, output: AbstractValue
     ) -> None:
-        scan = self._measured.Eval(context).scan
+        scan = self._measured.Eval(context).points
         p_WSset, R_WSset = self._calc_poses(context)
         # The pose of S when each point was measured: one, or each column's.
-        columns = self._first.beams.column_t_ns
+        columns = self._scanner.column_t_ns
         pose = np.searchsorted(columns, scan["t"]) % len(p_WSset)
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
         p_WRset = (p_WSset[pose] + p_SRset_W).T
-        self._fill(output.get_mutable_value(), p_WRset, scan["intensity"])
-
-    def _fill(
-        self, cloud: PointCloud, p_FRset: np.ndarray, intensity: np.ndarray
-    ) -> None:
-        cloud.resize(p_FRset.shape[1])
-        cloud.mutable_xyzs()[:] = p_FRset
-        if cloud.has_rgbs():
-            bright = intensity if self._returns else 255.0 * intensity
-            cloud.mutable_rgbs()[:] = np.rint(np.clip(bright, 0.0, 255.0))
+        greys = self._scanner.greys(scan["intensity"])
+        _set_points(output.get_mutable_value(), p_WRset, greys)
 
 
-def _value(port: InputPort, context: Context, default: Any = None) -> Any:
-    """Returns the value of a port, or the default if it is not connected."""
-    return port.Eval(context) if port.HasValue(context) else default
+def _set_points(
+    cloud: PointCloud, p_FRset: np.ndarray, greys: np.ndarray
+) -> None:
+    """Sets the points of a cloud.
+
+    Args:
+        cloud: the cloud, with or without colours.
+        p_FRset: (3, N) positions in any frame F [m].
+        greys: (N,) brightness of the points, from 0 to 255.
+    """
+    cloud.resize(p_FRset.shape[1])
+    cloud.mutable_xyzs()[:] = p_FRset
+    if cloud.has_rgbs():
+        cloud.mutable_rgbs()[:] = np.rint(np.clip(greys, 0.0, 255.0))
+
+
+def _check_role(role: Role) -> None:
+    """Checks that a role is a role of geometry.
+
+    Raises:
+        TypeError: it is not.
+    """
+    if not isinstance(role, Role) or role == Role.kUnassigned:
+        raise TypeError(
+            f"role: {role!r} is not a role of geometry; give "
+            "Role.kPerception, Role.kIllustration or Role.kProximity of "
+            "pydrake.geometry"
+        )
+
+
+def _check_unseen(unseen: Collection[FrameId | GeometryId]) -> None:
+    """Checks that the elements of `unseen` are frames or geometries.
+
+    Raises:
+        TypeError: an element is of another type.
+    """
+    for place in unseen:
+        if not isinstance(place, FrameId | GeometryId):
+            raise TypeError(
+                f"unseen: {place!r} is not a FrameId or GeometryId; "
+                "add_lidar also takes a RigidBody or Frame"
+            )
+
+
+def _optional_value(port: InputPort, context: Context) -> Any:
+    """Returns the value of a port; None if the port is not connected."""
+    return port.Eval(context) if port.HasValue(context) else None
 
 
 def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:
-    """Returns the geometry of a cache entry in a Context."""
+    """Returns the geometry that a cache entry contains in a Context."""
     seen = entry.Eval(context)
     if seen.scene is not None:
         return seen
@@ -688,25 +620,3 @@ def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:
         return entry.Eval(context)
     finally:
         entry.enable_caching(context)
-
-
-def _ids_of(
-    geometries: Sequence[PerceptionGeometry], met: np.ndarray
-) -> list[GeometryId | None]:
-    """Returns ids by (N,) indices; None where these are negative."""
-    ids: list[GeometryId | None] = [one.geometry_id for one in geometries]
-    ids.append(None)
-    return [ids[k] for k in np.maximum(met, -1).tolist()]
-
-
-class _Measured(NamedTuple):
-    """A scan, the (N,) geometry of each point, and the geometries."""
-
-    scan: np.ndarray
-    met: np.ndarray
-    geometries: tuple[PerceptionGeometry, ...]
-
-    def __deepcopy__(self, memo: dict) -> _Measured:
-        # A Context is cloned together with this value. It never changes, and
-        # geometry ids cannot be copied.
-        return self

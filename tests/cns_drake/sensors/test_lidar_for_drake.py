@@ -516,22 +516,24 @@ def test_an_error_leaves_no_pose_behind():
 
 def test_lidars_of_many_diagrams_share_their_beams():
     """A dropped Diagram may stay in memory: little of it may be large."""
-    turns = set()
+    revolutions = set()
     for _ in range(3):
         for preset in ("os1-128", "mid-360"):
             field = Field()
             field.add("ball", Sphere(1.0))
             field.finish(preset)
             field.eval()
-            turns.add(id(field.lidar._first))
+            scanner = field.lidar._scanner
+            revolutions.add(id(scanner._first))
             own = sum(
                 value.nbytes
-                for value in vars(field.lidar).values()
+                for part in (field.lidar, scanner)
+                for value in vars(part).values()
                 if isinstance(value, np.ndarray)
             )
             assert own < 200_000
     gc.collect()
-    assert len(turns) == 2
+    assert len(revolutions) == 2
 
 
 def ahead_at(time=0.0):

@@ -1,0 +1,187 @@
+"""The scanning unit of a LiDAR: from its poses to the points of a scan.
+
+A `Scanner` knows no Diagram and no Context; `Lidar` is the Drake system.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.sensors.lidar.beams import BeamPattern
+from cns_drake.sensors.lidar.measurement import MeasurementModel, Returns
+from cns_drake.sensors.lidar.scan_assembly import (
+    POINT_DTYPE,
+    Revolution,
+    assemble_points,
+    shared_revolution,
+)
+from cns_drake.sensors.lidar.seen_geometry import SeenGeometry
+
+if TYPE_CHECKING:
+    # Slow to import, and ideal returns do without.
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+
+class MeasuredScan(NamedTuple):
+    """A scan of N points, and the geometry that each point lies on.
+
+    Attributes:
+        points: (N,) array of `POINT_DTYPE`, read-only.
+        geometry: (N,) index of each point's geometry in `geometries`; negative
+            for a point without a surface, such as rain.
+        geometries: the geometry that the LiDAR sees.
+    """
+
+    points: np.ndarray
+    geometry: np.ndarray
+    geometries: tuple[PerceptionGeometry, ...]
+
+    def __deepcopy__(self, memo: dict) -> MeasuredScan:
+        # A Context is cloned together with this value. It never changes, and
+        # geometry ids cannot be copied.
+        return self
+
+
+class Scanner:
+    """The scanning unit of a LiDAR: its beams, and how it measures returns.
+
+    Attributes:
+        pattern: the beams of a revolution.
+        column_times: (C,) time at which each column fires, as a fraction of the
+            revolution.
+        column_t_ns: (C,) these times since the start of the revolution [ns].
+    """
+
+    def __init__(
+        self,
+        pattern: BeamPattern,
+        measurement: MeasurementModel,
+        returns: CalibratedReturns | None,
+    ):
+        """Prepares the first revolution.
+
+        Args:
+            pattern: the beams.
+            measurement: the model of noise, losses and rounding.
+            returns: the model of a real unit; None for ideal returns. With a
+                model, only the resolution is taken from `measurement`.
+        """
+        self.pattern = pattern
+        self._measurement = measurement
+        self._returns = returns
+        self._first = shared_revolution(pattern.beams(0), returns)
+        self.column_t_ns = self._first.beams.column_t_ns
+        self.column_times = self.column_t_ns / (pattern.period * 1e9)
+
+    @property
+    def varies(self) -> bool:
+        """Whether scans of the same geometry from one pose differ."""
+        return (
+            self._measurement.is_random
+            or self._returns is not None
+            or not self.pattern.repeats
+        )
+
+    def reach(self) -> float:
+        """Returns how far beams must be cast [m]."""
+        model = self._returns or self._measurement
+        return model.reach(self.pattern.max_range)
+
+    def greys(self, intensity: np.ndarray) -> np.ndarray:
+        """Returns the greys (N,) that stand for intensities (N,) of points.
+
+        The greys are not limited to the range from 0 to 255.
+        """
+        return 255.0 * intensity if self._returns is None else intensity
+
+    def scan(
+        self,
+        seen: SeenGeometry,
+        labels: np.ndarray,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        frame: int,
+    ) -> MeasuredScan:
+        """Returns the scan of a revolution.
+
+        Args:
+            seen: the geometry, with a scene.
+            labels: (num_geometries,) uint16 present class of each geometry.
+            p_WSset: (K, 3) positions of S in the world: one, or one for each
+                column [m].
+            R_WSset: (K, 3, 3) orientations of S in the world.
+            frame: number of the revolution.
+        """
+        revolution = self._revolution(frame)
+        columns = revolution.beams.cast_columns
+        times = self.column_times
+        if columns is not None:
+            times = times[columns]
+            if len(p_WSset) > 1:
+                p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
+        geometry, returns = self._measure(
+            seen, revolution, p_WSset, R_WSset, times, frame
+        )
+        # Zeros, so that the padding between fields is defined, too.
+        points = np.zeros(len(returns.beams), POINT_DTYPE)
+        assemble_points(
+            points,
+            revolution.table,
+            returns,
+            geometry,
+            labels,
+            seen.instance,
+            np.float32(self._measurement.resolution),
+        )
+        # Ports and methods of the LiDAR share the points.
+        points.flags.writeable = False
+        return MeasuredScan(points, geometry, seen.built)
+
+    def _revolution(self, frame: int) -> Revolution:
+        """Returns the beams of the revolution with a number."""
+        if self.pattern.repeats:
+            return self._first
+        return shared_revolution(self.pattern.beams(frame), self._returns)
+
+    def _measure(
+        self,
+        seen: SeenGeometry,
+        revolution: Revolution,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        times: np.ndarray,
+        frame: int,
+    ) -> tuple[np.ndarray, Returns]:
+        """Returns the index of the geometry of each return, and the returns."""
+        assert seen.scene is not None
+        if self._returns is not None:
+            assert revolution.calibrated is not None
+            reported = self._returns.measure(
+                seen.scene,
+                seen.materials(self._returns),
+                self.pattern,
+                revolution.calibrated,
+                p_WSset,
+                R_WSset,
+                times,
+                frame,
+            )
+            return reported.geometry, Returns(*reported[:3])
+        hits = seen.scene.cast_rays(
+            p_WSset,
+            revolution.d_Sset_cast,
+            self.reach(),
+            R_WSset=R_WSset,
+            times=times,
+        )
+        place = revolution.table.place
+        returns = self._measurement.measure(
+            hits.ranges.take(place),
+            self.pattern.min_range,
+            self.pattern.max_range,
+            frame,
+        )
+        return hits.geometry.take(place.take(returns.beams)), returns
