@@ -62,7 +62,7 @@ class Revolution:
     Attributes:
         beams: the beams in firing order.
         d_Sset_cast: (N, 3) directions in the order of casting.
-        calibrated: the revolution of a unit with calibrated returns; None for
+        unit_beams: the beams with the errors of an individual unit; None for
             ideal returns.
         table: constants for assembling points.
     """
@@ -72,10 +72,11 @@ class Revolution:
         self.beams = beams
         self.d_Sset_cast = beams.d_Sset[beams.packet_order]
         d_Sset, p_Sset = beams.d_Sset, np.zeros((0, 3))
-        self.calibrated = None if returns is None else returns.turn(beams)
-        if self.calibrated is not None:
-            d_Sset = self.calibrated.reported
-            p_Sset = self.calibrated.p_SLset
+        self.unit_beams = None
+        if returns is not None:
+            self.unit_beams = returns.unit_beams(beams)
+            d_Sset = self.unit_beams.reported
+            p_Sset = self.unit_beams.p_SLset
         self.table = BeamTable(
             d_Sset.astype(np.float32),
             p_Sset.astype(np.float32),

@@ -158,12 +158,12 @@ class Scanner:
         """Returns the index of the geometry of each return, and the returns."""
         assert seen.scene is not None
         if self._returns is not None:
-            assert revolution.calibrated is not None
+            assert revolution.unit_beams is not None
             reported = self._returns.measure(
                 seen.scene,
                 seen.materials(self._returns),
                 self.pattern,
-                revolution.calibrated,
+                revolution.unit_beams,
                 p_WSset,
                 R_WSset,
                 times,

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from cns_drake.base.elementary import cos, sin
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene, SceneHits
 from cns_drake.ray_casting.rays import rotate
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -21,7 +19,8 @@ from cns_drake.sensors.returns.footprint import correct_side_hits, find_sides
 from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
 from cns_drake.sensors.returns.materials import Materials, find_materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
-from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
+from cns_drake.sensors.returns.random_numbers import frame_key
+from cns_drake.sensors.returns.unit_beams import UnitBeams, make_unit_beams
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
@@ -118,6 +117,7 @@ class CalibratedReturns:
         return max_range + 8.0 * self.sheet.range_noise
 
     def _receiver(self, min_range: float, max_range: float) -> Receiver:
+        """Returns the receiver of the unit, with range limits [m]."""
         sheet = self.sheet
         scattering = None
         if not self.weather.is_clear:
@@ -143,7 +143,7 @@ class CalibratedReturns:
         scene: RayCastingScene,
         materials: Materials,
         pattern: BeamPattern,
-        turn: CalibratedTurn,
+        unit: UnitBeams,
         p_WSset: np.ndarray,
         R_WSset: np.ndarray,
         times: np.ndarray,
@@ -158,8 +158,8 @@ class CalibratedReturns:
             scene: geometry on which rays are cast.
             materials: reflection properties of each geometry.
             pattern: the beams of a revolution.
-            turn: the beams with the errors of the individual unit, from
-                `CalibratedReturns.turn`.
+            unit: the beams with the errors of the individual unit, from
+                `CalibratedReturns.unit_beams`.
             p_WSset: (K, 3) positions of S in the world [m].
             R_WSset: (K, 3, 3) orientations of S in the world.
             times: (T,) firing times as fractions of the revolution.
@@ -168,32 +168,11 @@ class CalibratedReturns:
         key = frame_key(self.seed, self.sensor_name, frame)
         reach = self.reach(pattern.max_range)
         times = np.asarray(times, np.float32)
-        found = []
-        for height, rows in turn.blocks:
-            # An array with one entry per column is used whole, because a block
-            # contains whole cycles of the columns.
-            p, R, when = (
-                one[rows] if len(one) == len(turn.beam) else one
-                for one in (p_WSset, R_WSset, times)
-            )
-            # A single place for all rays is faster.
-            hits = scene.cast_rays(
-                p + height * R[:, :, 2],
-                turn.d_Sset[rows],
-                reach,
-                R_WSset=R,
-                times=when,
-                with_normals=True,
-            )
-            found.append(hits)
-        joined = found[0]
-        if len(found) > 1:
-            fields = zip(*(vars(hits).values() for hits in found), strict=True)
-            joined = SceneHits(*map(np.concatenate, fields))
-        met = BeamHits.of(rotate(R_WSset, turn.d_Sset), joined)
-        if turn.height.any():
-            every = np.arange(len(turn.height))
-            up = turn.height[:, None] * _row_value(R_WSset[:, :, 2], every)
+        hits = _cast_axes(scene, unit, p_WSset, R_WSset, times, reach)
+        met = BeamHits.of(rotate(R_WSset, unit.d_Sset), hits)
+        if unit.height.any():
+            every = np.arange(len(unit.height))
+            up = unit.height[:, None] * _row_value(R_WSset[:, :, 2], every)
             p_WSset = _row_value(p_WSset, every) + up
 
         def cast(
@@ -208,7 +187,7 @@ class CalibratedReturns:
 
         shots = Shots(
             key,
-            turn.beam,
+            unit.beam,
             p_WSset,
             times,
             self.sheet.divergence,
@@ -216,8 +195,8 @@ class CalibratedReturns:
             materials,
             cast,
         )
-        sides = find_sides(shots, turn.orders, met)
-        # A single place for all is faster.
+        sides = find_sides(shots, unit.orders, met)
+        # A single origin for all rays is faster.
         origins = _row_value(p_WSset, sides.row)
         when = times[sides.row % len(times)]
         side_met = BeamHits.of(
@@ -231,16 +210,16 @@ class CalibratedReturns:
         followed = follow(shots, ways, ways_met, receiver.budget.scale)
         light = texture(
             join([*lights, *followed]),
-            turn.orders[1],
+            unit.orders[1],
             np.asarray(p_WSset, float),
             met.d_Wset,
             materials,
             *scene.surface_frames(),
         )
-        return report_echoes(light, receiver, key, turn.range_error, turn.gain)
+        return report_echoes(light, receiver, key, unit.range_error, unit.gain)
 
-    def turn(self, beams: Beams) -> CalibratedTurn:
-        """Returns the beams of a revolution, with this LiDAR's errors.
+    def unit_beams(self, beams: Beams) -> UnitBeams:
+        """Returns the beams of a revolution, with the errors of this unit.
 
         Each laser has errors of direction, range and gain, which are the same
         in all revolutions.
@@ -248,46 +227,8 @@ class CalibratedReturns:
         Args:
             beams: the nominal beams, from `BeamPattern.beams`.
         """
-        laser = np.arange(int(beams.ring.max()) + 1)
         key = frame_key(self.unit_seed, f"unit/{self.sensor_name}", 0)
-        sheet, head = self.sheet, self.sheet.head
-        angle = np.radians(sheet.angle_error_deg)
-        # The alternating offset is part of the unit's range errors.
-        rest = np.sqrt(sheet.range_bias**2 - head.alternate**2)
-        unit = sheet.response
-        sizes = (rest, angle, angle, unit.gain, unit.flicker)
-        # None is farther off than three deviations.
-        range_error, elevation, azimuth, gain, flicker = (
-            size * np.clip(normal(key, laser, draw), -3.0, 3.0)
-            for draw, size in enumerate(sizes)
-        )
-        range_error += np.where(laser % 2, -head.alternate, head.alternate)
-        gain += unit.dim * np.minimum(gain + unit.gain, 0.0)
-        errors = range_error, elevation, azimuth, gain, flicker
-        range_error, elevation, azimuth, gain, flicker = (
-            one[beams.ring] for one in errors
-        )
-        x, y, z = beams.d_Sset.T
-        shift = 0.0
-        own = 0.0
-        if head.tick_deg:
-            tick = np.radians(head.tick_deg)
-            now = np.arctan2(y, x)
-            shift = np.rint(now / tick) * tick - now
-            own = (uniform(key, laser, len(sizes)) - 0.5) * 2.0 * tick
-            own = own[beams.ring]
-        across = np.maximum(np.sqrt(x * x + y * y), 1e-9)
-        lowest, heights, parts = np.transpose(head.blocks)
-        block = (np.degrees(np.arcsin(z))[:, None] < lowest[:-1]).sum(axis=1)
-        return CalibratedTurn(
-            beams,
-            _turned_directions(beams.d_Sset, own + azimuth, elevation / across),
-            _turned_directions(beams.d_Sset, own + shift, 0.0),
-            heights[block],
-            range_error * parts[block],
-            np.maximum(1.0 + gain, 0.0)
-            * np.where(beams.column % 2, 1.0 + flicker, 1.0 - flicker),
-        )
+        return make_unit_beams(beams, self.sheet, key)
 
 
 def _row_value(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -295,75 +236,34 @@ def _row_value(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return values if len(values) == 1 else values[rows % len(values)]
 
 
-def _turned_directions(
-    d_Sset: np.ndarray, left: np.ndarray | float, up: np.ndarray | float
-) -> np.ndarray:
-    """Returns (N, 3) directions turned by small angles.
-
-    Azimuths grow by `left` [rad]. Elevations grow by about `up` times the
-    cosine of the elevation [rad].
-    """
-    x, y, z = d_Sset.T
-    c, s = cos(left), sin(left)
-    x, y = c * x - s * y, s * x + c * y
-    x, y, z = x - up * x * z, y - up * y * z, z + up * (x * x + y * y)
-    return np.stack([x, y, z], axis=1) / np.sqrt(x * x + y * y + z * z)[:, None]
-
-
-class CalibratedTurn:
-    """The N beams of a revolution, with the errors of their lasers.
-
-    The arrays `reported`, `p_SLset`, `range_error` and `gain` are in the order
-    in which the beams fire. All other attributes refer to the order in which
-    rays are cast (`packet_order` of the `Beams`).
-
-    Attributes:
-        d_Sset: (N, 3) true unit directions of the beams in S.
-        height: (N,) height of each beam's laser above the origin of S [m].
-        blocks: for each run of consecutive beams with the same laser height,
-            this height and a slice that selects the beams.
-        reported: (N, 3) unit directions in S that the unit reports.
-        p_SLset: (N, 3) position of each beam's laser in S [m].
-        beam: (N,) number of each beam in firing order.
-        orders: (2, N) indices of the beams: 0, 1, ..., N - 1; and the indices
-            sorted by firing. Beams that are consecutive in one of these two
-            sequences are neighbours for `find_sides`.
-        range_error: (N,) range error of each beam's laser [m].
-        gain: (N,) gain of each beam's laser.
-    """
-
-    def __init__(
-        self,
-        beams: Beams,
-        d_Sset: np.ndarray,
-        reported: np.ndarray,
-        height: np.ndarray,
-        range_error: np.ndarray,
-        gain: np.ndarray,
-    ):
-        """Makes the turn; all arrays are in firing order.
-
-        Args:
-            beams: beams of the pattern.
-            d_Sset: (N, 3) true unit directions of the beams.
-            reported: (N, 3) unit directions that the unit reports.
-            height: (N,) height of each beam's laser above the origin of S [m].
-            range_error: (N,) range error of each beam's laser [m].
-            gain: (N,) gain of each beam's laser.
-        """
-        self.range_error = range_error
-        self.gain = gain
-        self.reported = reported
-        self.p_SLset = np.outer(height, (0.0, 0.0, 1.0))
-        self.beam = np.asarray(beams.packet_order, np.int64)
-        self.d_Sset = np.ascontiguousarray(d_Sset[self.beam])
-        self.height = height[self.beam]
-        self.orders = np.stack(
-            [np.arange(len(self.beam)), np.argsort(self.beam)]
+def _cast_axes(
+    scene: RayCastingScene,
+    unit: UnitBeams,
+    p_WSset: np.ndarray,
+    R_WSset: np.ndarray,
+    times: np.ndarray,
+    reach: float,
+) -> SceneHits:
+    """Returns the hits of the beams' axes; see `CalibratedReturns.measure`."""
+    found = []
+    for height, rows in unit.blocks:
+        # An array with one entry per column is used whole, because a block
+        # contains whole cycles of the columns.
+        p, R, when = (
+            one[rows] if len(one) == len(unit.beam) else one
+            for one in (p_WSset, R_WSset, times)
         )
-        ends = np.flatnonzero(np.diff(self.height)) + 1
-        ends = np.concatenate([[0], ends, [len(self.height)]])
-        self.blocks = [
-            (self.height[first], slice(first, last))
-            for first, last in pairwise(ends)
-        ]
+        # A single origin for all rays is faster.
+        hits = scene.cast_rays(
+            p + height * R[:, :, 2],
+            unit.d_Sset[rows],
+            reach,
+            R_WSset=R,
+            times=when,
+            with_normals=True,
+        )
+        found.append(hits)
+    if len(found) == 1:
+        return found[0]
+    fields = zip(*(vars(hits).values() for hits in found), strict=True)
+    return SceneHits(*map(np.concatenate, fields))

@@ -58,8 +58,8 @@ def test_reported_angles_are_nominal_and_true_ones_are_not():
     pattern = make_beam_pattern("hdl-64e")
     beams = pattern.beams(0)
     returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
-    turn = returns.turn(beams)
-    true = turn.d_Sset
+    unit = returns.unit_beams(beams)
+    true = unit.d_Sset
     nominal = beams.d_Sset[beams.packet_order]
     np.testing.assert_allclose(np.linalg.norm(true, axis=1), 1.0, atol=1e-12)
     ring = beams.ring[beams.packet_order]
@@ -116,7 +116,7 @@ def test_some_lasers_are_dim():
     for dim in (0.0, 3.0):
         response = Response(gain=0.1, dim=dim)
         returns = replace(base, sheet=replace(base.sheet, response=response))
-        gains[dim] = returns.turn(pattern.beams(0)).gain[:128]
+        gains[dim] = returns.unit_beams(pattern.beams(0)).gain[:128]
     even, dim = gains.values()
     expected = np.where(even < 0.9, 0.9 + 4.0 * (even - 0.9), even)
     np.testing.assert_allclose(dim, np.maximum(expected, 0.0))
@@ -129,7 +129,7 @@ def test_every_second_shot_of_a_laser_is_brighter():
     response = Response(gain=0.0, flicker=0.1)
     returns = replace(base, sheet=replace(base.sheet, response=response))
     beams = pattern.beams(0)
-    brighter = returns.turn(beams).gain - 1.0
+    brighter = returns.unit_beams(beams).gain - 1.0
     is_odd = beams.column % 2 == 1
     of_laser = brighter[is_odd][:128]
     np.testing.assert_allclose(
@@ -185,7 +185,7 @@ class Wall:
 def test_lasers_have_their_places_however_poses_are_given():
     pattern = make_beam_pattern("hdl-64e")
     returns = CalibratedReturns.of_preset("hdl-64e", unit_seed=3)
-    turn = returns.turn(pattern.beams(0))
+    unit = returns.unit_beams(pattern.beams(0))
     zero = np.zeros(1, np.float32)
     half = np.full(1, 0.5, np.float32)
     materials = Materials(
@@ -196,7 +196,7 @@ def test_lasers_have_their_places_however_poses_are_given():
             Wall(),
             materials,
             pattern,
-            turn,
+            unit,
             np.zeros((count, 3)),
             np.tile(np.eye(3), (count, 1, 1)),
             np.zeros(count),
