@@ -16,10 +16,12 @@ from cns_drake.sensors.lidar.measurement import Echoes
 from cns_drake.sensors.lidar.presets import check_preset
 from cns_drake.sensors.returns.echoes import Receiver, Reported, report_echoes
 from cns_drake.sensors.returns.footprint import correct_side_hits, find_sides
-from cns_drake.sensors.returns.light import BeamHits, Shots, join, texture
+from cns_drake.sensors.returns.light import BeamHits, Shots
 from cns_drake.sensors.returns.materials import Materials, find_materials
 from cns_drake.sensors.returns.propagation import follow, start_ways
 from cns_drake.sensors.returns.random_numbers import frame_key
+from cns_drake.sensors.returns.surface_texture import with_texture
+from cns_drake.sensors.returns.tables import join
 from cns_drake.sensors.returns.unit_beams import UnitBeams, make_unit_beams
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
@@ -208,7 +210,7 @@ class CalibratedReturns:
         )
         receiver = self._receiver(pattern.min_range, pattern.max_range)
         followed = follow(shots, ways, ways_met, receiver.budget.scale)
-        light = texture(
+        light = with_texture(
             join([*lights, *followed]),
             unit.orders[1],
             np.asarray(p_WSset, float),

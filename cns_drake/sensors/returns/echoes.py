@@ -8,7 +8,7 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import log
 from cns_drake.sensors.lidar.measurement import Echoes
-from cns_drake.sensors.returns.light import Light, join, select
+from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
     HOPELESS_SNR,
@@ -19,6 +19,7 @@ from cns_drake.sensors.returns.link_budget import (
     target_snr,
 )
 from cns_drake.sensors.returns.random_numbers import normal, uniform
+from cns_drake.sensors.returns.tables import join, select
 from cns_drake.sensors.returns.unit_sheets import UnitSheet
 from cns_drake.sensors.returns.weather import Scattering
 
@@ -81,11 +82,17 @@ class Reported(NamedTuple):
     geometry: np.ndarray
 
 
-class _Pulses(NamedTuple):
-    """N echoes, with beam, number within the beam and distance [m].
+class _EchoTable(NamedTuple):
+    """N echoes, before or after their detection.
 
-    `energy` is the energy that the unit infers if it assumes clear air; see
-    `Reported` for `geometry`. Echoes marked `sure` need no test of detection.
+    Attributes:
+        beam: (N,) number of each echo's beam.
+        number: (N,) number of each echo among the echoes of its beam.
+        distance: (N,) distances [m].
+        snr: (N,) signal-to-noise ratios.
+        energy: (N,) energy that the unit infers if it assumes clear air.
+        geometry: (N,) index of the reflecting geometry, as in `Reported`.
+        is_sure: (N,) bool, whether each echo is detected in any case.
     """
 
     beam: np.ndarray
@@ -121,43 +128,46 @@ def report_echoes(
     """
     num_beams = len(gain)
     unit = receiver.budget, receiver.extinction, receiver.sheet.resolution
-    pulses = _merge(light, *unit, num_beams)
+    pulses = _merge_light(light, *unit, num_beams)
     scattering = receiver.scattering
     if scattering is not None and scattering.counts[-1] > 0.0:
-        drops = _drops(pulses, receiver, scattering, key, num_beams)
+        drops = _drop_echoes(pulses, receiver, scattering, key, num_beams)
         pulses = join([pulses, drops])
-    pulses = _detect(pulses, receiver, key, range_error)
+    pulses = _detected_echoes(pulses, receiver, key, range_error)
     if scattering is not None and scattering.fog_energies[-1] > 0.0:
         # A unit reports the broad echo of fog only if the beam has no other
         # echo.
         nearest = np.full(num_beams, np.inf)
         np.minimum.at(nearest, light.beam, light.distance)
         nearest[pulses.beam] = -np.inf
-        fog = _fog(nearest, receiver, scattering, key)
-        pulses = join([pulses, _detect(fog, receiver, key, range_error)])
+        fog = _fog_echoes(nearest, receiver, scattering, key)
+        pulses = join(
+            [pulses, _detected_echoes(fog, receiver, key, range_error)]
+        )
     chosen = select(pulses, _choose(pulses, receiver.choice, num_beams))
     return Reported(
         chosen.beam,
         chosen.distance.astype(np.float32),
-        _intensity(chosen, receiver, key, gain).astype(np.float32),
+        _reported_intensity(chosen, receiver, key, gain).astype(np.float32),
         chosen.geometry,
     )
 
 
 @compiled
-def _merge(
+def _merge_light(
     light: Light,
     budget: LinkBudget,
     extinction: float,
     resolution: float,
     num_beams: int,
-) -> _Pulses:
+) -> _EchoTable:
     """Returns the echoes of surfaces, beam by beam, the nearest first.
 
-    A new echo begins where the light is more than `resolution`, half the length
-    of a pulse [m], behind the beginning of the last echo.
+    A new echo begins where the light comes from more than `resolution` [m]
+    behind the beginning of the last echo. `resolution` is half the length of a
+    pulse.
     """
-    row, first = _sorted(light, num_beams)
+    row, first = _sort_by_beam(light, num_beams)
     count = len(row)
     beam, number = np.empty(count, np.int64), np.empty(count, np.int64)
     mean, total = np.empty(count), np.empty(count)
@@ -193,7 +203,7 @@ def _merge(
                 most = snr
                 geometry[echo] = light.geometry[k]
     echo += 1
-    return _Pulses(
+    return _EchoTable(
         beam[:echo],
         number[:echo],
         mean[:echo],
@@ -205,7 +215,9 @@ def _merge(
 
 
 @compiled
-def _sorted(light: Light, num_beams: int) -> tuple[np.ndarray, np.ndarray]:
+def _sort_by_beam(
+    light: Light, num_beams: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns the rows of the light beam by beam, the nearest first.
 
     Also returns where the rows of each beam begin, and where the last ones end,
@@ -228,14 +240,14 @@ def _sorted(light: Light, num_beams: int) -> tuple[np.ndarray, np.ndarray]:
     return row, first
 
 
-def _drops(
-    surfaces: _Pulses,
+def _drop_echoes(
+    surfaces: _EchoTable,
     receiver: Receiver,
     scattering: Scattering,
     key: np.uint64,
     num_beams: int,
-) -> _Pulses:
-    """Returns the echoes of drops in front of surfaces."""
+) -> _EchoTable:
+    """Returns the detected echoes of drops in front of surfaces."""
     distances, counts = scattering.distances, scattering.counts
     # Drops along a beam are arrivals of a Poisson process; distance is measured
     # by the mean number of drops up to it. In most beams, even the first drop
@@ -253,7 +265,7 @@ def _drops(
     found = [select(surfaces, np.zeros(0, np.int64))]
     for k in range(_MOST_DROPS):
         draw = _FIRST_DROP_DRAW + 2 * k
-        arrived = arrived + _number_before(key, beam, draw)
+        arrived = arrived + _drops_until_next(key, beam, draw)
         is_near = arrived < mean
         beam, arrived, mean = beam[is_near], arrived[is_near], mean[is_near]
         if not len(beam):
@@ -265,7 +277,7 @@ def _drops(
         energy = scattering.energies[row, column.astype(int)]
         snr = target_snr(receiver.budget, receiver.extinction, energy, distance)
         found.append(
-            _Pulses(
+            _EchoTable(
                 beam,
                 number[beam] + k,
                 distance,
@@ -280,18 +292,25 @@ def _drops(
 
 
 @compiled
-def _number_before(key: np.uint64, beam: np.ndarray, draw: int) -> np.ndarray:
-    """Draws the distance to the next drop, as a mean number of drops."""
+def _drops_until_next(
+    key: np.uint64, beam: np.ndarray, draw: int
+) -> np.ndarray:
+    """Returns the distances to the next drops, as mean numbers of drops."""
     return -np.log(1.0 - uniform(key, beam, draw))
 
 
-def _fog(
+def _fog_echoes(
     nearest: np.ndarray,
     receiver: Receiver,
     scattering: Scattering,
     key: np.uint64,
-) -> _Pulses:
-    """Returns the echoes of fog nearer than `nearest` light of a beam [m]."""
+) -> _EchoTable:
+    """Returns the echoes of fog in front of the nearest light of each beam.
+
+    Args:
+        nearest: (num_beams,) distance of the nearest light [m]; -inf for beams
+            that get no echo of fog.
+    """
     beam = np.flatnonzero(nearest > 0.0)
     share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
     distance = np.interp(share, scattering.fog_counts, scattering.distances)
@@ -299,7 +318,7 @@ def _fog(
     beam, distance = beam[is_near], distance[is_near]
     energy = np.interp(distance, scattering.distances, scattering.fog_energies)
     snr = target_snr(receiver.budget, receiver.extinction, energy, distance)
-    return _Pulses(
+    return _EchoTable(
         beam,
         np.zeros_like(beam),
         distance,
@@ -310,10 +329,13 @@ def _fog(
     )
 
 
-def _detect(
-    pulses: _Pulses, receiver: Receiver, key: np.uint64, range_error: np.ndarray
-) -> _Pulses:
-    """Returns the echoes that are detected, with range errors added."""
+def _detected_echoes(
+    pulses: _EchoTable,
+    receiver: Receiver,
+    key: np.uint64,
+    range_error: np.ndarray,
+) -> _EchoTable:
+    """Returns the echoes that the unit detects, with range errors added."""
     # The true distance of a surface decides, not the measured one.
     is_seen = pulses.snr >= HOPELESS_SNR
     is_seen &= pulses.energy >= receiver.sheet.response.least
@@ -338,7 +360,7 @@ def _detect(
     )
 
 
-def _choose(pulses: _Pulses, choice: Echoes, num_beams: int) -> np.ndarray:
+def _choose(pulses: _EchoTable, choice: Echoes, num_beams: int) -> np.ndarray:
     """Returns the rows of the echoes to report, in the order of the beams."""
 
     def find_greatest(values: np.ndarray) -> np.ndarray:
@@ -381,14 +403,14 @@ def _find_greatest(
     return best
 
 
-def _first_draw(pulses: _Pulses) -> np.ndarray:
+def _first_draw(pulses: _EchoTable) -> np.ndarray:
     """Returns the number of the first random draw of each echo."""
     number = np.minimum(pulses.number, _MOST_ECHOES)
     return _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * number
 
 
-def _intensity(
-    pulses: _Pulses, receiver: Receiver, key: np.uint64, gain: np.ndarray
+def _reported_intensity(
+    pulses: _EchoTable, receiver: Receiver, key: np.uint64, gain: np.ndarray
 ) -> np.ndarray:
     """Returns the intensity that the unit reports, a whole number.
 

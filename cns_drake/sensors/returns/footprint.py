@@ -73,7 +73,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
         [np.tile([2 * k, 2 * k + 1], len(edges[k])) for k in range(len(edges))]
     )
     toward = _find_directions(hits.d_Wset, row, neighbour)
-    share = _share(len(shots.beam), row, number, toward)
+    share = _side_shares(len(shots.beam), row, number, toward)
     kept = share > 0.0
     row, neighbour, number = row[kept], neighbour[kept], number[kept]
     toward, share = toward[kept], share[kept]
@@ -139,10 +139,10 @@ def _aim(
 
 
 @compiled
-def _share(
+def _side_shares(
     num_beams: int, row: np.ndarray, number: np.ndarray, toward: np.ndarray
 ) -> np.ndarray:
-    """Returns the (P,) fraction of a beam's light that each side gets.
+    """Returns the fraction (P,) of a beam's light that each side gets.
 
     A side gets half of the light, or a quarter if other sides have edges, too.
     A second neighbour on the same side gets nothing. `toward` has the (P, 3)

@@ -80,7 +80,7 @@ def find_materials(
     names = [geometry.structure for geometry in geometries]
     table = structures.completed(names)
     rows = [
-        _material(geometry, table[name], is_wet)
+        _field_values(geometry, table[name], is_wet)
         for geometry, name in zip(geometries, names, strict=True)
     ]
     empty: list[tuple] = [()] * len(Materials._fields)
@@ -91,7 +91,7 @@ def find_materials(
     )
 
 
-def _material(
+def _field_values(
     geometry: PerceptionGeometry, entry: StructureEntry, is_wet: bool
 ) -> tuple[float, ...]:
     """Returns the values of the fields of `Materials` for one geometry."""
@@ -104,12 +104,12 @@ def _material(
         reflectivity = given
         density = 0.0
     else:
-        kind = _kind(material, geometry.surface)
+        kind = _reflector_kind(material, geometry.surface)
         dark, bright = material.reflectivity
         reflectivity = dark + (bright - dark) * _brightness(geometry.rgb)
         density = material.leaf_area_density
     if is_wet and kind == LAMBERT and material.gets_wet:
-        reflectivity = _wet(reflectivity)
+        reflectivity = _wet_reflectivity(reflectivity)
     if kind not in (LAMBERT, LEAVES, SPRAYS) or given is not None:
         return kind, reflectivity, density, *[0.0] * 7
     return (
@@ -127,7 +127,7 @@ def _material(
     )
 
 
-def _kind(material: Material, surface: Surface) -> int:
+def _reflector_kind(material: Material, surface: Surface) -> int:
     """Returns the kind of a material; leaves depend on the surface.
 
     A closed surface of leaves is a volume of leaves. An open one is a sheet
@@ -150,7 +150,7 @@ def _brightness(rgb: tuple[float, float, float] | None) -> float:
     return float(np.dot(light, (0.2126, 0.7152, 0.0722)))
 
 
-def _wet(reflectivity: float) -> float:
+def _wet_reflectivity(reflectivity: float) -> float:
     """Returns the reflectivity of a surface under a film of water."""
     return (
         reflectivity * (1.0 - _FILM_INNER) / (1.0 - _FILM_INNER * reflectivity)

@@ -22,13 +22,12 @@ from cns_drake.sensors.returns.light import (
     BeamHits,
     Light,
     Shots,
-    cell_number,
-    join,
     reflect,
     reflected,
-    select,
 )
 from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
+from cns_drake.sensors.returns.random_numbers import cell_number
+from cns_drake.sensors.returns.tables import join, select
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52
@@ -151,10 +150,10 @@ def start_ways(
 
 @compiled
 def _leaf_areas(p_Wset: np.ndarray) -> np.ndarray:
-    """Returns the (N,) leaf areas that rays pass before they hit a leaf.
+    """Returns the leaf areas (N,) that rays pass before they hit a leaf.
 
-    They are distributed exponentially with mean 1, and depend only on the (N,
-    3) places of entry.
+    The leaf areas are distributed exponentially with a mean of 1. They depend
+    only on the places (N, 3) at which the rays enter the leaves.
     """
     result = np.empty(len(p_Wset))
     for k, (x, y, z) in enumerate(p_Wset):
@@ -202,7 +201,7 @@ def follow(
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):
-        light, ways = _step(
+        light, ways = _advance_to_hits(
             ways, met, shots.materials, scale, shots.divergence, shots.max_range
         )
         found.append(light)
@@ -214,7 +213,7 @@ def follow(
 
 
 @compiled
-def _step(
+def _advance_to_hits(
     ways: Ways,
     met: BeamHits,
     materials: Materials,
@@ -224,8 +223,16 @@ def _step(
 ) -> tuple[Light, Ways]:
     """Advances each ray to its hit.
 
+    Args:
+        ways: the rays.
+        met: hits of the rays.
+        materials: materials of all geometries.
+        scale: `scale` of the `LinkBudget`.
+        divergence: half angle of a beam [rad].
+        max_range: greatest length of a path [m].
+
     Returns:
-        The returning light, and the continued rays.
+        The light that returns from the hits, and the rays that go on.
     """
     count = len(ways.beam)
     beam, distance = np.empty(count, np.int64), np.empty(count)

@@ -1,8 +1,12 @@
-"""Counter-based random numbers, without the state of a generator.
+"""Random numbers without the state of a generator: of beams, and of places.
 
-A random number depends only on a key, a beam and the number's index among the
-numbers of this beam, and not on other beams or on the order of computation.
+The random number of a beam depends only on a key, the beam and the number's
+index among the numbers of this beam. The random number of a place depends only
+on the cell of a grid in which the place lies. Neither depends on the order of
+computation.
 """
+
+from __future__ import annotations
 
 import numpy as np
 
@@ -90,3 +94,20 @@ def normal(
             size = (above + 6.6579051150) / (below + 1.0)
         result[k] = np.copysign(size, q)
     return result
+
+
+@compiled
+def cell_number(a: float, b: float, c: float) -> float:
+    """Returns a random number from -1 to 1 that depends on a cell of a grid.
+
+    All points (a, b, c) with the same integer parts give the same number.
+    """
+    z = (
+        np.uint64(np.int64(np.floor(a))) * np.uint64(0x9E3779B97F4A7C15)
+        ^ np.uint64(np.int64(np.floor(b))) * np.uint64(0xC2B2AE3D27D4EB4F)
+        ^ np.uint64(np.int64(np.floor(c))) * np.uint64(0x165667B19E3779F9)
+    )
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    return (
+        np.float64((z ^ (z >> np.uint64(27))) >> np.uint64(11)) * 2.0**-52 - 1
+    )

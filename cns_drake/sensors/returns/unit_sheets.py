@@ -167,7 +167,7 @@ class UnitSheet:
         return replace(pattern, elevations_rad=own) if is_own else pattern
 
 
-def _sheet(
+def _make_sheet(
     rows: list, unknown: list[str], source: str, **fields: Any
 ) -> UnitSheet:
     """Returns a unit's sheet from its fields in unit_sheets.yaml."""
@@ -187,7 +187,7 @@ def _sheet(
 
 
 UNIT_SHEETS: dict[str, UnitSheet] = {
-    name: _sheet(**fields)
+    name: _make_sheet(**fields)
     for name, fields in parse_yaml(
         Path(__file__).with_name("unit_sheets.yaml").read_bytes()
     ).items()

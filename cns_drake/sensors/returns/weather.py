@@ -32,18 +32,19 @@ from cns_drake.base.elementary import exp
 from cns_drake.sensors.returns import link_budget
 
 
-def _geometric(first: float, last: float, count: int) -> np.ndarray:
+def _geometric_sequence(first: float, last: float, count: int) -> np.ndarray:
+    """Returns `count` numbers, each the same multiple of the one before."""
     return exp(np.linspace(math.log(first), math.log(last), count))
 
 
 # Diameters of drops; smaller ones are not detectable [mm].
-_DIAMETERS_MM = _geometric(0.05, 12.0, 120)
+_DIAMETERS_MM = _geometric_sequence(0.05, 12.0, 120)
 _WATER_INDEX = 1.328
 # The extinction of a flake is twice its area. The back-scatter of a Lambertian
 # target is rho / pi times its area: rho = 2 pi / 25 sr.
 _FLAKE_REFLECTIVITY = 2.0 * np.pi / 25.0
 # Distances at which scattering is tabulated [m].
-_DISTANCES = _geometric(0.3, 60.0, 96)
+_DISTANCES = _geometric_sequence(0.3, 60.0, 96)
 # The aperture of a unit: the radius of a beam at its start [m].
 _APERTURE = 0.004
 # The receiver sees nothing of the beam up to the first distance, and all of it
@@ -95,7 +96,7 @@ class Weather:
         if self.visibility is not None:
             fog = math.log(20.0) / self.visibility
         return fog + sum(
-            _extinction(number) for number, _ in self.drops(_DIAMETERS_MM)
+            _extinction_of(number) for number, _ in self.drops(_DIAMETERS_MM)
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
@@ -124,7 +125,11 @@ class Weather:
         return kinds
 
 
-def _extinction(number: np.ndarray) -> float:
+def _extinction_of(number: np.ndarray) -> float:
+    """Returns the extinction coefficient of drops or flakes [1/m].
+
+    `number` is their number density at the diameters `_DIAMETERS_MM`.
+    """
     area_mm2 = np.pi / 4.0 * _DIAMETERS_MM**2
     return 2e-6 * float(np.trapezoid(number * area_mm2, _DIAMETERS_MM))
 
@@ -155,6 +160,7 @@ class Scattering(NamedTuple):
     fog_counts: np.ndarray
 
 
+# Probabilities of the quantiles of energies.
 _QUANTILES = (np.arange(16) + 0.5) / 16
 
 
@@ -213,14 +219,14 @@ def tabulate_scattering(
     return Scattering(
         distances,
         cumulative_trapezoid(rate, distances, initial=0.0),
-        _quantiles(energies, weights),
+        _weighted_quantiles(energies, weights),
         fog_energies,
         fog_counts / max(fog_counts[-1], 1e-300),
     )
 
 
-def _quantiles(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Returns weighted quantiles of each row."""
+def _weighted_quantiles(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Returns the quantiles `_QUANTILES` of each row of weighted values."""
     result = np.zeros((len(values), len(_QUANTILES)))
     for row, (value, weight) in enumerate(zip(values, weights, strict=True)):
         if weight.sum() > 0.0:

@@ -17,8 +17,9 @@ from cns_drake.sensors.lidar.config import (
 )
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
-from cns_drake.sensors.returns.light import Light, texture
+from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
+from cns_drake.sensors.returns.surface_texture import texture
 from cns_drake.sensors.returns.unit_sheets import Response
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].

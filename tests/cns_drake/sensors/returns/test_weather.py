@@ -12,7 +12,7 @@ from cns_drake.sensors.returns.random_numbers import frame_key, normal, uniform
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 from cns_drake.sensors.returns.weather import (
     Weather,
-    _quantiles,
+    _weighted_quantiles,
     tabulate_scattering,
 )
 
@@ -127,12 +127,12 @@ def test_fog_sends_back_less_with_the_square_of_the_distance():
     np.testing.assert_allclose(table.fog_energies, expected)
 
 
-def test_quantiles_are_those_of_the_weight():
+def test_weighted_quantiles_are_those_of_the_weight():
     values = np.random.default_rng(2).permutation(3200)
     # Those from 1600 on weigh nothing.
-    found = _quantiles(values[None], (values[None] < 1600) * 0.5)
+    found = _weighted_quantiles(values[None], (values[None] < 1600) * 0.5)
     np.testing.assert_array_equal(found, [np.arange(49, 1600, 100)])
-    assert not _quantiles(values[None], np.zeros((1, 3200))).any()
+    assert not _weighted_quantiles(values[None], np.zeros((1, 3200))).any()
 
 
 @pytest.mark.parametrize(
