@@ -10,6 +10,7 @@ import warnings
 from pydrake import geometry
 from pydrake.geometry import FrameId, GeometryId, Rgba, Role, SceneGraph
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
@@ -152,33 +153,11 @@ def add_lidar(
             f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
             "preset"
         )
-    if returns != "ideal":
-        from cns_drake.sensors.returns.calibrated import CalibratedReturns
-
-        if returns == "calibrated" and preset is not None:
-            returns = CalibratedReturns.of_preset(
-                preset, seed=seed, sensor_name=name
-            )
-        elif seed and isinstance(returns, CalibratedReturns):
-            raise ValueError(
-                "seed: CalibratedReturns has its own; leave it out"
-            )
-        if not isinstance(returns, CalibratedReturns):
-            raise ValueError(
-                f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
-                "name of a preset as pattern, or CalibratedReturns"
-            )
-        if preset is not None:
-            pattern = returns.sheet.aimed(pattern)
-        if (
-            range_noise
-            or dropout
-            or (measurement is not None and measurement.is_random)
-        ):
-            raise ValueError(
-                "range_noise, dropout, measurement: calibrated returns have "
-                "noise of their own; leave these out"
-            )
+    model = _returns_model(returns, preset, seed, name)
+    if model is not None and preset is not None:
+        pattern = model.sheet.aimed(pattern)
+    if model is not None:
+        _check_no_noise(measurement, range_noise, dropout)
     elif range_noise or dropout or seed:
         if measurement is not None:
             raise ValueError(
@@ -191,30 +170,16 @@ def add_lidar(
             sensor_name=name,
         )
     measurement = _with_name(measurement or IDEAL, name)
-    model = None if isinstance(returns, str) else _with_name(returns, name)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
-        source = plant.get_source_id()
-        inspector = scene_graph.model_inspector()
-        if source is None or not inspector.SourceIsRegistered(source):
-            raise RuntimeError(
-                "body: its plant is not registered with this SceneGraph; make "
-                "both by AddMultibodyPlantSceneGraph, or call "
-                "plant.RegisterAsSourceForSceneGraph(scene_graph)"
-            )
+        _check_registered(plant, scene_graph)
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())
         if unseen is None:
             unseen = _welded_to(body)
         if anchored_frames is None:
             anchored_frames = perception_geometry.anchored_frames(plant)
         if motion_distortion:
-            frames = map(
-                plant.GetBodyFrameIdIfExists,
-                map(BodyIndex, range(plant.num_bodies())),
-            )
-            moving_bodies = {
-                frame: k for k, frame in enumerate(frames) if frame is not None
-            }
+            moving_bodies = _body_frames(plant)
     else:
         frame_id = body
         if motion_distortion:
@@ -222,14 +187,6 @@ def add_lidar(
                 "motion distortion needs a body of a plant, which has its "
                 "velocity; a frame of another source does not"
             )
-    if unseen is not None:
-        bodies = [p.body() if isinstance(p, Frame) else p for p in unseen]
-        unseen = [
-            place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
-            if isinstance(place, RigidBody)
-            else place
-            for place in bodies
-        ]
     lidar = builder.AddNamedSystem(
         name,
         Lidar(
@@ -240,7 +197,7 @@ def add_lidar(
             returns=model,
             moving_bodies=moving_bodies,
             role=role,
-            unseen=unseen,
+            unseen=None if unseen is None else [*map(_unseen_id, unseen)],
             structures=structures,
             anchored_frames=anchored_frames or (),
             num_threads=num_threads,
@@ -387,6 +344,53 @@ def connect_lidar(
     builder.Connect(listed, lidar.GetInputPort("geometry"))
 
 
+def _returns_model(
+    returns: CalibratedReturns | str, preset: str | None, seed: int, name: str
+) -> CalibratedReturns | None:
+    """Returns the model of calibrated returns, None for ideal returns.
+
+    The arguments are those of `add_lidar`; `preset` is None for a pattern that
+    is not given by the name of a preset.
+
+    Raises:
+        ValueError: calibrated returns need a preset, or the seed is given
+            twice.
+    """
+    if returns == "ideal":
+        return None
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+    if returns == "calibrated" and preset is not None:
+        return CalibratedReturns.of_preset(preset, seed=seed, sensor_name=name)
+    if not isinstance(returns, CalibratedReturns):
+        raise ValueError(
+            f"returns: {returns!r}: give 'ideal', 'calibrated' with the "
+            "name of a preset as pattern, or CalibratedReturns"
+        )
+    if seed:
+        raise ValueError("seed: CalibratedReturns has its own; leave it out")
+    return _with_name(returns, name)
+
+
+def _check_no_noise(
+    measurement: MeasurementModel | None, range_noise: float, dropout: float
+) -> None:
+    """Checks that a LiDAR with calibrated returns gets no other noise.
+
+    Raises:
+        ValueError: one of the arguments adds noise.
+    """
+    if (
+        range_noise
+        or dropout
+        or (measurement is not None and measurement.is_random)
+    ):
+        raise ValueError(
+            "range_noise, dropout, measurement: calibrated returns have "
+            "noise of their own; leave these out"
+        )
+
+
 _Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")
 
 
@@ -395,8 +399,47 @@ def _with_name(model: _Model, name: str) -> _Model:
     return model if model.sensor_name else replace(model, sensor_name=name)
 
 
+def _check_registered(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
+    """Checks that a plant is registered with a SceneGraph.
+
+    Raises:
+        RuntimeError: the plant is not registered with this SceneGraph.
+    """
+    source = plant.get_source_id()
+    inspector = scene_graph.model_inspector()
+    if source is None or not inspector.SourceIsRegistered(source):
+        raise RuntimeError(
+            "body: its plant is not registered with this SceneGraph; make "
+            "both by AddMultibodyPlantSceneGraph, or call "
+            "plant.RegisterAsSourceForSceneGraph(scene_graph)"
+        )
+
+
+def _body_frames(plant: MultibodyPlant) -> dict[FrameId, int]:
+    """Returns frame -> index of its body, for all bodies with a frame."""
+    frames = map(
+        plant.GetBodyFrameIdIfExists,
+        map(BodyIndex, range(plant.num_bodies())),
+    )
+    return {frame: k for k, frame in enumerate(frames) if frame is not None}
+
+
+def _unseen_id(
+    place: RigidBody | Frame | FrameId | GeometryId,
+) -> FrameId | GeometryId:
+    """Returns the id of a body or of a frame's body; other ids as they are."""
+    if isinstance(place, Frame):
+        place = place.body()
+    if isinstance(place, RigidBody):
+        return place.GetParentPlant().GetBodyFrameIdOrThrow(place.index())
+    return place
+
+
 def _welded_to(body: RigidBody) -> list[RigidBody]:
-    """Returns a body and all bodies welded to it, not through the world."""
+    """Returns a body and all bodies that are welded to it.
+
+    Bodies that are connected only through the world do not count.
+    """
     plant = body.GetParentPlant()
     world = plant.world_body().index()
     neighbours: dict[int, list[RigidBody]] = {}
