@@ -19,7 +19,7 @@ from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.returns.calibrated import CalibratedReturns
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import LAMBERT, Materials
-from cns_drake.sensors.returns.surface_texture import texture
+from cns_drake.sensors.returns.surface_texture import with_texture
 from cns_drake.sensors.returns.unit_sheets import Response
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].
@@ -225,7 +225,7 @@ def textured(p_WGset, contrast=0.5, **fields):
     )
     every = np.arange(count)
     geometry = np.zeros(count, np.int32)
-    return texture(
+    return with_texture(
         Light(every, np.full(count, 2.0), np.ones(count), geometry),
         every,
         p_WGset + np.array([0.0, 0.0, 2.0]),
