@@ -1,15 +1,4 @@
-"""Groups of geometry as Embree scenes, and rays through them in packets.
-
-Curved shapes are not tessellated: Embree intersects spheres, cones, discs and
-rounded segments exactly (in float32), and an ellipsoid is an instance of the
-unit sphere. A curved shape in a scene slows down all rays of the scene by a
-third (measured), even rays that hit only triangles. Curved shapes that never
-move are therefore in a second hierarchy. The first hierarchy contains polyhedra
-around these shapes; only the few rays that hit a polyhedron are cast on the
-second hierarchy. Curved shapes that move are in the first hierarchy themselves,
-as instances, which few rays enter. Embree loses rays along the axis of a
-rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
-"""
+"""Groups of geometry in an Embree hierarchy, and packets of rays cast on it."""
 
 from __future__ import annotations
 
@@ -25,23 +14,13 @@ from pydrake.math import RotationMatrix
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.curved_shapes import CapsuleAxes, NearCurvedShapes
 from cns_drake.ray_casting.embree_primitives import (
-    CURVED,
-    FLAT,
-    PROXY,
-    PROXY_OWNER,
+    ALL,
     Primitives,
-    merge_first,
-    merge_second,
 )
 from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
-
-SOLID = FLAT | CURVED
-ALL = SOLID | PROXY
-
 
 # Embree treats smaller direction components as positive, whatever their sign. A
 # packet that mixes such rays with truly positive ones loses hits.
@@ -294,93 +273,6 @@ class EmbreeHierarchy:
         self._lib.rtcAttachGeometry(self._top, handle)
         self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
         return handle
-
-
-class EmbreeScene:
-    """Casts rays on groups of geometry with Embree.
-
-    It is a part of `cns_drake.ray_casting.ray_casting_scene.RayCastingScene`.
-    """
-
-    def __init__(
-        self,
-        groups: Sequence[RayGroup],
-        num_threads: int,
-        previous: EmbreeScene | None = None,
-    ):
-        """Builds the scene.
-
-        Args:
-            groups: the groups, already placed (see `RayGroup.place`).
-            num_threads: number of threads that share the rays of a cast.
-            previous: scene from which unchanged groups are reused; None to
-                build all anew.
-
-        Raises:
-            MemoryError: Embree cannot build it.
-        """
-        first, second = None, None
-        if previous is not None:
-            first, second = previous._first, previous._second
-        self._first: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_first, num_threads, first
-        )
-        self._second: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_second, 1, second
-        )
-        self._near = NearCurvedShapes(
-            [groups[row] for row in self._second.rows]
-        )
-        self._axes = CapsuleAxes(groups)
-
-    def place(self, placed: Placed) -> None:
-        """Moves all groups to their current poses."""
-        self._first.place(placed)
-
-    def cast_rays(
-        self, rays: Rays, with_normals: bool, solid: int = SOLID
-    ) -> Hits:
-        """Casts rays on the scene; returns the hits.
-
-        Args:
-            rays: the rays.
-            with_normals: whether to find normals as well.
-            solid: shapes that rays can hit: flat and curved shapes (`SOLID`),
-                or only curved shapes (`CURVED`).
-        """
-        hits = self._first.cast(
-            rays, mask=solid | PROXY, with_normals=with_normals
-        )
-        if self._second.rows:
-            self._cast_again(rays, hits, with_normals, solid)
-        self._axes.cast(rays, hits)
-        return hits
-
-    def _cast_again(
-        self, rays: Rays, hits: Hits, with_normals: bool, solid: int
-    ) -> None:
-        """Updates hits of rays that may meet curved shapes that never move."""
-        is_near = self._near.contain(rays.p_OSset)
-        is_unsure = hits.owner == PROXY_OWNER
-        if is_near.any():  # Origins are taken in turn.
-            is_unsure |= is_near[np.arange(len(is_unsure)) % len(is_near)]
-        again = np.flatnonzero(is_unsure)
-        if len(again):
-            rest = rays.select(again, rays.max_ranges_of(again))
-            in_second = self._second.cast(rest, with_normals=with_normals)
-            # Nearer hits can only be in the other hierarchy.
-            reach = np.minimum(in_second.ranges, rest.max_ranges)
-            in_first = self._first.cast(
-                rest._replace(max_ranges=reach),
-                mask=solid,
-                with_normals=with_normals,
-            )
-            is_first = in_first.owner >= 0
-            for result, first, second in zip(
-                hits, in_first, in_second, strict=True
-            ):
-                second[is_first] = first[is_first]
-                result[again] = second
 
 
 def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import embree
-from cns_drake.ray_casting.curved_shapes import circumscribe
+from cns_drake.ray_casting.curved_proxies import circumscribe
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
@@ -22,10 +22,13 @@ from cns_drake.scene.surfaces import (
     merge_triangles,
 )
 
-# Masks of geometry: triangles, curved shapes, and proxies of these.
+# Masks of geometry: triangles, curved shapes, polyhedra around curved shapes;
+# what rays hit (without these polyhedra), and all.
 FLAT = 1
 CURVED = 2
 PROXY = 4
+SOLID = FLAT | CURVED
+ALL = SOLID | PROXY
 # Owner of the primitives of proxies.
 PROXY_OWNER = -2
 # Longest cones and rounded segments [radii]: longer ones lose hits to single

@@ -9,40 +9,9 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
+from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_groups import Motion, RayGroup
 from cns_drake.scene import surfaces
-
-
-class KnownPoses(NamedTuple):
-    """Poses of M frames F in the world.
-
-    Attributes:
-        rows: frame -> row of its pose. All KnownPoses of a simulation share
-            this mapping.
-        X_WFs: (M, 4, 4) poses.
-    """
-
-    rows: Mapping[FrameId, int]
-    X_WFs: np.ndarray
-
-    def __deepcopy__(self, memo: dict) -> KnownPoses:
-        # A Context is cloned together with this value. It never changes, and
-        # frames cannot be copied.
-        return self
-
-    def find(
-        self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
-    ) -> RigidTransform:
-        """Returns the pose X_WF of a frame F, computed if it is unknown.
-
-        Args:
-            frame: the frame F.
-            calc_X_WF: function that computes X_WF from `frame`.
-        """
-        row = self.rows.get(frame)
-        if row is None:
-            return calc_X_WF(frame)
-        return RigidTransform(self.X_WFs[row])
 
 
 class Ball(NamedTuple):
@@ -86,7 +55,6 @@ class Placed(NamedTuple):
 
 
 NO_MOTIONS: Mapping[FrameId, Motion] = {}
-NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)
 NOTHING_PLACED = Placed.of((), ())
 

@@ -11,9 +11,10 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.embree_hierarchy import SOLID, EmbreeScene
-from cns_drake.ray_casting.embree_primitives import CURVED
+from cns_drake.ray_casting.embree_primitives import CURVED, SOLID
+from cns_drake.ray_casting.embree_scene import EmbreeScene
 from cns_drake.ray_casting.exact_triangles import ExactTriangles
+from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_groups import Motion, group_geometries, serves
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -113,7 +114,7 @@ class RayCastingScene:
         self,
         calc_X_WF: Callable[[FrameId], RigidTransform],
         motions: Mapping[FrameId, Motion] = moving_groups.NO_MOTIONS,
-        known: moving_groups.KnownPoses = moving_groups.NOTHING_KNOWN,
+        known: KnownPoses = NOTHING_KNOWN,
         seen: moving_groups.Ball = moving_groups.EVERYWHERE,
     ) -> None:
         """Moves the geometry of the frames that are not anchored.

@@ -27,7 +27,7 @@ _MOST_STEPS = 129
 _MERGED_CUBE = 2000.0
 # Side of the cubes for other scenes, which are quick to rebuild [m].
 _MOVING_CUBE = 256.0
-# A member of a scene: index of a geometry, its pose, its surface.
+# A member of a group: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, surfaces.Surface]
 
 
@@ -189,6 +189,43 @@ def group_geometries(
     """
     geometries = list(geometries)
     shared = _find_shared(geometries)
+    by_frame, half_spaces = _members_by_frame(
+        geometries, anchored_frames, calc_X_WF
+    )
+    world = by_frame.pop(None, [])
+    p_WO = _choose_origin(world, p_WS)
+    groups, alone = [], []
+    for frame_id, members in [(None, world), *by_frame.items()]:
+        # Coordinates are relative to O before they are rounded to float32,
+        # and relative to F where F moves.
+        shift = p_WO if frame_id is None else np.zeros(3)
+        X_FL, X_LF = RigidTransform(shift), RigidTransform(-shift)
+        merged: list[Member] = []
+        for index, X_FG, surface in members:
+            own = _group_of_one(frame_id, (index, X_FG, surface), shared)
+            if own is None:
+                merged.append((index, X_LF @ X_FG, surface))
+            else:
+                alone.append(own)
+        if merged:
+            groups.append(
+                RayGroup(
+                    frame_id, X_FL.GetAsMatrix4(), merged, frame_id is None
+                )
+            )
+    return p_WO, groups + alone + half_spaces
+
+
+def _members_by_frame(
+    geometries: Iterable[tuple[int, PerceptionGeometry]],
+    anchored_frames: Collection[FrameId],
+    calc_X_WF: Callable[[FrameId], RigidTransform],
+) -> tuple[dict[FrameId | None, list[Member]], list[RayGroup]]:
+    """Returns the members of each frame F, and the groups of half spaces.
+
+    Members are expressed in F; F is None for the world, to which the geometry
+    of anchored frames belongs.
+    """
     by_frame: dict[FrameId | None, list[Member]] = {}
     half_spaces = []
     for index, geometry in geometries:
@@ -203,52 +240,55 @@ def group_geometries(
         by_frame.setdefault(frame_id, []).append(
             (index, X_FG, geometry.surface)
         )
+    return by_frame, half_spaces
 
+
+def _choose_origin(
+    world: Sequence[Member], p_WS: np.ndarray | None
+) -> np.ndarray:
+    """Returns p_WO, (3,) [m]; see `group_geometries`.
+
+    Args:
+        world: the geometry that never moves, expressed in the world.
+        p_WS: (3,) position of the sensor [m]; None if it is not known.
+    """
     p_WO = np.zeros(3)
-    world = by_frame.pop(None, [])
     if world:
         places = np.array([X_WG.translation() for _, X_WG, _ in world])
         p_WO = np.round((places.min(axis=0) + places.max(axis=0)) / 2.0)
     if p_WS is not None:
         cube = _MERGED_CUBE if world else _MOVING_CUBE
         p_WO += cube * np.round((p_WS - p_WO) / cube)
+    return p_WO
 
-    groups, alone = [], []
-    for frame_id, members in [(None, world), *by_frame.items()]:
-        # Coordinates are relative to O before they are rounded to float32,
-        # and relative to F where F moves.
-        shift = p_WO if frame_id is None else np.zeros(3)
-        X_FL, X_LF = RigidTransform(shift), RigidTransform(-shift)
-        rest = []
-        for index, X_FG, surface in members:
-            if id(surface) in shared:
-                alone.append(
-                    RayGroup(
-                        frame_id,
-                        X_FG.GetAsMatrix4(),
-                        [(index, RigidTransform(), surface)],
-                    )
-                )
-            elif (
-                isinstance(surface, surfaces.EllipsoidSurface)
-                and not surface.is_sphere
-            ):
-                stretch = np.diag([*surface.semi_axes, 1.0])
-                unit_sphere = surfaces.EllipsoidSurface((1.0, 1.0, 1.0))
-                alone.append(
-                    RayGroup(
-                        frame_id,
-                        X_FG.GetAsMatrix4() @ stretch,
-                        [(index, RigidTransform(), unit_sphere)],
-                    )
-                )
-            else:
-                rest.append((index, X_LF @ X_FG, surface))
-        if rest:
-            groups.append(
-                RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
-            )
-    return p_WO, groups + alone + half_spaces
+
+def _group_of_one(
+    frame_id: FrameId | None, member: Member, shared: Collection[int]
+) -> RayGroup | None:
+    """Returns the group of a geometry that is merged with no other geometry.
+
+    Such a geometry is a copy of a shared surface, or an ellipsoid. The result
+    is None for all other geometry.
+
+    Args:
+        frame_id: the frame F of the geometry; None for the world.
+        member: the geometry, expressed in F.
+        shared: the `id` of each surface that is stored once for all copies.
+    """
+    index, X_FG, surface = member
+    if id(surface) in shared:
+        return RayGroup(
+            frame_id, X_FG.GetAsMatrix4(), [(index, RigidTransform(), surface)]
+        )
+    if isinstance(surface, surfaces.EllipsoidSurface) and not surface.is_sphere:
+        stretch = np.diag([*surface.semi_axes, 1.0])
+        unit_sphere = surfaces.EllipsoidSurface((1.0, 1.0, 1.0))
+        return RayGroup(
+            frame_id,
+            X_FG.GetAsMatrix4() @ stretch,
+            [(index, RigidTransform(), unit_sphere)],
+        )
+    return None
 
 
 def serves(

@@ -10,7 +10,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.ray_casting.known_poses import KnownPoses
 from cns_drake.traffic.traffic_motion import (
     TrafficMotion,
 )

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.elementary import cos, product, sin
 from cns_drake.base.errors import InputError
-from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.ray_casting.known_poses import KnownPoses
 from cns_drake.recording.object_messages import RecordedObjects
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import StructureEntry, StructureTable

@@ -23,6 +23,7 @@ from pydrake.systems.framework import (
 
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import moving_groups
+from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.sensors.lidar.beams import BeamPattern
@@ -441,9 +442,9 @@ class Lidar(LeafSystem):
             self._calc_pose(context).translation(),
         )
 
-    def _known_poses(self, context: Context) -> moving_groups.KnownPoses:
+    def _known_poses(self, context: Context) -> KnownPoses:
         known = _optional_value(self._frame_poses, context)
-        return moving_groups.NOTHING_KNOWN if known is None else known
+        return NOTHING_KNOWN if known is None else known
 
     def _calc_ball(self, context: Context) -> moving_groups.Ball:
         """Returns the ball in which beams can meet geometry.

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.progress import doing
 from cns_drake.ray_casting import moving_groups
+from cns_drake.ray_casting.known_poses import KnownPoses
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.geometry_list import GeometryList, list_geometry
@@ -97,7 +98,7 @@ class SeenGeometry:
         query_object: QueryObject,
         records: GeometryList | None,
         motions: Mapping[FrameId, Motion],
-        known: moving_groups.KnownPoses,
+        known: KnownPoses,
         seen: moving_groups.Ball,
         p_WS: np.ndarray,
     ) -> None:

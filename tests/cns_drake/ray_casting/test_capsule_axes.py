@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.ray_casting.known_poses import KnownPoses
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
 from cns_drake.scene.perception_geometry import PerceptionGeometry

@@ -7,7 +7,7 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.curved_shapes import NearCurvedShapes, circumscribe
+from cns_drake.ray_casting.curved_proxies import NearCurvedShapes, circumscribe
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene.surfaces import (

@@ -5,7 +5,8 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.moving_groups import Ball, KnownPoses, MovingGroups
+from cns_drake.ray_casting.known_poses import KnownPoses
+from cns_drake.ray_casting.moving_groups import Ball, MovingGroups
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion, group_geometries
 from cns_drake.scene.perception_geometry import PerceptionGeometry

@@ -14,7 +14,7 @@ from pydrake.systems.framework import LeafSystem
 import pytest
 
 import cns_drake
-from cns_drake.ray_casting.moving_groups import KnownPoses
+from cns_drake.ray_casting.known_poses import KnownPoses
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 
