@@ -123,8 +123,8 @@ class BagWriter:
         # message of all [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
-        # False while a record is being written. If an interrupt comes then, the
-        # writer's index does not describe the file and must not be used.
+        # Whether the writer's index describes the file. It is False while a record
+        # is being written, and stays False if an error interrupts the writing.
         self._intact = False
 
     def __enter__(self) -> BagWriter:
@@ -142,7 +142,9 @@ class BagWriter:
             self._stream = self._open_part()
         try:
             with self._writing():
-                self._chunks, self._channel_ids = self._begin(self._stream)
+                self._chunks, self._channel_ids = self._write_preamble(
+                    self._stream
+                )
         except BaseException:
             self._close_part()
             raise
@@ -162,9 +164,9 @@ class BagWriter:
             return
         try:
             with self._writing():
-                self._end()
+                self._write_ending()
                 self._stream.finish()
-            self._publish()
+            self._rename_files()
         finally:
             self._close_stream()
 
@@ -248,7 +250,7 @@ class BagWriter:
     def _open_part(self) -> PartFile:
         """Opens the part file, empty or with messages to take over."""
         preamble = io.BytesIO()
-        self._begin(preamble)
+        self._write_preamble(preamble)
         if (
             self._files.mcap.is_file()
             and not self._files.is_finished()
@@ -256,13 +258,13 @@ class BagWriter:
         ):
             # The earlier run was interrupted while it renamed the files.
             with contextlib.closing(PartFile(self._files.mcap)) as stream:
-                if self._goes_on(stream, preamble):
+                if self._continues(stream, preamble):
                     os.replace(self._files.mcap, self._part)
                 else:
                     self._refuse_other_recording()
         stream = PartFile(self._part)
         try:
-            if not self._goes_on(stream, preamble):
+            if not self._continues(stream, preamble):
                 self._refuse_other_recording()
                 stream.clear()
             if self._fingerprint:
@@ -272,8 +274,8 @@ class BagWriter:
             raise
         return stream
 
-    def _goes_on(self, stream: PartFile, preamble: io.BytesIO) -> bool:
-        """Returns whether the existing file is the start of this recording."""
+    def _continues(self, stream: PartFile, preamble: io.BytesIO) -> bool:
+        """Returns whether an existing file is the start of this recording."""
         if not stream.replaying:
             return True
         found = ""
@@ -294,7 +296,7 @@ class BagWriter:
                 "(--overwrite discards it)"
             )
 
-    def _begin(
+    def _write_preamble(
         self, stream: io.BytesIO | PartFile
     ) -> tuple[TopicChunks, dict[str, int]]:
         """Writes the records before the messages.
@@ -307,7 +309,7 @@ class BagWriter:
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
             start_ns = self._start_ns
-            kind, content = _encode(name, value)
+            kind, content = _encode_attachment(name, value)
             writer.add_attachment(start_ns, start_ns, name, kind, content)
         schema_ids: dict[str, int] = {}
         for topic in self._topics:
@@ -327,14 +329,14 @@ class BagWriter:
         writer.flush()
         return chunks, channel_ids
 
-    def _end(self) -> None:
+    def _write_ending(self) -> None:
         self._chunks.writer.add_metadata(
             "rosbag2", {"serialized_metadata": to_yaml(self._bag_information())}
         )
         self._chunks.finish({v: k for k, v in self._channel_ids.items()})
         self._stream.flush()
 
-    def _publish(self) -> None:
+    def _rename_files(self) -> None:
         """Gives the finished files their final names, `metadata.yaml` last.
 
         All files are whole under their `.part` names before the first is
@@ -364,7 +366,7 @@ class BagWriter:
         with contextlib.suppress(InputError):
             if self._intact and not self._stream.replaying:
                 with self._writing():
-                    self._end()
+                    self._write_ending()
         self._close_stream()
 
     def _close_stream(self) -> None:
@@ -375,6 +377,7 @@ class BagWriter:
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
+        """Sets `_intact` to False until the context ends without an error."""
         self._intact = False
         with user_errors(self._part):
             yield
@@ -401,7 +404,7 @@ class BagWriter:
         )
 
 
-def _encode(name: str, value: Any) -> tuple[str, bytes]:
+def _encode_attachment(name: str, value: Any) -> tuple[str, bytes]:
     """Returns the media type and the content of an attachment."""
     if name.endswith(".yaml"):
         return "application/yaml", to_yaml(value).encode()

@@ -43,6 +43,7 @@ from cns_drake.recording.recorded_topics import (
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.scene.drake_ports import optional_value
 
 _IMAGES = {"color": ImageRgba8U, "depth": ImageDepth32F, "label": ImageLabel16I}
 
@@ -237,28 +238,28 @@ class McapRecorder(LeafSystem):
             for name, X in X_BCs.items()
             if X is not None
         }
-        # Child frame of the map -> the port of a frame's pose, and the child's
-        # pose in that frame. Several children may share a port.
+        # Frame C that moves in the map -> the port with the pose of a frame P,
+        # and the pose X_PC. Several frames may share a port.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
         # A topic, and a function that makes all messages that are due with it.
         self._streams: list[
             tuple[Topic, Callable[[Context, int], dict[Topic, Any]]]
         ] = []
-        # The tick of the last event; there was none so far.
+        # The tick of the last event; None before the first event.
         self._last_tick: int | None = None
 
         # The following lines determine the order of the ports.
-        self._odometry = self._declare("odometry", object())
+        self._odometry = self._declare_port("odometry", object())
         self._imu_samples: InputPort | None = None
         if with_imu_samples:
-            self._imu_samples = self._declare("imu_samples", object())
+            self._imu_samples = self._declare_port("imu_samples", object())
         else:
             self._specific_force, self._angular_velocity = (
                 self.DeclareVectorInputPort(name, 3)
                 for name in ("specific_force", "angular_velocity")
             )
         if with_objects:
-            self._add_objects()
+            self._add_objects_port()
         for name in X_BSs:
             convert = functools.partial(
                 to_layout,
@@ -266,29 +267,38 @@ class McapRecorder(LeafSystem):
                 num_rings=(num_rings or {}).get(name),
                 is_calibrated=name in calibrated,
             )
-            self._add_lidar(name, convert)
+            self._add_scan_port(name, convert)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
-                self._poses[name] = self._declare_pose(name), RigidTransform()
+                self._poses[name] = (
+                    self._declare_pose_port(name),
+                    RigidTransform(),
+                )
         for name, camera in cameras.items():
-            self._add_camera(name, camera)
-            port = self._declare_pose(name)
+            self._add_image_ports(name, camera)
+            port = self._declare_pose_port(name)
             self._poses[name] = port, camera.X_BC
             if camera.depth is not None:
                 self._poses[depth_frame(name)] = port, camera.depth.X_BC
         for name, sensor in further.items():
-            self._add_sensor(name, sensor)
+            self._add_sensor_port(name, sensor)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self._declare_events()
 
-    def _declare(self, name: str, example: object) -> InputPort:
-        """Declares an abstract port of the value's type; object means any."""
+    def _declare_port(self, name: str, example: object) -> InputPort:
+        """Declares an abstract port for values of the type of the example.
+
+        For an `object` as the example, values can have any type.
+
+        Raises:
+            ValueError: there is a port with this name.
+        """
         if self.HasInputPort(name):
             raise ValueError(f"name: two sensors would have the port '{name}'")
         return self.DeclareAbstractInputPort(name, Value(example))
 
-    def _declare_pose(self, name: str) -> InputPort:
-        return self._declare(f"{name}_pose", RigidTransform())
+    def _declare_pose_port(self, name: str) -> InputPort:
+        return self._declare_port(f"{name}_pose", RigidTransform())
 
     def _add_port(
         self,
@@ -297,16 +307,26 @@ class McapRecorder(LeafSystem):
         make: Callable[[Any, int], dict],
         example: object = None,
     ) -> None:
-        """Declares a port; `make` takes its value and the time [ns]."""
-        port = self._declare(name, object() if example is None else example)
+        """Declares a port whose values are recorded.
+
+        Args:
+            name: name of the port.
+            topic: the topic that is due when messages are made.
+            make: function that returns topic -> message, given the value of the
+                port and the time [ns].
+            example: a value of the port's type; None for any Python object.
+        """
+        port = self._declare_port(
+            name, object() if example is None else example
+        )
 
         def make_all(context: Context, stamp_ns: int) -> dict[Topic, Any]:
-            value = _value_of(port, context)
+            value = optional_value(port, context)
             return {} if value is None else make(value, stamp_ns)
 
         self._streams.append((topic, make_all))
 
-    def _add_objects(self) -> None:
+    def _add_objects_port(self) -> None:
         detections = object_messages.BoxMessages(
             object_messages.marked_detections
         )
@@ -324,7 +344,7 @@ class McapRecorder(LeafSystem):
 
         self._add_port("objects", recorded_topics.OBJECTS_TOPIC, make)
 
-    def _add_lidar(
+    def _add_scan_port(
         self, name: str, convert: Callable[[np.ndarray], np.ndarray]
     ) -> None:
         topic = recorded_topics.points_topic(name)
@@ -340,7 +360,7 @@ class McapRecorder(LeafSystem):
 
         self._add_port(f"{name}_scan", topic, make)
 
-    def _add_sensor(self, name: str, sensor: RecordedSensor) -> None:
+    def _add_sensor_port(self, name: str, sensor: RecordedSensor) -> None:
         self._add_port(
             name,
             sensor.topic,
@@ -352,7 +372,7 @@ class McapRecorder(LeafSystem):
             sensor.example,
         )
 
-    def _add_camera(self, name: str, camera: RecordedCamera) -> None:
+    def _add_image_ports(self, name: str, camera: RecordedCamera) -> None:
         def make(kind: str, image: Any, stamp_ns: int) -> dict:
             info, frame = camera.info, name
             info_topic = recorded_topics.camera_info_topic(name)
@@ -379,7 +399,7 @@ class McapRecorder(LeafSystem):
         self.DeclarePeriodicPublishEvent(
             period_sec=float(self._schedule.tick * step),
             offset_sec=0.0,
-            publish=self._publish,
+            publish=self._write_due_messages,
         )
         end = self._schedule.ends.get(IMU_TOPIC.name, 0)
         if waits and end % step:
@@ -387,10 +407,10 @@ class McapRecorder(LeafSystem):
             self.DeclarePeriodicPublishEvent(
                 period_sec=end * self._schedule.period,
                 offset_sec=end * self._schedule.period,
-                publish=self._publish,
+                publish=self._write_due_messages,
             )
 
-    def _publish(self, context: Context) -> EventStatus:
+    def _write_due_messages(self, context: Context) -> EventStatus:
         # The event's time differs from a tick's only by rounding.
         tick = round(context.get_time() / self._schedule.period)
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
@@ -404,7 +424,7 @@ class McapRecorder(LeafSystem):
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._motion_messages(context, stamp_ns)
         if self._imu_samples is not None:
-            outgoing |= self._write_samples(context, tick)
+            outgoing |= self._write_imu_samples(context, tick)
         elif IMU_TOPIC.name in due:
             outgoing |= self._imu_message(context, stamp_ns)
         self._last_tick = tick
@@ -421,7 +441,7 @@ class McapRecorder(LeafSystem):
         self, context: Context, stamp_ns: int
     ) -> dict[Topic, Any]:
         """Returns the messages of odometry and transforms."""
-        odometry = _value_of(self._odometry, context)
+        odometry = optional_value(self._odometry, context)
         X_WCs, made = {}, {}
         if odometry is not None:
             X_WCs[BASE_FRAME] = odometry.X_WB
@@ -429,8 +449,9 @@ class McapRecorder(LeafSystem):
                 odometry.X_WB, odometry.V_WB_B, stamp_ns
             )
         for name, (port, X_PC) in self._poses.items():
-            if port.HasValue(context):
-                X_WCs[name] = port.Eval(context) @ X_PC
+            X_WP = optional_value(port, context)
+            if X_WP is not None:
+                X_WCs[name] = X_WP @ X_PC
         if X_WCs:
             tf = messages.make_tf(MAP_FRAME, X_WCs, stamp_ns)
             return {TF_TOPIC: tf, **made}
@@ -438,11 +459,11 @@ class McapRecorder(LeafSystem):
 
     def _imu_message(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
         """Returns the message of the ports with the present sample, if any."""
-        turn = _value_of(self._angular_velocity, context)
-        force = _value_of(self._specific_force, context)
+        turn = optional_value(self._angular_velocity, context)
+        force = optional_value(self._specific_force, context)
         if turn is None and force is None:
             return {}
-        odometry = _value_of(self._odometry, context)
+        odometry = optional_value(self._odometry, context)
         quat_xyzw = None
         if odometry is not None and self._X_BI is not None:
             R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
@@ -452,7 +473,9 @@ class McapRecorder(LeafSystem):
         )
         return {IMU_TOPIC: message}
 
-    def _write_samples(self, context: Context, tick: int) -> dict[Topic, Any]:
+    def _write_imu_samples(
+        self, context: Context, tick: int
+    ) -> dict[Topic, Any]:
         """Writes samples of earlier ticks; returns the message of this one.
 
         Raises:
@@ -463,7 +486,7 @@ class McapRecorder(LeafSystem):
         since = tick - 1 if self._last_tick is None else self._last_tick
         numbers = range(since // step + 1, last // step + 1)
         assert self._imu_samples is not None
-        samples = _value_of(self._imu_samples, context)
+        samples = optional_value(self._imu_samples, context)
         if samples is None or not numbers:
             return {}
         if numbers[0] < samples.first:
@@ -491,11 +514,6 @@ class McapRecorder(LeafSystem):
         if not isinstance(message, bytes):
             message = ros_types.serialize(message)
         self._bag.write(topic.name, stamp_ns, message, sequence)
-
-
-def _value_of(port: InputPort, context: Context) -> Any:
-    """Returns the value of a port; None if it is not connected."""
-    return port.Eval(context) if port.HasValue(context) else None
 
 
 def _warn_of_early_start(context: Context) -> EventStatus:

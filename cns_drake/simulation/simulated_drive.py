@@ -98,9 +98,9 @@ class SimulatedDrive(Drive):
         # The station would compute the vehicle's motion and its wheels; here
         # the motion is known beforehand.
         self._base = drive.base_link.index()
-        poses = self._diagram.GetSubsystemByName("frame_poses")
-        context = poses.GetMyMutableContextFromRoot(self._context)
-        port = poses.GetInputPort("body_poses")
+        frame_poses = self._diagram.GetSubsystemByName("frame_poses")
+        context = frame_poses.GetMyMutableContextFromRoot(self._context)
+        port = frame_poses.GetInputPort("body_poses")
         self._X_WBodies = list(port.Eval(context))
         self._fixed_poses = port.FixValue(
             context, AbstractValue.Make(self._X_WBodies)

@@ -150,7 +150,9 @@ def simulate(
         resumed_frames = 0
         with _make_bag(drive, inputs, folder, overwrite=overwrite) as bag:
             if page is None:
-                resumed_frames = _resume(bag, drive, on_frame, on_note)
+                resumed_frames = _keep_finished_frames(
+                    bag, drive, on_frame, on_note
+                )
 
             def report_frames(done: int) -> None:
                 strike()
@@ -169,7 +171,7 @@ def simulate(
                 write_text(graphviz_file, diagram.GetGraphvizString())
             strike()
             loaded = time.perf_counter()
-            simulated_s = _advance(
+            simulated_s = _simulate_frames(
                 diagram, writer, drive, resumed_frames, report_frames
             )
             doing("closing the recording")
@@ -265,13 +267,13 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
     )
 
 
-def _resume(
+def _keep_finished_frames(
     bag: BagWriter,
     drive: LoadedDrive,
     on_frame: ProgressCallback,
     on_note: NoteCallback,
 ) -> int:
-    """Keeps the frames of an interrupted run; returns their number."""
+    """Keeps the frames of an interrupted run, and returns their number."""
     if not bag.follows_interruption():
         return 0
     name, num_frames = drive.scenario.name, drive.num_frames
@@ -314,7 +316,7 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     )
 
 
-def _advance(
+def _simulate_frames(
     diagram: Diagram,
     writer: BackgroundWriter,
     drive: LoadedDrive,
@@ -324,7 +326,7 @@ def _advance(
     """Simulates frames and writes their messages.
 
     Returns:
-        Simulated time from the first of them to the last [s].
+        Simulated time from the first to the last of these frames [s].
     """
     if first >= drive.num_frames:
         return 0.0

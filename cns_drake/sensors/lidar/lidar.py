@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 import operator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -26,6 +26,7 @@ from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import Motion
+from cns_drake.scene.drake_ports import optional_value
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
@@ -435,7 +436,7 @@ class Lidar(LeafSystem):
         """Updates the geometry that the LiDAR sees in a ball."""
         seen.update(
             self._geometry_query.Eval(context),
-            _optional_value(self._geometry, context),
+            optional_value(self._geometry, context),
             self._calc_motions(context),
             self._known_poses(context),
             ball,
@@ -443,7 +444,7 @@ class Lidar(LeafSystem):
         )
 
     def _known_poses(self, context: Context) -> KnownPoses:
-        known = _optional_value(self._frame_poses, context)
+        known = optional_value(self._frame_poses, context)
         return NOTHING_KNOWN if known is None else known
 
     def _calc_ball(self, context: Context) -> moving_groups.Ball:
@@ -484,7 +485,7 @@ class Lidar(LeafSystem):
 
     def _calc_measured(self, context: Context, output: AbstractValue) -> None:
         seen = _eval_seen(self._seen_in_reach, context)
-        moving = _optional_value(self._moving, context)
+        moving = optional_value(self._moving, context)
         labels = seen.label if moving is None else seen.labels(moving)
         revolution = round(context.get_time() / self.pattern.period)
         output.set_value(
@@ -502,7 +503,7 @@ class Lidar(LeafSystem):
 
     def _calc_carrier_pose(self, context: Context) -> RigidTransform:
         """Returns the pose of P at the time of the output."""
-        sweep = _optional_value(self._sweep, context)
+        sweep = optional_value(self._sweep, context)
         if sweep is not None and len(sweep.p_WPset) == 1:
             R_WP = RotationMatrix(sweep.R_WPset[0])
             return RigidTransform(R_WP, sweep.p_WPset[0])
@@ -516,7 +517,7 @@ class Lidar(LeafSystem):
 
         K is the number of columns with motion distortion, otherwise 1.
         """
-        sweep = _optional_value(self._sweep, context)
+        sweep = optional_value(self._sweep, context)
         if sweep is not None:
             sweep = sweep.of_frame(self.X_PB)
             return sweep.p_WPset, sweep.R_WPset
@@ -603,11 +604,6 @@ def _check_unseen(unseen: Collection[FrameId | GeometryId]) -> None:
                 f"unseen: {place!r} is not a FrameId or GeometryId; "
                 "add_lidar also takes a RigidBody or Frame"
             )
-
-
-def _optional_value(port: InputPort, context: Context) -> Any:
-    """Returns the value of a port; None if the port is not connected."""
-    return port.Eval(context) if port.HasValue(context) else None
 
 
 def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:

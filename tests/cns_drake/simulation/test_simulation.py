@@ -15,7 +15,7 @@ from cns_drake.scenarios.scenario_files import (
     load_scenario,
     make_scenario,
 )
-from cns_drake.simulation import loaded_drive, simulation
+from cns_drake.simulation import simulation, stage_loading
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.studies.recording import is_recorded, record_all
@@ -58,9 +58,9 @@ def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
 
     for module, name in (
         (planning, "Trajectory"),
-        (loaded_drive, "load_world"),
+        (stage_loading, "load_world"),
         (simulation, "make_station"),
-        (simulation, "_advance"),
+        (simulation, "_simulate_frames"),
     ):
         work = telling(name, getattr(module, name))
         monkeypatch.setattr(module, name, work)
@@ -77,7 +77,7 @@ def test_each_phase_is_told_before_it_begins(scenario, tmp_path, monkeypatch):
         "parsing vehicle.sdf",
         "building the diagram",
         "make_station",
-        "_advance",
+        "_simulate_frames",
         "reading meshes",
         "preparing the ray casting",
         "simulating",
