@@ -123,8 +123,8 @@ class BagWriter:
         # message of all [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
-        # Whether the writer's index describes the file. It is False while a record
-        # is being written, and stays False if an error interrupts the writing.
+        # Whether the writer's index describes the file: False while a record is
+        # being written, and after an error that interrupted the writing.
         self._intact = False
 
     def __enter__(self) -> BagWriter:
