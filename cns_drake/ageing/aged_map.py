@@ -16,9 +16,10 @@ from cns_drake.ageing.events import Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.years import check_years
+from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import draft_folder, is_there, user_errors
+from cns_drake.base.files import is_there, user_errors
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.generation.stage_sizes import (

@@ -6,8 +6,9 @@ import io
 from pathlib import Path
 import re
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_text, write_text
+from cns_drake.base.files import read_text
 from cns_drake.base.number_text import other_separator
 from cns_drake.base.repetitions import repeated
 

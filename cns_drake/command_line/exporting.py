@@ -460,7 +460,7 @@ def _write_truth(
         json: whether to print the counts of labels as JSON.
     """
     with uninterrupted():
-        from cns_drake.base.files import check_new_folder
+        from cns_drake.base.complete_files import check_new_folder
         from cns_drake.studies.map_truth import open_labelled, write_truth
         from evaluation.map_update.labels import Label
 
@@ -505,8 +505,8 @@ def _write_sessions(
 ) -> None:
     """Writes maps of two drives without labels."""
     with uninterrupted():
+        from cns_drake.base.complete_files import draft_folder
         from cns_drake.base.drives.drive import check_same_world
-        from cns_drake.base.files import draft_folder
         from evaluation.map_update.labels import SIDES
         from evaluation.map_update.sessions import write_session
 

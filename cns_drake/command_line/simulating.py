@@ -239,7 +239,7 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
-        from cns_drake.base.files import check_writable
+        from cns_drake.base.complete_files import check_writable
         from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
         from cns_drake.sensors.lidar.config import (

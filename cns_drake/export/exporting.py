@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 import shutil
 
-from cns_drake.base import files
+from cns_drake.base import complete_files, files
 from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, value_errors
@@ -84,15 +84,15 @@ def export_drive(
         )
     if layout.shared_outer_files:
         _check_shared_files(outer)
-    part = files.part_path(folder)
-    with files.sole_writer(folder):
+    part = complete_files.part_path(folder)
+    with complete_files.sole_writer(folder):
         try:
             for note in _notes(drive, layout):
                 on_note(note)
             _write_drive(drive, layout, part)
             for path, text in outer.items():
                 files.make_folder(path.parent)
-                files.write_text(path, text)
+                complete_files.write_text(path, text)
             with files.user_errors(folder):
                 os.replace(part, folder)
         finally:
@@ -175,7 +175,7 @@ def _claim(output: Path, format_name: str) -> None:
         "format": format_name,
         "files": explained[format_name],
     }
-    files.write_text(marker, to_yaml(values))
+    complete_files.write_text(marker, to_yaml(values))
 
 
 def _write_drive(

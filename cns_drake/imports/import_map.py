@@ -7,8 +7,8 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import draft_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
 from cns_drake.imports import map_files

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
-from cns_drake.base.files import write_text
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.jpeg_images import to_jpeg
 from cns_drake.pictures.drive_page import make_drive_page, moving_frames
 from cns_drake.pictures.drive_record import DriveRecord

@@ -19,10 +19,14 @@ import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cns_drake.base import files
+from cns_drake.base.complete_files import (
+    complete_part,
+    part_path,
+    write_part,
+)
 from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.files import user_errors
 from cns_drake.base.version import __version__
 from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.part_file import PartFile
@@ -268,7 +272,7 @@ class BagWriter:
                 self._refuse_other_recording()
                 stream.clear()
             if self._fingerprint:
-                files.write_part(self._files.fingerprint, self._fingerprint)
+                write_part(self._files.fingerprint, self._fingerprint)
         except BaseException:
             stream.close()
             raise
@@ -345,19 +349,19 @@ class BagWriter:
         """
         own = self._files
         metadata = {"rosbag2_bagfile_information": self._bag_information()}
-        files.write_part(own.scenario, to_yaml(self._scenario))
-        files.write_part(own.metadata, to_yaml(metadata))
+        write_part(own.scenario, to_yaml(self._scenario))
+        write_part(own.metadata, to_yaml(metadata))
         for path, value in self._beside.items():
-            files.write_part(path, to_yaml(value))
+            write_part(path, to_yaml(value))
         with user_errors(own.path):
             own.metadata.unlink(missing_ok=True)
             own.fingerprint.unlink(missing_ok=True)
-        files.complete_part(own.mcap)
+        complete_part(own.mcap)
         for path in (*self._beside, own.scenario):
-            files.complete_part(path)
+            complete_part(path)
         if self._fingerprint:
-            files.complete_part(own.fingerprint)
-        files.complete_part(own.metadata)
+            complete_part(own.fingerprint)
+        complete_part(own.metadata)
 
     def _close_part(self) -> None:
         """Closes an incomplete file, as a valid MCAP file where possible."""

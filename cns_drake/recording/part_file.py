@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import open_plain
+from cns_drake.base.file_locks import open_plain
 
 
 class PartFile(io.BufferedRandom):

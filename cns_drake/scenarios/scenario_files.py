@@ -8,13 +8,14 @@ from typing import Any
 
 import yaml
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.errors import (
     InputError,
     did_you_mean,
     validated,
     value_errors,
 )
-from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.files import make_folder
 from cns_drake.base.terminal import note
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from cns_drake.base.complete_files import check_writable, completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_writable, completing
 from cns_drake.base.jobs.processes import (
     JobError,
     ProcessDiedError,

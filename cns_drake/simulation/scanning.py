@@ -9,8 +9,9 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
+from cns_drake.base.complete_files import completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder
+from cns_drake.base.files import make_folder
 from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.world import World

@@ -9,8 +9,8 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from cns_drake.base.complete_files import check_writable, write_text
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_writable, write_text
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__

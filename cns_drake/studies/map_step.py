@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from cns_drake.base import files
+from cns_drake.base import complete_files, files
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -40,7 +40,7 @@ class MakeMap(Step):
     def run(self, reporter: Reporter) -> None:
         made_of = self.sources()
         if is_older := self.check():
-            files.remove_folder(self.folder)
+            complete_files.remove_folder(self.folder)
         self.make(
             lambda draft: Part(draft / _PART).write(made_of, None), reporter
         )

@@ -32,10 +32,11 @@ from pathlib import Path
 import jinja2
 import numpy as np
 
+from cns_drake.base.complete_files import draft_folder, write_text
 from cns_drake.base.drives.drive import Drive, check_same_world
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, validated
-from cns_drake.base.files import draft_folder, user_errors, write_text
+from cns_drake.base.files import user_errors
 from cns_drake.base.process import num_cores
 from cns_drake.base.progress import track
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene

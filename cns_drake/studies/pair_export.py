@@ -17,8 +17,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.complete_files import completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, make_folder, user_errors
+from cns_drake.base.files import make_folder, user_errors
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter

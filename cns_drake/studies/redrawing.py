@@ -21,7 +21,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.base import files
+from cns_drake.base import complete_files, files
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.jobs.cluster import Cluster
@@ -99,7 +99,7 @@ class RedrawCity(MakeMap):
     seed: int
 
     def make(self, finish: Callable[[Path], None], reporter: Reporter) -> None:
-        with files.draft_folder(self.folder) as draft:
+        with complete_files.draft_folder(self.folder) as draft:
             for name, content in self.inputs().items():
                 (draft / name).write_bytes(content)
             place = f"{self.map_folder}: seed {self.seed}"

@@ -252,7 +252,7 @@ def pr(
         chosen = choice.make()
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
-    from cns_drake.base import files
+    from cns_drake.base import complete_files, files
     from cns_drake.base.errors import InputError
     from evaluation.drives import check_same_world
     from evaluation.drives.drive_views import CountedDrive
@@ -286,7 +286,7 @@ def pr(
         )
     # Checked before the long work.
     if overlaps is not None:
-        files.check_writable(overlaps)
+        complete_files.check_writable(overlaps)
     if exact_overlaps is not None:
         files.check_regular(exact_overlaps)
     if output is not None:

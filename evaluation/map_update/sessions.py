@@ -24,9 +24,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
+from cns_drake.base.complete_files import completing
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing, is_there, user_errors
+from cns_drake.base.files import is_there, user_errors
 from cns_drake.base.listing import listed
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import track

@@ -17,10 +17,11 @@ import numpy as np
 from PIL import Image
 from scipy.spatial import cKDTree
 
+from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import draft_folder, user_errors
+from cns_drake.base.files import user_errors
 from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.base.listing import listed
 from cns_drake.base.points import from_xyz, xyz

@@ -18,8 +18,8 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex, to_rgb
 import numpy as np
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import write_text
 from cns_drake.base.listing import natural_key
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.recognition.costs import Cost

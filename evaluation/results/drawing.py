@@ -14,7 +14,7 @@ from matplotlib.transforms import Bbox, BboxTransformTo, ScaledTranslation
 import numpy as np
 from sklearn.isotonic import isotonic_regression
 
-from cns_drake.base.files import completing
+from cns_drake.base.complete_files import completing
 from evaluation.results.ranges import check_all
 
 # Okabe and Ito's colours, distinct for all kinds of colour vision; line

@@ -11,9 +11,10 @@ from markupsafe import Markup
 from matplotlib.markers import MarkerStyle
 import numpy as np
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder, write_text
+from cns_drake.base.files import make_folder
 from cns_drake.base.version import __version__
 from evaluation.results import charts as drawing
 from evaluation.results.drawing import save

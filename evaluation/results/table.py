@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.csv_files import check_separator, csv_text
 from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.files import read_bytes, write_text
+from cns_drake.base.files import read_bytes
 from cns_drake.base.repetitions import repeated
 from cns_drake.base.terminal import note
 from cns_drake.base.version import __version__

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.csv_files import csv_text
-from cns_drake.base.files import write_text
 from cns_drake.base.yaml_files import read_yaml
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 from evaluation.results.ranges import checked, range_of

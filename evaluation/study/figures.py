@@ -3,7 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from cns_drake.base.files import file_name, make_folder
+from cns_drake.base.file_names import file_name
+from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import doing

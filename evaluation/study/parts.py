@@ -16,13 +16,9 @@ from typing import Any, BinaryIO
 
 import zstandard
 
+from cns_drake.base.complete_files import completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import (
-    check_regular,
-    completing,
-    make_folder,
-    user_errors,
-)
+from cns_drake.base.files import check_regular, make_folder, user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
 from evaluation.study.value_encoding import (

@@ -27,7 +27,7 @@ from types import ModuleType
 
 from cns_drake.base import errors, interrupts
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import exclusive, remove_lock
+from cns_drake.base.file_locks import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.own_packages import leave_out_folder

@@ -64,7 +64,7 @@ class Step(abc.ABC):
 
         After a lost connection, two copies of a step may be running. A lock
         prevents both from writing this output at the same time; see
-        `cns_drake.base.files.exclusive`.
+        `cns_drake.base.file_locks.exclusive`.
         """
 
     @abc.abstractmethod

@@ -4,9 +4,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from cns_drake.base.complete_files import write_text
 from cns_drake.base.csv_files import csv_text
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors, write_text
+from cns_drake.base.files import user_errors
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.renaming import find_renaming, renamed_text

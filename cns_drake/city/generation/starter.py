@@ -16,7 +16,7 @@ from shapely.geometry import box
 from shapely.ops import unary_union
 import yaml
 
-from cns_drake.base.files import complete_part, write_part
+from cns_drake.base.complete_files import complete_part, write_part
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap

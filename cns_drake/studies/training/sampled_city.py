@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cns_drake.base.files import draft_folder
+from cns_drake.base.complete_files import draft_folder
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.generation.starter import start_city

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.files import check_writable, completing, make_folder
+from cns_drake.base.complete_files import check_writable, completing
+from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job, run_jobs

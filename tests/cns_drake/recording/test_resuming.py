@@ -13,7 +13,7 @@ from helpers.bag_recordings import (
 import numpy as np
 import pytest
 
-from cns_drake.base import files
+from cns_drake.base import complete_files
 from cns_drake.base.errors import InputError
 from cns_drake.recording import topic_chunks
 from cns_drake.recording.schedule import frame_stamp_ns
@@ -130,7 +130,7 @@ def test_interrupted_between_the_final_names(
         left[0] -= 1
         replace(*arguments)
 
-    monkeypatch.setattr(files.os, "replace", replace_some)
+    monkeypatch.setattr(complete_files.os, "replace", replace_some)
     if renamed < 3:
         with pytest.raises(KeyboardInterrupt):
             record(folder, overwrite=overwrite)

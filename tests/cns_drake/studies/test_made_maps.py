@@ -11,7 +11,7 @@ from helpers.small_city import write_small_city
 import pytest
 
 from cns_drake.ageing.rates import DEFAULT_RATES
-from cns_drake.base import files
+from cns_drake.base import complete_files
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.step import Reporter
@@ -182,7 +182,7 @@ class MakeFiles(MakeMap):
     version: int
 
     def make(self, finish, reporter):
-        with files.draft_folder(self.folder) as draft:
+        with complete_files.draft_folder(self.folder) as draft:
             for name in ("city.yaml", "roads.yaml", "stage_01.sdf"):
                 (draft / name).write_text(str(self.version))
             finish(draft)

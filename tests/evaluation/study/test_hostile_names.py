@@ -7,7 +7,7 @@ from helpers import studies
 from helpers.small_towns import drive
 import pytest
 
-from cns_drake.base.files import file_name
+from cns_drake.base.file_names import file_name
 from evaluation.results.table_forms import Table
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.collection import MapDrives, RecordingInfo

@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from cns_drake.base.errors import FailedJobsError, InputError
-from cns_drake.base.files import exclusive
+from cns_drake.base.file_locks import exclusive
 from cns_drake.base.jobs import cluster
 from cns_drake.base.jobs.cluster import (
     Cluster,
@@ -427,7 +427,7 @@ def test_two_never_work_on_the_same(tmp_path):
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from cns_drake.base.files import exclusive\n"
+        "from cns_drake.base.file_locks import exclusive\n"
         "output, pipe = map(Path, sys.argv[1:])\n"
         "with exclusive(output, lambda: pipe.write_text('waiting')):\n"
         "    output.write_text(output.read_text() + ' second')\n"
