@@ -60,7 +60,11 @@ from evaluation.map_update.sessions import (
     write_labels,
     write_session,
 )
-from evaluation.map_update.structures import StructureChange, write_structures
+from evaluation.map_update.structures import (
+    StructureChange,
+    structure_changes,
+    write_structures,
+)
 from evaluation.results.drawing import GONE, NEW
 from evaluation.study.sources import DriveSource, RecordingSource
 
@@ -259,9 +263,8 @@ def write_truth(
             write_labels(session.folder / "truth.npy", labels)
         names = [one.drive.instances or {} for one in (a, b)]
         present = [one.simulated.structures for one in (a, b)]
-        table = write_structures(
-            draft / "structures.csv", pair, truth, names, present
-        )
+        table = structure_changes(pair, truth, names, present)
+        write_structures(draft / "structures.csv", table)
         write_page(
             draft / "index.html",
             pair,

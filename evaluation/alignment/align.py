@@ -222,15 +222,7 @@ def align(
         X_TK, model = _fit_poses(search)
     loops = list(search.loops.values())
     is_inlier = agreeing(loops, target.X_WK, X_TK)
-    needed = max(
-        _FEWEST_LOOPS, 0.5 * len(loops), _LEAST_YIELD * len(search.tried)
-    )
-    if is_inlier.sum() < needed:
-        raise InputError(
-            f"{source.name}: cannot be aligned to {target.name}: of "
-            f"{len(search.tried)} tried places {len(loops)} fit, and only "
-            f"{is_inlier.sum()} of these agree"
-        )
+    _check_agreement(search, int(is_inlier.sum()))
     distances, angles = loop_errors(loops, target.X_WK, X_TK)
     ground = 0.0 if hold_first else target.ground_height()
     if abs(ground) < _GROUND_TOLERANCE:
@@ -346,6 +338,22 @@ def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
     if np.quantile(distances, 0.75) < _DRIFT:
         return X_TK, "anchor"
     return fit_bent(loops, X_TL, source, X_TS), "pose graph"
+
+
+def _check_agreement(search: LoopSearch, num_agreeing: int) -> None:
+    """Checks that enough of the loops agree.
+
+    Raises:
+        InputError: too few loops agree.
+    """
+    num_loops, num_tried = len(search.loops), len(search.tried)
+    needed = max(_FEWEST_LOOPS, 0.5 * num_loops, _LEAST_YIELD * num_tried)
+    if num_agreeing < needed:
+        raise InputError(
+            f"{search.source.name}: cannot be aligned to {search.target.name}:"
+            f" of {num_tried} tried places {num_loops} fit, and only"
+            f" {num_agreeing} of these agree"
+        )
 
 
 def _doubtful_keyframes(search: LoopSearch, X_TK: np.ndarray) -> np.ndarray:

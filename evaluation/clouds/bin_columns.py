@@ -79,18 +79,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     if columns is not None:
         return BinLayout(columns)
     files = [files[k] for k in sorted({0, len(files) // 2, len(files) - 1})]
-    windows: list[np.ndarray] = []
-    sizes = []
-    for path in files:
-        check_regular(path)
-        with user_errors(path), open(path, "rb") as stream:
-            sizes.append(path.stat().st_size)
-            last = max(0, sizes[-1] // 4 - 1) // _WINDOW
-            for k in np.unique(np.linspace(0, last, _WINDOWS).astype(int)):
-                stream.seek(4 * _WINDOW * int(k))
-                windows.append(np.fromfile(stream, "<f4", _WINDOW))
-    values = np.concatenate(windows)
-    places = np.concatenate([np.arange(len(one)) for one in windows])
+    values, places, sizes = _read_windows(files)
     found = _find_period(values, places)
     wanted = found or _USUAL
     for path, size in zip(files, sizes, strict=True):
@@ -133,13 +122,35 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     )
 
 
+def _read_windows(
+    files: Sequence[Path],
+) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Reads some values of each file.
+
+    Returns:
+        (N,) values; (N,) positions of the values in their files, correct modulo
+        any number of columns; size of each file [bytes].
+    """
+    windows: list[np.ndarray] = []
+    sizes = []
+    for path in files:
+        check_regular(path)
+        with user_errors(path), open(path, "rb") as stream:
+            sizes.append(path.stat().st_size)
+            last = max(0, sizes[-1] // 4 - 1) // _WINDOW
+            for k in np.unique(np.linspace(0, last, _WINDOWS).astype(int)):
+                stream.seek(4 * _WINDOW * int(k))
+                windows.append(np.fromfile(stream, "<f4", _WINDOW))
+    places = np.concatenate([np.arange(len(one)) for one in windows])
+    return np.concatenate(windows), places, sizes
+
+
 def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
     """Returns the number of columns found from the values, or None.
 
     Args:
         values: (N,) in the order of the file.
-        places: (N,) positions of the values in the file, correct modulo any
-            number of columns.
+        places: (N,) positions of the values, see `_read_windows`.
     """
     # Beams without a return are stored as zeros or NaN, alike in all columns.
     is_value = np.isfinite(values) & (values != 0.0)

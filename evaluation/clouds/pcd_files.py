@@ -39,7 +39,7 @@ def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
             f"{path}: VIEWPOINT is not applied; the points are taken as they"
             " are written"
         )
-    dtype, count = _point_type_and_count(header)
+    dtype, count = _point_type(header), _num_points(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
         # A point takes at least one byte, which bounds the buffer.
@@ -78,30 +78,18 @@ def _is_moved(viewpoint: list[str]) -> bool:
     return bool(viewpoint) and list(map(float, viewpoint)) != _UNMOVED
 
 
-def _point_type_and_count(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
-    """Returns the type of a point and the number of points."""
-
-    def of(keyword: str) -> list[int]:
-        try:
-            return [int(word) for word in header[keyword]]
-        except (KeyError, ValueError) as error:
-            raise ValueError(
-                f"PCD header: {keyword} is missing or wrong"
-            ) from error
-
+def _point_type(header: dict[str, list[str]]) -> np.dtype:
+    """Returns the type of a point."""
     if "FIELDS" not in header:
         raise ValueError("PCD header: FIELDS is missing or wrong")
     names = header["FIELDS"]
-    sizes = of("SIZE")
+    sizes = _integers(header, "SIZE")
     kinds = [
         _PCD_TYPES.get(kind.upper(), "") for kind in header.get("TYPE", [])
     ]
-    counts = of("COUNT") if "COUNT" in header else [1] * len(names)
-    numbers = of("POINTS")[:1] if "POINTS" in header else []
-    if "WIDTH" in header or not numbers:
-        # Unorganised clouds of old writers have no height.
-        height = of("HEIGHT")[:1] if "HEIGHT" in header else [1]
-        numbers.append(math.prod([*of("WIDTH")[:1], *height]))
+    counts = [1] * len(names)
+    if "COUNT" in header:
+        counts = _integers(header, "COUNT")
     if not len(names) == len(sizes) == len(kinds) == len(counts):
         raise ValueError(
             "PCD header: FIELDS, SIZE, TYPE and COUNT differ in length"
@@ -124,6 +112,16 @@ def _point_type_and_count(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     for name in "xyz":
         if name not in names or dtype[name].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
+    return dtype
+
+
+def _num_points(header: dict[str, list[str]]) -> int:
+    """Returns the number of points."""
+    numbers = _integers(header, "POINTS")[:1] if "POINTS" in header else []
+    if "WIDTH" in header or not numbers:
+        # Unorganised clouds of old writers have no height.
+        height = _integers(header, "HEIGHT")[:1] if "HEIGHT" in header else [1]
+        numbers.append(math.prod([*_integers(header, "WIDTH")[:1], *height]))
     number = numbers[0]
     if numbers[-1] != number:
         raise ValueError(
@@ -132,7 +130,16 @@ def _point_type_and_count(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
         )
     if number < 0:
         raise ValueError("PCD header: a negative number of points")
-    return dtype, number
+    return number
+
+
+def _integers(header: dict[str, list[str]], keyword: str) -> list[int]:
+    try:
+        return [int(word) for word in header[keyword]]
+    except (KeyError, ValueError) as error:
+        raise ValueError(
+            f"PCD header: {keyword} is missing or wrong"
+        ) from error
 
 
 def _read_compressed(

@@ -220,6 +220,18 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
             f" FILE.py){did_you_mean(method, METHODS)}"
         )
     path = Path(method)
+    function = with_named_faults(_function_of_file(path), path)
+    return partial(_by_own, function, path)
+
+
+def _function_of_file(path: Path) -> Callable:
+    """Returns the estimator that a user's Python file defines.
+
+    It is the function `localise`, or the only public function of the file.
+
+    Raises:
+        InputError: the file cannot be run, or has no such function.
+    """
     module = run_module(path)
     own = {
         name: value
@@ -235,4 +247,4 @@ def make_estimator(method: str, settings: Settings) -> Estimator:
         raise InputError(
             f"{path}: has {len(own)} functions, none of which is `localise`"
         )
-    return partial(_by_own, with_named_faults(function, path), path)
+    return function

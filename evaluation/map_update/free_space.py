@@ -84,21 +84,30 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
     found = np.where(is_shown, kept, unobserved)
     found = np.where(past > 0, changed, found)
     labels[far] = found[cell_of.ravel()]
-    # A new object may pass near to one that is gone.
-    is_changed = labels == changed
-    known = is_changed | (labels == kept)
-    blocks = np.floor(mine.points[known] / _CUBE).astype(np.int64)
-    blocks -= blocks.min(axis=0, initial=0)
-    sizes = blocks.max(axis=0, initial=0) + 1
-    _, block_of = np.unique(
-        np.ravel_multi_index(tuple(blocks.T), tuple(sizes)), return_inverse=True
-    )
-    part = np.bincount(block_of, is_changed[known]) / np.bincount(block_of)
-    is_beside = (part[block_of] > _CHANGED_SHARE) & (
+    known = np.flatnonzero((labels == changed) | (labels == kept))
+    shares = _changed_shares(mine.points[known], labels[known] == changed)
+    is_beside = (shares > _CHANGED_SHARE) & (
         distances[known] > _STILL_KEPT_WITHIN
     )
-    labels[np.flatnonzero(known)[is_beside]] = changed
+    # A new object may pass near to one that is gone.
+    labels[known[is_beside]] = changed
     return labels
+
+
+def _changed_shares(points: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
+    """Returns the share of changed points in each point's cube, (N,).
+
+    Args:
+        points: (N, 3) points [m].
+        is_changed: (N,) bool, which points have changed.
+    """
+    cubes = np.floor(points / _CUBE).astype(np.int64)
+    cubes -= cubes.min(axis=0, initial=0)
+    sizes = cubes.max(axis=0, initial=0) + 1
+    _, cube_of = np.unique(
+        np.ravel_multi_index(tuple(cubes.T), tuple(sizes)), return_inverse=True
+    )
+    return (np.bincount(cube_of, is_changed) / np.bincount(cube_of))[cube_of]
 
 
 def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
@@ -112,17 +121,12 @@ def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
     """
     counts = np.zeros((3, len(points)), np.int32)
     chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
-    # The field of view reaches from the lowest to the highest return, and as
-    # far as the farthest, without the strays.
     some = chosen[:: max(len(chosen) // 20, 1)]
     scans = [other.scan(number) for number in some]
     returns = np.concatenate([np.zeros((0, 3)), *scans])
     if len(returns) == 0:
         return counts
-    slopes = np.sort(_slopes(returns))
-    strays = min(_STRAYS, (len(returns) - 1) // 2)
-    low, high = slopes[[strays, -1 - strays]]
-    reach = np.sort(np.linalg.norm(returns, axis=1))[-1 - strays]
+    low, high, reach = _field_of_view(returns)
 
     def look(number: int) -> list[np.ndarray]:
         X_WS = other.X_WS[number]
@@ -147,6 +151,21 @@ def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
             for count, rows in zip(counts, kinds, strict=True):
                 count[rows] += 1
     return counts
+
+
+def _field_of_view(p_S: np.ndarray) -> tuple[float, float, float]:
+    """Returns the limits of a field of view, from its returns (N, 3) [m].
+
+    The field of view reaches from the lowest to the highest return, and as far
+    as the farthest return, without `_STRAYS` returns on each side.
+
+    Returns:
+        Least and greatest slope; greatest distance [m].
+    """
+    slopes = np.sort(_slopes(p_S))
+    strays = min(_STRAYS, (len(p_S) - 1) // 2)
+    low, high = slopes[[strays, -1 - strays]]
+    return low, high, np.sort(np.linalg.norm(p_S, axis=1))[-1 - strays]
 
 
 def _slopes(p_S: np.ndarray) -> np.ndarray:

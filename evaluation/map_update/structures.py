@@ -1,6 +1,6 @@
-"""Computes how much of each structure changed, and a verdict on each."""
+"""How much each structure of two maps has changed, and a verdict on each."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -85,20 +85,18 @@ def verdicts(
     return numbers, count, np.where(count[:, 1] == 0, unobserved, found)
 
 
-def write_structures(
-    path: Path,
+def structure_changes(
     pair: Pair,
     truth: Sequence[np.ndarray],
     tables: Sequence[Mapping[int, Mapping]],
     present: Sequence[Collection[str]],
 ) -> list[StructureChange]:
-    """Writes the table of structures of both maps, and returns its rows.
+    """Returns how much each structure of both maps has changed.
 
-    A structure that exists in only one of the two worlds has a row even if no
+    A structure that exists in only one of the two worlds is included even if no
     map point lies on it.
 
     Args:
-        path: path of the CSV file.
         pair: both sessions.
         truth: labels of each session.
         tables: instance -> name and class, for each session.
@@ -141,12 +139,16 @@ def write_structures(
                     number in alone,
                 )
             )
+    return rows
+
+
+def write_structures(path: Path, rows: Iterable[StructureChange]) -> None:
+    """Writes the table of structures of both maps as CSV."""
     header = [
         field.name.replace("semantic_class", "class")
         for field in fields(StructureChange)
     ]
     write_csv(path, header, map(astuple, rows))
-    return rows
 
 
 def class_names(folder: Path) -> dict[int, str]:

@@ -4,7 +4,7 @@ The distance of a query from a place is the distance between the positions of
 the sensor in three dimensions.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive, check_same_world
 from evaluation.methods.method import Method
 from evaluation.recognition.describing import describe_drive
-from evaluation.recognition.descriptors import DriveDescriptors
+from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 from evaluation.recognition.geometric_verification import (
     gated_by_poses,
     tested_places,
@@ -182,20 +182,11 @@ def compare_with_gates(
     tested = [tested_places(one)[: None if radii else 1] for one in alone]
     poses = search.poses(query, tested)
     scores = [np.empty(is_known.shape) for _ in gate_radii]
-    errors = [PoseErrors.unknown(len(rows)) for _ in gate_radii]
-    distances = _distances(database, query)
     for row, ungated in enumerate(alone):
         by_gate = iter(gated_by_poses(ungated, poses[row], radii))
-        for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
-            found = ungated if radius is None else next(by_gate)
-            kept[row] = found
-            if np.isnan(found).all():
-                continue
-            best = int(ranked_places(found)[0])
-            if (X_PQ := poses[row][best]) is not None:
-                error.translation[row], error.rotation_deg[row] = pose_error(
-                    X_PQ, places.X_WS[best], queries.X_WS[row]
-                )
+        for radius, kept in zip(gate_radii, scores, strict=True):
+            kept[row] = ungated if radius is None else next(by_gate)
+    distances = _distances(database, query)
     matches = _near_enough(distances, overlaps, protocol) & is_known
     return [
         Retrieval(
@@ -204,13 +195,39 @@ def compare_with_gates(
             scores=kept,
             distances=distances,
             matches=matches,
-            pose_errors=error,
+            pose_errors=_errors_at_best(kept, poses, places, queries),
             is_known=is_known,
             overlaps=overlaps,
             query_blocks=queries.blocks,
         )
-        for kept, error in zip(scores, errors, strict=True)
+        for kept in scores
     ]
+
+
+def _errors_at_best(
+    scores: np.ndarray,
+    poses: Sequence[Mapping[int, np.ndarray | None]],
+    places: DescribedScans,
+    queries: DescribedScans,
+) -> PoseErrors:
+    """Returns the errors of the poses at each query's top-ranked place.
+
+    Args:
+        scores: (Q, D) scores; NaN for a place that is no candidate.
+        poses: for each query, place -> estimated pose X_PQ (4, 4), or None.
+        places: the D places.
+        queries: the Q queries.
+    """
+    errors = PoseErrors.unknown(len(scores))
+    for row, found in enumerate(scores):
+        if np.isnan(found).all():
+            continue
+        best = int(ranked_places(found)[0])
+        if (X_PQ := poses[row][best]) is not None:
+            errors.translation[row], errors.rotation_deg[row] = pose_error(
+                X_PQ, places.X_WS[best], queries.X_WS[row]
+            )
+    return errors
 
 
 def matches_within_radius(

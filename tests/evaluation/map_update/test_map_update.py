@@ -25,6 +25,7 @@ from evaluation.map_update.sessions import (
 )
 from evaluation.map_update.structures import (
     class_names,
+    structure_changes,
     verdicts,
     write_structures,
 )
@@ -234,7 +235,8 @@ def test_structures_that_one_world_has_need_no_point(tmp_path):
     tables = table, table
     path = tmp_path / "structures.csv"
     present = {"house"}, {"house", "car", "shed"}
-    rows = write_structures(path, Pair(a, b), truth, tables, present)
+    rows = structure_changes(Pair(a, b), truth, tables, present)
+    write_structures(path, rows)
     found = [(r.side, r.structure, r.points, r.alone, r.moves) for r in rows]
     assert found == [
         ("A", "house", 400, False, False),
