@@ -21,7 +21,7 @@ import typer
 
 from cns_drake.city.plan import city_plan, stages
 from cns_drake.command_line import cli
-from cns_drake.roads import road
+from cns_drake.roads import roads_file
 from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.scenarios.losses import Losses
@@ -60,10 +60,10 @@ SCENARIO: Sections = {
     "Odometry": OdometrySection,
 }
 CITY: Sections = {
-    "roads.yaml": road.RoadsFile,
-    "A road's style": road.RoadStyle,
-    "A road": road.RoadEntry,
-    "A junction": road.JunctionEntry,
+    "roads.yaml": roads_file.RoadsFile,
+    "A road's style": roads_file.RoadStyle,
+    "A road": roads_file.RoadEntry,
+    "A junction": roads_file.JunctionEntry,
     "city.yaml": city_plan.CityPlan,
     "A district": city_plan.DistrictPlan,
     "A patch": city_plan.PatchPlan,
@@ -166,7 +166,7 @@ def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
     methods, is in the tables of those.
     """
     shared: dict[str, FieldInfo] = {}
-    for base in (road.RoadStyle, MethodConfig):
+    for base in (roads_file.RoadStyle, MethodConfig):
         if issubclass(model, base) and model is not base:
             shared |= base.model_fields
     fields = model.model_fields

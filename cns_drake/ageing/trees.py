@@ -14,7 +14,7 @@ from cns_drake.ageing.yearly_draws import YearlyDraws
 from cns_drake.city.geometry import Structure
 from cns_drake.city.plants.plant_sizes import scaled_plant
 from cns_drake.city.plants.trees import SPECIES
-from cns_drake.imports.foreign_city import random_generator
+from cns_drake.imports.named_randomness import random_generator
 from cns_drake.transient.loaded_structures import LoadedStructure
 
 # Least and greatest growth of a tree in a year [m].

@@ -15,13 +15,8 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.listing import natural_key
 from cns_drake.base.number_text import whole_number
 from cns_drake.base.terminal import note, show
-from cns_drake.imports.options import (
-    REPORT_NAME,
-    DriveOn,
-    ImportOptions,
-    ImportReport,
-    Undated,
-)
+from cns_drake.imports.options import DriveOn, ImportOptions, Undated
+from cns_drake.imports.report import REPORT_NAME, ImportReport
 
 # Default share of the buildings that change between an added first stage and
 # today.

@@ -10,22 +10,22 @@ from datetime import date
 import re
 from typing import Any
 
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.faults import ImportFaults
 
-# Position within a period that "early", "mid", "late" or none of these words
-# means.
-_PARTS = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
+# Word before a period, or none -> the share of the period after which a year
+# with this word lies.
+_SHARES_OF_PERIOD = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
 _ABOUT = re.compile(r"^(?:~|ca\.?|circa|about|before|after|by|j:)\s*")
 _PERIOD = re.compile(
     r"(?:(early|mid|late)[\s-]*)?(?:c(\d{1,2})|(\d{3})0s)", re.ASCII
 )
 _DAY = re.compile(r"jd:(\d{7})(?:\.\d+)?", re.ASCII)
 _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)", re.ASCII)
-# The Julian day number of the day before 1 January of the year 1.
+# Julian day number of the day before 1 January of the year 1.
 _DAY_ZERO = 1721425
 # The usual attributes in lower case, the most reliable first: those of 3DBAG,
 # CityGML, predecessors of 3DBAG, and OpenStreetMap.
-_USUAL = (
+_USUAL_ATTRIBUTES = (
     "oorspronkelijkbouwjaar",
     "yearofconstruction",
     "year_of_construction",
@@ -43,7 +43,7 @@ _PLACEHOLDER = 9999
 # Placeholder for an unknown year in Dutch registers.
 _DUTCH_PLACEHOLDER = 1005
 # Names of the year of construction in Dutch registers.
-_DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
+_DUTCH_ATTRIBUTES = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 def year_of_date(text: str) -> int | None:
@@ -64,7 +64,7 @@ def year_of_date(text: str) -> int | None:
         text = plain
     period = _PERIOD.fullmatch(text)
     if period:
-        part = _PARTS[period[1] or ""]
+        part = _SHARES_OF_PERIOD[period[1] or ""]
         if period[2]:
             century = int(period[2])
             return 100 * (century - 1) + round(100 * part) if century else None
@@ -93,12 +93,12 @@ def construction_year(
         given = {attribute: attributes.get(attribute)}
     else:
         lower = {key.lower(): value for key, value in attributes.items()}
-        given = {key: lower[key] for key in _USUAL if key in lower}
+        given = {key: lower[key] for key in _USUAL_ATTRIBUTES if key in lower}
     for key, value in given.items():
-        year = _year(value)
+        year = _year_of_value(value)
         if year is None:
             continue
-        is_dutch = key.lower() in _DUTCH
+        is_dutch = key.lower() in _DUTCH_ATTRIBUTES
         if year == _PLACEHOLDER or (is_dutch and year == _DUTCH_PLACEHOLDER):
             faults.add(f"{year} in place of a year, taken as no year", name)
             continue
@@ -108,7 +108,7 @@ def construction_year(
     return None
 
 
-def _year(value: object) -> int | None:
+def _year_of_value(value: object) -> int | None:
     if isinstance(value, bool) or value is None:
         return None
     if isinstance(value, (int, float)):

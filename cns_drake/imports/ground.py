@@ -18,8 +18,9 @@ from cns_drake.city.geometry import (
     Structure,
     hull_of,
 )
-from cns_drake.imports.faces import joined, surface_samples
-from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.faces import joined_triangles
+from cns_drake.imports.structures import Imported
+from cns_drake.imports.surface_samples import surface_samples
 
 # Cell size of a guessed ground [m].
 CELL = 4.0
@@ -27,15 +28,17 @@ CELL = 4.0
 MARGIN = 40.0
 # Above this number of cells along a side, cells are larger.
 _MOST_CELLS = 500
-# Number of cells over which the ground is smoothed. Then its depth below the
-# structures [m], so that pavements can be seen.
-_SMOOTHING = 1.5
-_DEPTH = 0.1
+# Standard deviation of the filter that smooths a guessed ground [cells].
+_SMOOTHING_CELLS = 1.5
+# The mesh of the ground is this much lower than the ground itself, so that
+# pavements at the height of the ground can be seen [m].
+_MESH_DEPTH = 0.1
 # Beyond this distance from the convex hull of the feet, heights are not
 # interpolated between feet [m].
 _BESIDE_HULL = 1.0
-# For flat things of these classes, corners give the height of the ground.
-_EVERY_CORNER = 7
+# Every seventh corner of streets and other ground gives the height of the
+# guessed ground.
+_CORNER_STRIDE = 7
 
 
 class Ground:
@@ -88,11 +91,12 @@ class Ground:
     def to_mesh(self) -> Mesh:
         """Returns the ground as a mesh, lowered by 0.1 m.
 
-        The mesh is lower than the ground, so that pavements at the height of
-        the ground can be seen.
+        Otherwise the mesh would hide pavements at the height of the ground.
         """
         x, y = np.meshgrid(self.xs, self.ys)
-        vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)
+        vertices = np.stack([x, y, self.z - _MESH_DEPTH], axis=-1).reshape(
+            -1, 3
+        )
         number = np.arange(len(vertices)).reshape(self.z.shape)
         a, b = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
         c, d = number[1:, 1:].ravel(), number[1:, :-1].ravel()
@@ -127,7 +131,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     outside = np.isnan(z)
     nearest = NearestNDInterpolator(feet[:, :2], feet[:, 2])
     z[outside] = nearest(x[outside], y[outside])
-    return Ground(xs, ys, gaussian_filter(z, _SMOOTHING, mode="nearest"))
+    return Ground(xs, ys, gaussian_filter(z, _SMOOTHING_CELLS, mode="nearest"))
 
 
 def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
@@ -152,7 +156,9 @@ def ground_of(
         below_bridges: whether bridges and tunnels are ignored in the guess,
             unless the city has no other structures.
     """
-    corners = joined(one.triangles for one in structures).reshape(-1, 3)
+    corners = joined_triangles(one.triangles for one in structures).reshape(
+        -1, 3
+    )
     terrain = [one for one in structures if one.kind == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
@@ -164,7 +170,7 @@ def ground_of(
             low = firm or structures
         feet = [feet_of([o.triangles for o in low if not o.is_ground])]
         feet += [
-            one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
+            one.triangles.reshape(-1, 3)[::_CORNER_STRIDE]
             for one in low
             if one.is_ground
         ]
@@ -190,7 +196,9 @@ def ground_structures(
     while name in taken:
         name += "_"
     # The guessed ground must not hide streets and water.
-    covered = joined(one.triangles for one in structures if one.is_ground)
+    covered = joined_triangles(
+        one.triangles for one in structures if one.is_ground
+    )
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),

@@ -11,21 +11,33 @@ from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
-from cns_drake.imports import map_files
-from cns_drake.imports.cityjson_structures import import_cityjson
+from cns_drake.imports import map_files, overview
+from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cropping import cropped_city
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives import cell_graph, search, street_graph
-from cns_drake.imports.drives.free_space import find_free_space
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.drives.cell_graph import CellGraph
+from cns_drake.imports.drives.free_space import FreeSpace, find_free_space
+from cns_drake.imports.drives.search import find_drives
+from cns_drake.imports.drives.steerable_drives import (
+    WaypointRoute,
+    driven_path,
+    with_ground_heights,
+)
+from cns_drake.imports.drives.street_graph import StreetGraph
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import ground_of, ground_structures
+from cns_drake.imports.grown_city import grow
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
-from cns_drake.imports.options import ImportOptions, ImportReport
-from cns_drake.imports.staged_city import grow, stage_city
+from cns_drake.imports.options import DriveOn, ImportOptions
+from cns_drake.imports.report import ImportReport
+from cns_drake.imports.staged_city import StagedCity, stage_city
+from cns_drake.imports.structures import Imported
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
+from cns_drake.roads.waypoint_file import read_waypoints
+from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
 
 # Gets the folder, and stage -> its numbers of structures and triangles.
@@ -74,43 +86,22 @@ def import_city(
     ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
     side = options.drive_on or ("left" if city.keeps_left else "right")
-    drives = (
-        own
-        or search.find_drives(
-            street_graph.StreetGraph(city.streets, space, side)
-        )
-        or search.find_drives(cell_graph.CellGraph(space))
-    )
+    drives = own or _find_drives(city, space, side)
     if options.within is not None:
-        staged = staged.near(drives, options.within, city.faults)
+        staged = cropped_city(staged, drives, options.within, city.faults)
         ground = ground_of(staged.kept, options.dressed)
-    drives = search.with_ground_heights(drives, ground.height, city.faults)
+    drives = with_ground_heights(drives, ground.height, city.faults)
     bare = staged.kept
     dressing = None
-    added: list[Imported] = []
     with draft_folder(output) as draft:
         (draft / MESH_FOLDER).mkdir()
-        map_files.draw_overview(draft / "from_above.png", bare, space, drives)
+        overview.draw_overview(draft / "from_above.png", bare, space, drives)
         if options.dressed:
             doing("dressing buildings and streets")
             dressing = dress_city(staged, city, drives, ground, options.seed)
             staged = dressing.city
-            names = {one.structure.name for one in bare}
-            added = [o for o in staged.kept if o.structure.name not in names]
         doing(f"writing {output}")
-        lanes = lanes_of_streets(
-            city.streets,
-            city.street_places,
-            [*bare, *added],
-            [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
-            drives,
-            side,
-        )
-        if lanes is None and city.streets and drives:
-            kind = "no lanes for traffic: none leads on for ever"
-            city.faults.add(kind, source.name)
-        if lanes is not None:
-            (draft / LANES_NAME).write_text(lanes, "utf-8")
+        _write_lanes(draft, source, city, bare, staged.kept, drives, side)
         bottom = (
             dressing.bottom if dressing else ground_structures(bare, ground)
         )
@@ -119,21 +110,7 @@ def import_city(
             city, options, list(staged.standing), changes, dressing
         )
         map_files.write_facts(draft, source, facts, city.faults)
-        report = ImportReport(
-            kinds=dict(Counter(one.kind for one in staged.kept)),
-            # Structures other than buildings may share their meshes.
-            triangles=sum(
-                one.structure.model.num_triangles
-                if one.kind.startswith("Building")
-                else len(one.triangles)
-                for one in staged.kept
-            ),
-            stages={stage: len(o) for stage, o in staged.standing.items()},
-            undated=staged.undated,
-            dated=staged.dated,
-            drives=tuple(drive.length for drive in drives),
-            faults=city.faults.rows(),
-        )
+        report = _report_of(staged, drives, city.faults)
         map_files.write_report(draft, report)
         when = [f" in {year}" for year in options.years] or [""]
         if options.grow is not None:
@@ -145,6 +122,71 @@ def import_city(
         )
         finish(draft, sizes)
     return report
+
+
+def _find_drives(
+    city: ForeignCity, space: FreeSpace, side: DriveOn
+) -> list[WaypointRoute]:
+    """Returns at most two drives: along streets or, without them, anywhere."""
+    streets = StreetGraph(city.streets, space, side)
+    return find_drives(streets) or find_drives(CellGraph(space))
+
+
+def _write_lanes(
+    draft: Path,
+    source: Path,
+    city: ForeignCity,
+    bare: Sequence[Imported],
+    kept: Sequence[Imported],
+    drives: Sequence[WaypointRoute],
+    side: DriveOn,
+) -> None:
+    """Writes the lanes for traffic to a map's folder, if there are any.
+
+    Args:
+        draft: folder of the map.
+        source: the imported file.
+        city: the content of this file.
+        bare: structures of the city without details.
+        kept: structures of the city, with details if it is dressed.
+        drives: the drives.
+        side: side of the street on which traffic keeps.
+    """
+    names = {one.structure.name for one in bare}
+    added = [one for one in kept if one.structure.name not in names]
+    lanes = lanes_of_streets(
+        city.streets,
+        city.street_places,
+        [*bare, *added],
+        [one for one in added if one.kind not in ("Sidewalk", "Lane mark")],
+        drives,
+        side,
+    )
+    if lanes is not None:
+        (draft / LANES_NAME).write_text(lanes, "utf-8")
+    elif city.streets and drives:
+        kind = "no lanes for traffic: none leads on for ever"
+        city.faults.add(kind, source.name)
+
+
+def _report_of(
+    staged: StagedCity, drives: Sequence[WaypointRoute], faults: ImportFaults
+) -> ImportReport:
+    return ImportReport(
+        kinds=dict(Counter(one.kind for one in staged.kept)),
+        # Structures other than buildings may share their meshes.
+        triangles=sum(
+            one.structure.model.num_triangles
+            if one.kind.startswith("Building")
+            else len(one.triangles)
+            for one in staged.kept
+        ),
+        stages={stage: len(some) for stage, some in staged.standing.items()},
+        undated=staged.undated,
+        dated=staged.dated,
+        drives=tuple(drive.length for drive in drives),
+        faults=faults.rows(),
+    )
 
 
 def _check_options(source: Path, output: Path, options: ImportOptions) -> None:
@@ -180,7 +222,8 @@ def _import_roads(
     finish: Finish,
 ) -> ImportReport:
     with uninterrupted():  # This imports the whole city generator.
-        from cns_drake.imports.opendrive.town import build_town, write_town
+        from cns_drake.imports.opendrive.town import build_town
+        from cns_drake.imports.opendrive.town_files import write_town
 
     town = build_town(source, options, own)
     with draft_folder(output) as draft:
@@ -211,7 +254,7 @@ def drive_along(path: Path) -> WaypointRoute:
     """
     points, _ = read_waypoints(path)
     control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
-    driven, radii = search.driven_path(control)
+    driven, radii = driven_path(control)
     radius = radii.min()
     x, y = driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:

@@ -2,14 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-from matplotlib.artist import Artist
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 import numpy as np
 import yaml
 
@@ -18,30 +11,17 @@ from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import Dressing
-from cns_drake.imports.drives.free_space import CELL, FreeSpace
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.faces import joined
-from cns_drake.imports.foreign_city import WATER, ForeignCity, Imported
-from cns_drake.imports.options import (
-    REPORT_NAME,
-    ImportFaults,
-    ImportOptions,
-    ImportReport,
-)
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.report import REPORT_NAME, ImportReport
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.scene.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
-from cns_drake.scene.semantics import CLASS_RGB
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
 _CRUISE = 8.0  # [m/s]
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
-_DPI = 130
-_INCHES = 9.0
-_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
-_ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
-_ROOM_COLOUR = "#ffd92f"
-_ROOM_ALPHA = 0.6
 
 
 def write_world(
@@ -226,110 +206,3 @@ def write_drives(
             }
             text = yaml.safe_dump(scenario, sort_keys=False)
             (folder / f"{kind}_{stage}.yaml").write_text(text, "utf-8")
-
-
-def draw_overview(
-    path: Path,
-    structures: Sequence[Imported],
-    space: FreeSpace | None,
-    drives: Sequence[WaypointRoute],
-) -> None:
-    """Draws a map's structures, the free space for a car and the drives.
-
-    Where two drives share a street, the second drive is a thinner line on top
-    of the first, so that both can be seen.
-
-    Args:
-        path: image file to write.
-        structures: the structures.
-        space: the free space; None to draw none.
-        drives: the drives, at most two.
-    """
-    corners = joined(one.triangles for one in structures).reshape(-1, 3)
-    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
-    if space is not None:
-        low = space.low
-        high = low + CELL * np.array(space.clearance.shape[::-1])
-    size = _INCHES * (high - low) / (high - low).max()
-    figure = Figure(layout="constrained")
-    axes = figure.subplots()
-    legend: dict[str, Artist] = {}
-    classes: dict[str, Artist] = {}
-    for is_ground in (True, False):
-        alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
-        for one in structures:
-            if one.is_ground == is_ground and one.kind != "TINRelief":
-                colour = _colour(one)
-                alike.setdefault(colour, []).append(one.triangles)
-                name = one.structure.semantic_class
-                if name == "building":
-                    name = "building, any colour"
-                elif colour == WATER:
-                    name = "water"
-                classes.setdefault(name, Patch(facecolor=colour))
-        for colour, triangles in alike.items():
-            # The library takes an array faster than a list, but its type hints
-            # do not allow it.
-            corners_xy: Any = np.concatenate(triangles)[:, :, :2]
-            axes.add_collection(
-                PolyCollection(
-                    corners_xy,
-                    facecolors=[colour],
-                    # Otherwise fine lines show between triangles.
-                    edgecolors="face",
-                    linewidths=0.3,
-                )
-            )
-    extent = (low[0], high[0], low[1], high[1])
-    if space is not None:
-        room = np.where(space.clearance >= space.least, 1.0, np.nan)
-        # This lies above the structures and below the lines.
-        axes.imshow(
-            room,
-            origin="lower",
-            extent=extent,
-            cmap=ListedColormap([_ROOM_COLOUR]),
-            alpha=_ROOM_ALPHA,
-            zorder=1.5,
-        )
-        classes["room for a car"] = Patch(
-            facecolor=_ROOM_COLOUR, alpha=_ROOM_ALPHA
-        )
-    for letter, drive, rgb, width in zip(
-        "ab", drives, _ROUTE_COLOURS, _ROUTE_WIDTHS, strict=False
-    ):
-        (line,) = axes.plot(*drive.path.T, color=rgb, linewidth=width)
-        legend[f"drive {letter}, {drive.length:.0f} m"] = line
-        for end, marker, name in ((0, "o", "start"), (-1, "s", "end")):
-            axes.plot(
-                *drive.path[end],
-                marker,
-                color=rgb,
-                markersize=2 * width + 3,
-                markeredgecolor="white",
-            )
-            legend[name] = Line2D(
-                [], [], linestyle="", marker=marker, color="black"
-            )
-    axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x [m]", ylabel="y [m]")
-    axes.set_aspect("equal")
-    axes.grid(alpha=0.3)
-    legend |= classes
-    wide = max(size[0] + 0.8, 4.0)
-    columns = int(wide / 2)
-    rows = -(-len(legend) // columns)
-    figure.set_size_inches(wide, size[1] + 0.8 + 0.2 * rows)
-    figure.legend(
-        legend.values(),
-        legend.keys(),
-        loc="outside lower center",
-        ncols=columns,
-    )
-    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
-
-
-def _colour(one: Imported) -> tuple[float, float, float]:
-    part = one.structure.model.parts[0]
-    if one.structure.semantic_class == "vegetation":
-        return CLASS_RGB["vegetation"]
-    return part.rgb or CLASS_RGB[one.structure.semantic_class]

@@ -23,9 +23,11 @@ _SIMPLIFY = 0.01
 # end beside one another at an angle [m].
 _SEAM = 0.25
 # Junctions extend this far into their roads before they are cut off at the
-# roads' ends. Pieces that remain beside the roads are dropped if they are
-# thinner than this [m].
+# roads' ends [m].
 _OVERLAP = 0.5
+# Pieces of a junction beside its roads are dropped if they are thinner than
+# twice this [m].
+_HALF_SPLINTER = 0.5
 # A parking bay keeps clear of the junction at each end of its road [m].
 _BAY_CLEARANCE = 3.0
 
@@ -87,7 +89,10 @@ def road_strip(road: Road) -> BaseGeometry:
 def _band(
     road: Road, right: float, left: float, clearance: float = 0.0
 ) -> BaseGeometry:
-    """Returns the area between two lateral offsets from the centreline [m]."""
+    """Returns the area between two lateral offsets from the centreline [m].
+
+    The area keeps `clearance` from both ends of the road [m].
+    """
     stations = road.stations(clearance=clearance)
     outline = [
         road.evaluate(stations, left)[:, :2],
@@ -106,6 +111,29 @@ def junction_area(
     filled, so that kerbs have the junction's radius. Third, the roads outside
     the junction are cut off. At a dead end, the area is a disc around the end
     of the road.
+    """
+    radius = junction.kerb_radius
+    area = _extended_roads(roads, junction)
+    area = area.buffer(radius, quad_segs=4 * _QUADRANT_SEGMENTS).buffer(
+        -radius, quad_segs=_QUADRANT_SEGMENTS
+    )
+    for arm in junction.arms:
+        area = area.difference(road_strip(roads[arm.road]))
+    # Cutting can leave splinters beside a road's end.
+    area = area.buffer(-_HALF_SPLINTER, join_style="mitre").buffer(
+        _HALF_SPLINTER, join_style="mitre"
+    )
+    pieces = getattr(area, "geoms", [area])
+    centre = Point(junction.position)
+    return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
+
+
+def _extended_roads(
+    roads: Mapping[str, Road], junction: Junction
+) -> BaseGeometry:
+    """Returns the union of a junction's roads, extended to its position.
+
+    A dead end includes the disc in which its road ends.
     """
     stubs = [_arm_centreline(roads[arm.road], arm) for arm in junction.arms]
     parts = [
@@ -126,20 +154,7 @@ def junction_area(
         through = LineString([*line_a.coords[::-1], *line_b.coords[1:]])
         width = min(a.half_width, b.half_width)
         parts.append(through.buffer(width, cap_style="flat"))
-    area = unary_union(parts)
-    radius = junction.kerb_radius
-    area = area.buffer(radius, quad_segs=4 * _QUADRANT_SEGMENTS).buffer(
-        -radius, quad_segs=_QUADRANT_SEGMENTS
-    )
-    for arm in junction.arms:
-        area = area.difference(road_strip(roads[arm.road]))
-    # Cutting can leave splinters beside a road's end.
-    area = area.buffer(-_OVERLAP, join_style="mitre").buffer(
-        _OVERLAP, join_style="mitre"
-    )
-    pieces = getattr(area, "geoms", [area])
-    centre = Point(junction.position)
-    return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
+    return unary_union(parts)
 
 
 def _arm_centreline(road: Road, arm: Arm) -> LineString:
@@ -160,7 +175,36 @@ def make_areas(
         roads: name of each road -> the road.
         junction_areas: name of each junction -> its area, seen from above [m].
     """
-    lanes = {name: road_strip(road) for name, road in roads.items()}
+    strips = {name: road_strip(road) for name, road in roads.items()}
+    bays = _parking_bays(roads)
+    wide = [r for r in roads.values() if 0 < r.median < r.length]
+    medians = unary_union([_median(road) for road in wide])
+    without_bays = union_without_slits(
+        [*strips.values(), *junction_areas.values()], _SEAM
+    )
+    carriageway = union_without_slits([without_bays, *bays.values()], _SEAM)
+    widened = [
+        strips[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
+        for name, road in roads.items()
+    ]
+    for name, area in junction_areas.items():
+        arms = [r for r in roads.values() if name in (r.start, r.end)]
+        width = min(road.sidewalk for road in arms)
+        widened.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
+    outline = _simplified(union_without_slits(widened, _SEAM))
+    return Areas(
+        carriageway=_multi_polygon(carriageway.difference(medians)),
+        lane_area=_multi_polygon(without_bays.difference(medians)),
+        sidewalks=_multi_polygon(outline.difference(carriageway)),
+        medians=_multi_polygon(medians),
+        parking_bays=bays,
+    )
+
+
+def _parking_bays(
+    roads: Mapping[str, Road],
+) -> dict[tuple[str, str], BaseGeometry]:
+    """Returns (name of the road, side) -> area of the parking bays."""
     bays = {}
     for name, road in roads.items():
         if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
@@ -168,28 +212,7 @@ def make_areas(
             far = road.half_width + road.parking
             bays[name, "right"] = _band(road, -far, -edge, _BAY_CLEARANCE)
             bays[name, "left"] = _band(road, edge, far, _BAY_CLEARANCE)
-    wide = [r for r in roads.values() if 0 < r.median < r.length]
-    medians = unary_union([_median(road) for road in wide])
-    without_bays = union_without_slits(
-        [*lanes.values(), *junction_areas.values()], _SEAM
-    )
-    carriageway = union_without_slits([without_bays, *bays.values()], _SEAM)
-    walks = [
-        lanes[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
-        for name, road in roads.items()
-    ]
-    for name, area in junction_areas.items():
-        arms = [r for r in roads.values() if name in (r.start, r.end)]
-        width = min(road.sidewalk for road in arms)
-        walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
-    outline = _simplified(union_without_slits(walks, _SEAM))
-    return Areas(
-        carriageway=_polygons_only(carriageway.difference(medians)),
-        lane_area=_polygons_only(without_bays.difference(medians)),
-        sidewalks=_polygons_only(outline.difference(carriageway)),
-        medians=_polygons_only(medians),
-        parking_bays=bays,
-    )
+    return bays
 
 
 def _median(road: Road) -> BaseGeometry:
@@ -240,8 +263,8 @@ def union_without_slits(
     return make_valid(joined, method="structure", keep_collapsed=False)
 
 
-def _polygons_only(area: BaseGeometry) -> MultiPolygon:
-    """Returns an area as a MultiPolygon."""
+def _multi_polygon(area: BaseGeometry) -> MultiPolygon:
+    """Returns the polygons of an area, without lines and points."""
     pieces = getattr(area, "geoms", [area])
     full = [p for p in pieces if isinstance(p, Polygon) and not p.is_empty]
     return MultiPolygon(full)

@@ -1,4 +1,4 @@
-"""Plane curves: the centrelines of roads, and the turns between lanes."""
+"""Plane curves of lines and arcs: centrelines, and turns between lanes."""
 
 from dataclasses import dataclass
 import math
@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 from cns_drake.base.angles import wrapped
 from cns_drake.base.elementary import arctan2, cos, power, sin, tan
 
-# A fillet may be longer than its segment by this much, so that two arcs can
-# meet in one point although corners are given in centimetres [m].
+# The arcs at both ends of a segment may need this much more than its length, so
+# that they can meet in one point although corners are given in centimetres
+# [m].
 _FIT_TOLERANCE = 0.02
 
 
@@ -73,7 +74,7 @@ class Centreline:
         position = points[0]
         heading = headings[0]
         for k, straight in enumerate(np.maximum(spare, 0.0)):
-            self._append(position, heading, 0.0, straight)
+            self._append_piece(position, heading, 0.0, straight)
             if k < len(turns):
                 corner = points[k + 1]
                 tangent = tangents[k + 1]
@@ -81,12 +82,12 @@ class Centreline:
                     begin = corner - tangent * _direction(heading)
                     curvature = np.sign(turns[k]) / radii[k]
                     length = abs(turns[k]) * radii[k]
-                    self._append(begin, heading, curvature, length)
+                    self._append_piece(begin, heading, curvature, length)
                 heading = headings[k + 1]
                 position = corner + tangent * _direction(heading)
         self._ends = np.cumsum([piece.length for piece in self._pieces])
 
-    def _append(
+    def _append_piece(
         self, start: np.ndarray, heading: float, curvature: float, length: float
     ) -> None:
         if length > 0:
@@ -116,9 +117,9 @@ class Centreline:
 
 
 def sample_stations(start: float, end: float, spacing: float) -> np.ndarray:
-    """Returns evenly spaced arc lengths from start to end, both included [m].
+    """Returns evenly spaced arc lengths (N,) from `start` to `end` [m].
 
-    They are at most `spacing` apart [m].
+    Both ends are included. The arc lengths are at most `spacing` apart [m].
     """
     count = max(2, int(np.ceil((end - start) / spacing - 1e-9)) + 1)
     return np.linspace(start, end, count)
@@ -141,8 +142,10 @@ def blend(
     curve.
 
     Args:
-        p_start, p_end: the points [m]. heading_start, heading_end: directions
-        at these points [rad].
+        p_start: (2,) the first point [m].
+        heading_start: direction of the curve at the first point [rad].
+        p_end: (2,) the last point [m].
+        heading_end: direction of the curve at the last point [rad].
         spacing: approximate distance between two points of the curve [m].
         max_radius: greatest radius of the arc [m].
     """

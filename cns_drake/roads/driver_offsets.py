@@ -14,9 +14,15 @@ import shapely
 from shapely import STRtree
 
 from cns_drake.base.elementary import smooth_step
+from cns_drake.roads.car_outline import (
+    FRONT,
+    HALF_WIDTH,
+    REAR,
+    directions,
+    outlines,
+)
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.u_turn import FRONT, HALF_WIDTH, REAR, directions, outlines
 
 # Distance between the points of the path that `driven_path` needs [m].
 FINE_SPACING = 0.5
@@ -25,19 +31,20 @@ SHORTEST_EPISODE = 15.0
 # Greatest length of an episode in another lane [m].
 LONGEST_EPISODE = 270.0
 # Length of a change from one lane to the other [m].
-_RAMP = 80.0
-# Greatest offset of the car from its line; in a lane of 3.5 m, as much room is
-# left [m].
-_FARTHEST = 0.8
+_LANE_CHANGE_LENGTH = 80.0
+# Greatest offset of the car from its line [m]: the room on each side of a car
+# in the middle of a lane of 3.5 m.
+_MOST_OFFSET = 0.8
 # Least distance of the car from kerbs and other obstacles [m].
 _CLEARANCE = 0.3
 # The smoothed path may fall short of this distance by so much [m].
 _SMOOTHING_SLACK = 0.1
-# Offsets that are tried [m], at one of so many points of the path.
-_OFFSETS = np.linspace(-_FARTHEST, _FARTHEST, 33)
-_CHECKED = 4
+# Offsets that are tried [m].
+_TRIED_OFFSETS = np.linspace(-_MOST_OFFSET, _MOST_OFFSET, 33)
+# Offsets are tried at every fourth point of the path.
+_CHECK_STRIDE = 4
 # Half the length over which the offset is smoothed [m].
-_REACH = 20.0
+_SMOOTHING_REACH = 20.0
 # After this many iterations the error is below 1e-9 for all lengths in
 # scenarios.
 _ITERATIONS = 40
@@ -106,10 +113,16 @@ def _points_beside(
     return np.column_stack([xy, points[:, 2]])
 
 
-def _is_free(
+def _has_room(
     points: np.ndarray, offsets: np.ndarray, obstacles: STRtree
 ) -> np.ndarray:
-    """Returns whether a car has room at K offsets from N points, (N, K)."""
+    """Returns (N, K) bool: whether a car has room at offsets from points.
+
+    Args:
+        points: (N, 3) points of a path [m].
+        offsets: (K,) distances to the left of the path [m].
+        obstacles: index of the edges of obstacles.
+    """
     along = directions(points[:, :2])[:, None]
     left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
     middle = points[:, None, :2] + offsets[:, None] * left
@@ -134,7 +147,7 @@ def _change_lanes(
     assert path.beside is not None  # Only routes have lanes.
     s = path.spacing * np.arange(len(path.points))
     points = path.points
-    half = _RAMP / 2
+    half = _LANE_CHANGE_LENGTH / 2
     ratio = math.log(LONGEST_EPISODE / SHORTEST_EPISODE)
     done = 0.0
     while True:
@@ -144,28 +157,36 @@ def _change_lanes(
         if done > s[-1]:
             return points
         for side in (first_side, 1 - first_side):
-            run = _stretch(path.beside[:, side], int(done / path.spacing))
+            run = _constant_stretch(
+                path.beside[:, side], int(done / path.spacing)
+            )
             begin = max(done, s[run.start] + half)
             end = min(begin + length, s[run.stop - 1] - half)
             if end - begin < SHORTEST_EPISODE:
                 continue
             share = smooth_step(
-                np.clip((s - begin) / _RAMP + 0.5, 0.0, 1.0)
-            ) - smooth_step(np.clip((s - end) / _RAMP + 0.5, 0.0, 1.0))
+                np.clip((s - begin) / _LANE_CHANGE_LENGTH + 0.5, 0.0, 1.0)
+            ) - smooth_step(
+                np.clip((s - end) / _LANE_CHANGE_LENGTH + 0.5, 0.0, 1.0)
+            )
             sign = 1.0 if side == 0 else -1.0
             aside = sign * share * path.beside[:, side]
             moved = _points_beside(points, path.points, aside)
-            if _is_free(moved[run][::_CHECKED], np.zeros(1), obstacles).all():
+            if _has_room(
+                moved[run][::_CHECK_STRIDE], np.zeros(1), obstacles
+            ).all():
                 points = moved
                 done = end + half
                 break
 
 
-def _stretch(beside: np.ndarray, place: int) -> slice:
-    """Returns the stretch around a place on which the lane beside is constant.
+def _constant_stretch(beside: np.ndarray, place: int) -> slice:
+    """Returns the stretch of points on which a neighbouring lane continues.
 
-    `beside` has its distance at each point. Where there is no lane, the stretch
-    is one point.
+    `beside` (N,) contains the distance to the neighbouring lane at each point,
+    0 where there is none [m]. The stretch contains the point `place`, and all
+    points around it with the same distance. Without a lane at `place`, the
+    stretch is this point only.
     """
     if not beside[place]:
         return slice(place, place + 1)
@@ -182,28 +203,30 @@ def _offset_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and greatest offsets (N,) to the left of a path [m].
 
-    They limit the free interval of offsets that is nearest to the path, over
-    the whole length over which offsets are smoothed. Both are 0 where there is
-    no room.
+    At each point, both are the limits of the free interval of offsets that is
+    nearest to the path. They are narrowed so that they hold over the whole
+    length over which offsets are smoothed. Both are 0 where there is no room.
     """
-    free = _is_free(points[::_CHECKED], _OFFSETS, obstacles)
+    free = _has_room(points[::_CHECK_STRIDE], _TRIED_OFFSETS, obstacles)
     low, high = np.zeros((2, len(free)))
-    nearest = np.argsort(np.abs(_OFFSETS), kind="stable")
+    nearest = np.argsort(np.abs(_TRIED_OFFSETS), kind="stable")
     for k, row in enumerate(free):
         if row.any():
             start = nearest[row[nearest].argmax()]
             blocked = np.flatnonzero(~row)
             after = np.searchsorted(blocked, start)
             ends = np.concatenate([[-1], blocked, [len(row)]])
-            low[k] = _OFFSETS[ends[after] + 1]
-            high[k] = _OFFSETS[ends[after + 1] - 1]
-    size = 2 * (math.ceil(_REACH / FINE_SPACING / _CHECKED) + 1) + 1
+            low[k] = _TRIED_OFFSETS[ends[after] + 1]
+            high[k] = _TRIED_OFFSETS[ends[after + 1] - 1]
+    size = (
+        2 * (math.ceil(_SMOOTHING_REACH / FINE_SPACING / _CHECK_STRIDE) + 1) + 1
+    )
     low = maximum_filter1d(low, size, mode="nearest")
     high = minimum_filter1d(high, size, mode="nearest")
     is_narrow = low > high
     low[is_narrow], high[is_narrow] = 0.0, 0.0
     num = len(points)
-    return low.repeat(_CHECKED)[:num], high.repeat(_CHECKED)[:num]
+    return low.repeat(_CHECK_STRIDE)[:num], high.repeat(_CHECK_STRIDE)[:num]
 
 
 def _draw_offsets(
@@ -218,16 +241,10 @@ def _draw_offsets(
     The mean of the process is at least two standard deviations away from both
     bounds or, if these are too close together, in their middle.
     """
-    weights = _kernel()
+    weights = _smoothing_weights()
     reach = len(weights) // 2
     decay, gain = _decay_and_gain(weights, length)
-    noise = rng.standard_normal(len(low) + 2 * reach)
-    value = float(noise[0])
-    values = [value]
-    fresh = math.sqrt(1.0 - decay**2)
-    for one in noise[1:].tolist():
-        value = decay * value + fresh * one
-        values.append(value)
+    values = _ornstein_uhlenbeck(decay, len(low) + 2 * reach, rng)
     low, high = (np.pad(bound, reach, mode="edge") for bound in (low, high))
     least, most = low + 2 * spread, high - 2 * spread
     mean = np.where(
@@ -235,7 +252,7 @@ def _draw_offsets(
         np.clip(0.0, least, np.maximum(least, most)),
         (low + high) / 2,
     )
-    wanted = np.clip(mean + spread * gain * np.array(values), low, high)
+    wanted = np.clip(mean + spread * gain * values, low, high)
     num = len(low) - 2 * reach
     # A loop, because a dot product is rounded differently on other processors.
     offset = np.zeros(num)
@@ -244,9 +261,29 @@ def _draw_offsets(
     return offset
 
 
-def _kernel() -> np.ndarray:
-    """Returns the weights of the smoothing; two derivatives are continuous."""
-    half = round(_REACH / FINE_SPACING)
+def _ornstein_uhlenbeck(
+    decay: float, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Returns a process (N,) with mean 0 and standard deviation 1.
+
+    The correlation of neighbouring values is `decay`, and N is `count`.
+    """
+    noise = rng.standard_normal(count)
+    value = float(noise[0])
+    values = [value]
+    innovation = math.sqrt(1.0 - decay**2)
+    for one in noise[1:].tolist():
+        value = decay * value + innovation * one
+        values.append(value)
+    return np.array(values)
+
+
+def _smoothing_weights() -> np.ndarray:
+    """Returns the weights (N,) of the smoothing, with a sum of 1.
+
+    As a function of the distance, the weight has two continuous derivatives.
+    """
+    half = round(_SMOOTHING_REACH / FINE_SPACING)
     u = np.arange(-half, half + 1) / (half + 1)
     # Products, because how a power is rounded depends on the processor.
     weights = (1.0 - u * u) * (1.0 - u * u) * (1.0 - u * u)

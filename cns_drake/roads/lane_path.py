@@ -1,4 +1,4 @@
-"""The line that a vehicle follows, and the limits of its speed."""
+"""The line along which a vehicle drives, and the limits of its speed."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -114,8 +114,7 @@ def sample_lane_path(
     count = max(1, round(length / spacing))
     wanted = np.linspace(0.0, length, count + 1)
     xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
-    # A limit holds from its first point on. Between two points the lower one
-    # holds.
+    # Index of the corner at which the segment of each point ends.
     after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
     if beside is not None:
         beside = np.minimum(beside[after - 1], beside[after])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 import itertools
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from shapely import STRtree
@@ -23,10 +23,8 @@ from cns_drake.roads.road import (
     Junction,
     LaneRef,
     Road,
-    RoadEntry,
-    RoadsFile,
-    read_roads_file,
 )
+from cns_drake.roads.roads_file import RoadEntry, RoadsFile, read_roads_file
 
 Turn = Literal["left", "straight", "right"]
 # x, y, z [m] and heading [rad].
@@ -121,8 +119,8 @@ class RoadNetwork:
     def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
         """Returns whether the second of two lanes that meet leads back.
 
-        Both are on the same road, and also where the directions of a road
-        separate, e.g. before a roundabout.
+        Both lanes are on the same road, or on two roads that are the separate
+        directions of one road, such as before a roundabout.
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction
@@ -133,8 +131,8 @@ class RoadNetwork:
     def _ends(
         self, incoming: LaneRef, outgoing: LaneRef
     ) -> tuple[_Pose, _Pose]:
-        """Returns the pose of one lane's end and of another one's beginning."""
-        # They are cached: each pair of lanes asks for them.
+        """Returns the poses at which `incoming` ends and `outgoing` begins."""
+        # The poses are cached, because each pair of lanes asks for them.
         wanted = (incoming, "exit"), (outgoing, "entry")
         for lane, end in wanted:
             if (lane, end) not in self._lane_ends:
@@ -224,6 +222,15 @@ def _turn_of(angle_deg: float, num_arms: int) -> Turn:
     return "left" if angle_deg > 0 else "right"
 
 
+class _RoadEnd(NamedTuple):
+    """An end of a road at a junction, as in `Arm`, without its setback."""
+
+    heading: float
+    road: str
+    end: End
+    half_width: float
+
+
 def load_road_network(path: Path | str) -> RoadNetwork:
     """Reads and checks the road network in a `roads.yaml`.
 
@@ -263,6 +270,12 @@ def load_road_network(path: Path | str) -> RoadNetwork:
 def _make_curve(
     path: Path, file: RoadsFile, name: str, entry: RoadEntry
 ) -> Centreline:
+    """Returns the centreline of a road, from junction to junction.
+
+    Raises:
+        InputError: a junction of the road does not exist, the road has no lane,
+            or a corner does not fit.
+    """
     for field in ENDS:
         junction = getattr(entry, field)
         if junction not in file.junctions:
@@ -283,17 +296,28 @@ def _make_curve(
 def _make_junction(
     path: Path, file: RoadsFile, name: str, curves: Mapping[str, Centreline]
 ) -> Junction:
+    """Returns a junction with its arms.
+
+    Args:
+        path: the file, for error messages.
+        file: content of the file.
+        name: name of the junction.
+        curves: name of a road -> its centreline.
+
+    Raises:
+        InputError: too few roads end at the junction.
+    """
     entry = file.junctions[name]
-    ends: list[tuple[float, str, End, float]] = []
+    ends: list[_RoadEnd] = []
     for road_name, road in file.roads.items():
         if name not in (road.start, road.end):
             continue
         width = road.lane_width * sum(road.lanes) + road.median
         first, last = curves[road_name].evaluate([0, curves[road_name].length])
         if road.start == name:
-            ends.append((first[2], road_name, "start", width / 2))
+            ends.append(_RoadEnd(first[2], road_name, "start", width / 2))
         if road.end == name:
-            ends.append((last[2] + np.pi, road_name, "end", width / 2))
+            ends.append(_RoadEnd(last[2] + np.pi, road_name, "end", width / 2))
     if (len(ends) == 1) != entry.dead_end or not ends:
         wanted = "exactly 1 at a dead end" if entry.dead_end else "at least 2"
         advice = ""
@@ -303,7 +327,9 @@ def _make_junction(
             f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
             f"{wanted} must{advice}"
         )
-    ends = sorted((h % (2 * np.pi), road, end, w) for h, road, end, w in ends)
+    ends = sorted(
+        one._replace(heading=one.heading % (2 * np.pi)) for one in ends
+    )
     arms = []
     for k, (heading, road_name, end, half_width) in enumerate(ends):
         setback = getattr(file.roads[road_name], f"{end}_setback")
@@ -316,25 +342,30 @@ def _make_junction(
 
 
 def _derived_setback(
-    ends: Sequence[tuple[float, str, End, float]], k: int, kerb_radius: float
+    ends: Sequence[_RoadEnd], k: int, kerb_radius: float
 ) -> float:
-    """Returns the k-th arm's setback, which its neighbours require [m]."""
+    """Returns the setback that the corners beside the k-th end require [m]."""
     if len(ends) == 1:
         return kerb_radius
-    heading, _, _, half_width = ends[k]
+    heading, half_width = ends[k].heading, ends[k].half_width
     before, after = ends[k - 1], ends[(k + 1) % len(ends)]
     return max(
         carriageway.corner_setback(
-            half_width, other[3], angle % (2 * np.pi), kerb_radius
+            half_width, other.half_width, angle % (2 * np.pi), kerb_radius
         )
         for other, angle in (
-            (before, heading - before[0]),
-            (after, after[0] - heading),
+            (before, heading - before.heading),
+            (after, after.heading - heading),
         )
     )
 
 
 def _check_crossings(path: Path, network: RoadNetwork) -> None:
+    """Checks that roads cross in junctions only.
+
+    Raises:
+        InputError: two roads overlap outside a junction.
+    """
     names = list(network.roads)
     strips = []
     for name in names:

@@ -1,8 +1,7 @@
 """Routes along the lanes of a road network, and their paths."""
 
-from collections import Counter, defaultdict
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
@@ -25,12 +24,10 @@ _ASIDE_LENGTH = 25.0
 # Least distance of the middle of a car's rear axle from kerbs and medians: its
 # front swings out [m].
 CAR_ROOM = 1.4
-
 # Greatest distance before a junction at which a car turns round [m].
 _TURNING_LENGTH = 30.0
 # Distance between the places of turning that are tried [m].
 _TURNING_STEP = 0.5
-
 LaneNumber = Annotated[int, Field(ge=1)]
 LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
 
@@ -114,53 +111,79 @@ def make_lane_path(
             before, is too short for its lane change or has no room for turning
             round; or the whole route is too short.
     """
-    pieces: list[np.ndarray] = []
-    limits: list[np.ndarray] = []
-    beside: list[np.ndarray] = []
+    stretches: list[_Stretch] = []
     begin: float | None = None
     for k, leg in enumerate(route.root):
+        before = route.root[k - 1] if k > 0 else None
         after = route.root[k + 1] if k + 1 < len(route.root) else None
         try:
-            _check_ends(network, leg, k == 0, after)
-            limit = network.roads[leg.road].speed_limit
-            length = network.roads[leg.road].length
-            lanes = _lanes_beside(network.roads[leg.road], leg)
-            if k > 0 and begin is None:
-                before = route.root[k - 1]
-                way = _way(network, before, leg)
-                points = way.points[1:-1]
-                pieces.append(points)
-                limits.append(np.full(len(points), min(limit, limits[-1][0])))
-                common = np.zeros(2)
-                if way.turn == "straight":
-                    common = np.minimum(
-                        lanes, _lanes_beside(network.roads[before.road], before)
-                    )
-                beside.append(np.tile(common, (len(points), 1)))
+            _check_ends(network, leg, before is None, after)
+            road = network.roads[leg.road]
+            if before is not None and begin is None:
+                stretches.append(_through_junction(network, before, leg))
             first = leg.start or 0.0 if begin is None else begin
+            loop = np.zeros((0, 3))
             if after is not None and leads_back(leg, after):
-                loop, last = _turn_round(network, leg, after, first, aside)
-                begin = length - last
+                loop, last = _turning_loop(network, leg, after, first, aside)
+                begin = road.length - last
             else:
-                loop = np.zeros((0, 3))
-                last = leg.end or length
+                last = leg.end or road.length
                 begin = None
             points = _leg_points(network, leg, first, last, aside)
-            pieces += [points, loop]
-            beside.append(np.tile(lanes, (len(points), 1)))
-            beside.append(np.zeros((len(loop), 2)))
-            limits.append(np.full(len(points) + len(loop), limit))
+            beside = _lanes_beside(road, leg)
+            stretches += [
+                _Stretch(points, road.speed_limit, beside),
+                _Stretch(loop, road.speed_limit, np.zeros(2)),
+            ]
         except ValueError as error:
             raise InputError(
                 f"{source}: route.{k} ({leg.road} {leg.direction}): {error}"
             ) from error
     return sample_lane_path(
-        np.concatenate(pieces),
-        np.concatenate(limits),
+        np.concatenate([one.points for one in stretches]),
+        np.concatenate(
+            [np.full(len(one.points), one.speed_limit) for one in stretches]
+        ),
         spacing,
         f"{source}: route",
-        np.concatenate(beside),
+        np.concatenate(
+            [np.tile(one.beside, (len(one.points), 1)) for one in stretches]
+        ),
     )
+
+
+class _Stretch(NamedTuple):
+    """A part of a path, with one speed limit and the same lanes beside it.
+
+    Attributes:
+        points: (N, 3) points of the path [m].
+        speed_limit: speed limit [m/s].
+        beside: (2,) distances to the neighbouring lanes on the left and on the
+            right [m]; 0 without such a lane.
+    """
+
+    points: np.ndarray
+    speed_limit: float
+    beside: np.ndarray
+
+
+def _through_junction(
+    network: RoadNetwork, before: RouteLeg, leg: RouteLeg
+) -> _Stretch:
+    """Returns the path through the junction between two legs.
+
+    Raises:
+        ValueError: there is no legal connection.
+    """
+    way = _legal_connection(network, before, leg)
+    roads = network.roads[before.road], network.roads[leg.road]
+    beside = np.zeros(2)
+    if way.turn == "straight":
+        beside = np.minimum(
+            _lanes_beside(roads[0], before), _lanes_beside(roads[1], leg)
+        )
+    limit = min(road.speed_limit for road in roads)
+    return _Stretch(way.points[1:-1], limit, beside)
 
 
 def _lanes_beside(road: Road, leg: RouteLeg) -> np.ndarray:
@@ -182,6 +205,11 @@ def leads_back(leg: RouteLeg, after: RouteLeg) -> bool:
 def _check_ends(
     network: RoadNetwork, leg: RouteLeg, is_first: bool, after: RouteLeg | None
 ) -> None:
+    """Checks the road, the start and the end of a leg.
+
+    Raises:
+        ValueError: the road does not exist, or start or end are not allowed.
+    """
     if leg.start is not None and not is_first:
         raise ValueError("start is allowed in the first leg only")
     if leg.road not in network.roads:
@@ -222,28 +250,33 @@ def _leg_points(
         )
     count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
     travelled = np.linspace(start, end, count)
-    offset = first + (last - first) * _lane_change(travelled, first != last)
+    offset = np.full(count, first)
+    if first != last:
+        offset += (last - first) * _completed_share(travelled)
     offset = _offsets_moved_right(road, leg.direction, offset, travelled, aside)
-    return road.evaluate(_stations(road, leg, travelled), offset)[:, :3]
+    return road.evaluate(_stations_of(road, leg, travelled), offset)[:, :3]
 
 
-def _stations(road: Road, leg: RouteLeg, travelled: np.ndarray) -> np.ndarray:
+def _stations_of(
+    road: Road, leg: RouteLeg, travelled: np.ndarray
+) -> np.ndarray:
     if leg.direction == "forward":
         return road.first_station + travelled
     return road.last_station - travelled
 
 
-def _turn_round(
+def _turning_loop(
     network: RoadNetwork,
     leg: RouteLeg,
     after: RouteLeg,
     start: float,
     aside: float,
 ) -> tuple[np.ndarray, float]:
-    """Returns the turn of the car at the end of a leg.
+    """Returns the loop in which the car turns round at the end of a leg.
 
-    It consists of the points (N, 3) between the lanes, and the distance from
-    the entry of the road at which the car leaves the first lane [m].
+    The result is the points (N, 3) of the loop between the lanes [m], and the
+    distance from the entry of the road at which the car leaves the first lane
+    [m].
 
     Raises:
         ValueError: there is no room, or no such lane.
@@ -255,7 +288,7 @@ def _turn_round(
 
         The pose (3,) contains x and y [m] and the heading [rad] of the lane's
         middle, `travelled` [m] after the entry of the road. The opposite lane
-        is on the left; its distance is that between both middles [m].
+        is on the left; the distance is measured from middle to middle [m].
         """
         offsets = [
             _offsets_moved_right(
@@ -270,7 +303,7 @@ def _turn_round(
                 (after, after.entry_lane, road.length - travelled),
             )
         ]
-        station = _stations(road, leg, np.array([travelled]))
+        station = _stations_of(road, leg, np.array([travelled]))
         x, y, _, heading = road.evaluate(station, offsets[0])[0]
         if leg.direction == "backward":
             heading += np.pi
@@ -289,7 +322,7 @@ def _turn_round(
     x, y, heading = lanes_at(loop.begin)[0]
     ahead = (loop.points[:, 0] - x) * math.cos(heading)
     ahead += (loop.points[:, 1] - y) * math.sin(heading)
-    z = road.height(_stations(road, leg, loop.begin + ahead))
+    z = road.height(_stations_of(road, leg, loop.begin + ahead))
     points = np.column_stack([loop.points, z])[1:-1]
     return points, loop.begin
 
@@ -318,14 +351,18 @@ def _offsets_moved_right(
     return right * (from_middle + share * (wanted - from_middle))
 
 
-def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
-    """Returns the completed share of a lane change, from 0 to 1.
+def _completed_share(travelled: np.ndarray) -> np.ndarray:
+    """Returns the completed share (N,) of a lane change, from 0 to 1.
 
-    The change lies in the middle of the leg. It follows the quintic whose first
-    and second derivatives vanish at both ends.
+    The change lies in the middle of the leg. The share follows the quintic
+    whose first and second derivatives vanish at both ends.
+
+    Args:
+        travelled: (N,) distances along the leg, from its start to its end [m].
+
+    Raises:
+        ValueError: the leg is too short for a change of lane.
     """
-    if not wanted:
-        return np.zeros_like(travelled)
     available = travelled[-1] - travelled[0]
     if available < MIN_LANE_CHANGE_LENGTH:
         raise ValueError(
@@ -337,7 +374,9 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
     return smooth_step(np.clip((travelled - middle) / length + 0.5, 0.0, 1.0))
 
 
-def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> Connection:
+def _legal_connection(
+    network: RoadNetwork, previous: RouteLeg, leg: RouteLeg
+) -> Connection:
     """Returns the connection from one leg to the next.
 
     Raises:
@@ -356,81 +395,3 @@ def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> Connection:
             f"{way.outgoing.lane}: {rule}"
         )
     return way
-
-
-# How strongly roads that were not driven before are preferred.
-_WEIGHT_OF_NEW = 6.0
-
-
-def draw_route(
-    network: RoadNetwork, length: float, rng: np.random.Generator
-) -> Route:
-    """Returns a random legal route, preferably along roads not yet driven.
-
-    The total length of the route's roads is at least `length` [m].
-
-    Raises:
-        InputError: no route in the network can be continued without end.
-    """
-    successors = _successors(network)
-    if not successors:
-        raise InputError(
-            "roads: every lane comes to an end, so that no endless route exists"
-        )
-    lanes = sorted(successors)
-    lane = lanes[int(rng.integers(len(lanes)))]
-    visits: Counter[str] = Counter()
-    legs: list[tuple[LaneRef, int]] = []
-    driven = 0.0
-    while driven < length:
-        visits[lane.road] += 1
-        driven += network.roads[lane.road].length
-        choices = successors[lane]
-        weights = np.array(
-            [_WEIGHT_OF_NEW ** -visits[after.road] for _, after in choices]
-        )
-        chosen = int(rng.choice(len(choices), p=weights / weights.sum()))
-        exit_lane, after = choices[chosen]
-        legs.append((lane, exit_lane))
-        lane = after
-    # No road follows the last one, so the drive stays in its lane.
-    legs[-1] = (legs[-1][0], legs[-1][0].lane)
-    return Route([_leg(entry, exit_lane) for entry, exit_lane in legs])
-
-
-def _leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
-    lane = entry.lane if exit_lane == entry.lane else (entry.lane, exit_lane)
-    return RouteLeg(road=entry.road, direction=entry.direction, lane=lane)
-
-
-def _successors(
-    network: RoadNetwork,
-) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
-    """Returns lane -> its continuations, as pairs: exit lane, next lane.
-
-    Lanes from which no endless route leads on are left out.
-    """
-    ways = defaultdict(list)
-    for junction in network.junctions:
-        for way in network.connections(junction):
-            ways[way.incoming].append(way.outgoing)
-    successors = {}
-    for lane in network.lanes():
-        road = network.roads[lane.road]
-        exits = [lane.lane]
-        if road.length > MIN_LANE_CHANGE_LENGTH:
-            exits = [*range(1, road.lanes[lane.direction] + 1)]
-        successors[lane] = [
-            (number, after)
-            for number in exits
-            for after in sorted(ways[lane._replace(lane=number)])
-        ]
-    while True:
-        alive = {
-            lane: [way for way in choices if way[1] in successors]
-            for lane, choices in successors.items()
-            if any(way[1] in successors for way in choices)
-        }
-        if alive == successors:
-            return alive
-        successors = alive

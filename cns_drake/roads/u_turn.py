@@ -11,6 +11,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import cos, sin
+from cns_drake.roads.car_outline import swept_area
 from cns_drake.roads.centreline import Centreline, sample_stations
 
 # From the car in worlds/vehicle.sdf: its wheelbase [m].
@@ -19,18 +20,11 @@ _WHEELBASE = 2.8
 _HALF_TRACK = 0.79
 # Greatest steering angle of the inner wheel [rad].
 _STEERING_LIMIT = 0.7
-# Length of the car behind the rear axle [m].
-REAR = 1.0
-# Length of the car ahead of the rear axle [m].
-FRONT = 3.72
-# Half the width of the car with mirrors [m].
-HALF_WIDTH = 1.03
-
 # Tightest radius on which the middle of the rear axle can drive [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / math.tan(_STEERING_LIMIT) + _HALF_TRACK)
 # Radius of planned loops; smoothing makes the curve slightly tighter [m].
 LOOP_RADIUS = 4.4
-# Distance between the places at which the outline of the car is tested [m].
+# Distance between the points of a loop, at which the car must fit [m].
 _STEP = 0.25
 # Radius of a dead end that has room for the loop of every street [m].
 _DEAD_END_RADIUS = 8.0
@@ -65,8 +59,7 @@ def loop_corners(
     swing_in = math.acos(min(1.0, (radius + aside_in) / (2 * radius)))
     swing_out = math.acos(min(1.0, (radius + aside_out) / (2 * radius)))
     turn = (heading_out - heading_in) % (2 * np.pi)
-    round_ = turn + swing_in + swing_out
-    share = round_ / 3
+    share = (turn + swing_in + swing_out) / 3
     # The corners of the loop lie outside its circle.
     first = heading_in - swing_in - np.pi / 2 + share / 2
     angles = first + share * np.arange(3)
@@ -128,18 +121,12 @@ def find_loop(
     for centre in centres:
         begin = float(centre) - _centre_distance(lanes_at(float(centre))[1])
         (x, y, heading), width = lanes_at(begin)
-        points = _loop(np.array([x, y]), heading, width)
+        points = _loop_points(np.array([x, y]), heading, width)
         swept = swept_area(points)
         if area.covers(swept):
             return Loop(begin, points)
-        # From the middle of the loop to both sides.
+        middle = _loop_centre(np.array([x, y]), heading, width)
         left = np.array([-math.sin(heading), math.cos(heading)])
-        along = np.array([left[1], -left[0]])
-        middle = (
-            np.array([x, y])
-            + _centre_distance(width) * along
-            + width / 2 * left
-        )
         sideways = (shapely.get_coordinates(swept) - middle) @ left
         needed = min(needed, 2 * np.abs(sideways).max())
         place = Point(middle)
@@ -154,20 +141,33 @@ def find_loop(
 
 
 def _centre_distance(width: float) -> float:
-    """Returns the distance from a loop's beginning to its centre [m]."""
+    """Returns how far ahead of its beginning a loop has its centre [m].
+
+    `width` is the distance to the opposite lane [m].
+    """
     radius = max(LOOP_RADIUS, width / 2)
     return float(np.sqrt(4 * radius**2 - (radius + width / 2) ** 2))
 
 
-def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
-    """Returns the points (N, 2) of a loop into the opposite lane [m].
+def _loop_centre(start: np.ndarray, heading: float, width: float) -> np.ndarray:
+    """Returns the centre (2,) of a loop that begins at a place (2,) [m].
 
-    That lane is `width` to the left.
+    The opposite lane is `width` to the left of the lane [m].
     """
-    radius = max(LOOP_RADIUS, width / 2)
     along = np.array([math.cos(heading), math.sin(heading)])
     left = np.array([-along[1], along[0]])
-    centre = start + _centre_distance(width) * along + width / 2 * left
+    return start + _centre_distance(width) * along + width / 2 * left
+
+
+def _loop_points(start: np.ndarray, heading: float, width: float) -> np.ndarray:
+    """Returns the points (N, 2) of a loop into the opposite lane [m].
+
+    The loop begins at the place `start` (2,). The opposite lane is `width` to
+    the left of the lane [m].
+    """
+    radius = max(LOOP_RADIUS, width / 2)
+    left = np.array([-math.sin(heading), math.cos(heading)])
+    centre = _loop_centre(start, heading, width)
     corners = loop_corners(
         centre, heading, heading + np.pi, radius, width / 2, width / 2
     )
@@ -176,52 +176,3 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
         np.full(len(corners), radius),
     )
     return curve.evaluate(sample_stations(0.0, curve.length, _STEP))[:, :2]
-
-
-def swept_area(points: ArrayLike) -> BaseGeometry:
-    """Returns the area that a car covers while its rear axle follows points.
-
-    The points (N, 2) are positions of the axle's middle and close to one
-    another [m].
-    """
-    points = np.asarray(points, dtype=float)
-    along = directions(points)
-    return shapely.union_all(
-        shapely.polygons(outlines(points, along, REAR, FRONT, HALF_WIDTH))
-    )
-
-
-def directions(points: np.ndarray) -> np.ndarray:
-    """Returns the unit tangents (N, 2) of a path, at its points (N, 2)."""
-    along = np.gradient(points, axis=0)
-    along /= np.sqrt(along[:, :1] ** 2 + along[:, 1:] ** 2)
-    return along
-
-
-def outlines(
-    places: np.ndarray,
-    ahead: np.ndarray,
-    rear: float,
-    front: float,
-    half_width: float,
-) -> np.ndarray:
-    """Returns the corners (..., 4, 2) of cars seen from above [m].
-
-    Args:
-        places: (..., 2) positions of the cars' frames [m].
-        ahead: (..., 2) unit vectors in the direction of the cars.
-        rear, front: distances from the frames' origins to the rear and front
-            ends of the cars, both positive [m].
-        half_width: half the width of the cars [m].
-    """
-    left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
-    corners = [
-        places + x * ahead + y * left
-        for x, y in (
-            (-rear, -half_width),
-            (front, -half_width),
-            (front, half_width),
-            (-rear, half_width),
-        )
-    ]
-    return np.stack(corners, axis=-2)

@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.base.angles import wrapped
-from cns_drake.base.csv_files import read_rows
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
-from cns_drake.base.number_text import to_number
-from cns_drake.base.repetitions import repeated
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
+from cns_drake.roads.waypoint_file import read_waypoints
 
 # Radius of the arcs that round corners, where the neighbouring waypoints leave
 # room for it [m].
@@ -24,8 +22,6 @@ _CORNER_RADIUS = 8.0
 _SHARPEST_TURN_DEG = 150.0
 # Waypoints closer than this to the one before count as the same [m].
 _SAME_PLACE = 1e-3
-# A greater coordinate is a mistake, not a place [m].
-_FARTHEST = 1_000_000.0
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
 
@@ -76,7 +72,7 @@ def make_waypoint_path(
 
     Args:
         waypoints: (N, 3) positions of the vehicle frame [m].
-        spacing: distance between the points of the path [m].
+        spacing: approximate distance between the points of the path [m].
         names: N names of the waypoints, for error messages.
         source: name of the list of waypoints, for error messages.
         u_turns: whether turns by more than 150 degrees are driven as loops.
@@ -100,23 +96,9 @@ def make_waypoint_path(
     headings = arctan2(edges[:, 1], edges[:, 0])
     turns = np.pi - (np.pi - np.diff(headings)) % (2 * np.pi)
     is_loop = np.abs(turns) > np.radians(_SHARPEST_TURN_DEG)
-    for k in np.flatnonzero(is_loop):
-        if not u_turns:
-            raise InputError(
-                f"{names[k + 1]}: turns by {np.degrees(abs(turns[k])):.0f} "
-                f"deg; a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at "
-                "most; with u_turns: true it turns round there in a loop"
-            )
-    # The lengths of the segments that loops need before and behind them.
-    taken = np.where(is_loop, _loop_length(turns), 0.0)
-    taken = np.concatenate([[0.0], taken, [0.0]])
-    free = lengths - taken[:-1] - taken[1:]
-    for k in np.flatnonzero((free < 0) & (lengths > 0)):
-        raise InputError(
-            f"{names[k + 1]}: turning round needs {lengths[k] - free[k]:.2f} "
-            "m between this waypoint and the one before, which are "
-            f"{lengths[k]:.2f} m apart"
-        )
+    if not u_turns:
+        _refuse_loops(turns, is_loop, names)
+    free = _free_lengths(lengths, turns, is_loop, names)
     usable = np.minimum(lengths / 2, free)
     room = np.minimum(usable[:-1], usable[1:])
     tangents = tan(np.where(is_loop, 0.0, np.abs(turns)) / 2)
@@ -126,12 +108,12 @@ def make_waypoint_path(
     for at, loops in enumerate(is_loop):
         corner = waypoints[at + 1 : at + 2]
         if loops:
-            xy = _loop(corner[0, :2], headings[at], turns[at])
+            xy = _loop_corners_at(corner[0, :2], headings[at], turns[at])
             z = np.full(len(xy), corner[0, 2])
             corner = np.column_stack([xy, z])
         corners.append(corner)
         corner_radii += [LOOP_RADIUS if loops else radii[at]] * len(corner)
-    return _rounded(
+    return _rounded_path(
         np.concatenate([*corners, waypoints[-1:]]),
         np.array(corner_radii),
         spacing,
@@ -139,7 +121,52 @@ def make_waypoint_path(
     )
 
 
-def _rounded(
+def _refuse_loops(
+    turns: np.ndarray, is_loop: np.ndarray, names: list[str]
+) -> None:
+    """Raises an InputError if any inner waypoint needs a loop.
+
+    `turns` (N - 2,) [rad] and `is_loop` (N - 2,) are for the inner ones of N
+    waypoints, and `names` contains the names of all.
+    """
+    for k in np.flatnonzero(is_loop):
+        raise InputError(
+            f"{names[k + 1]}: turns by {np.degrees(abs(turns[k])):.0f} "
+            f"deg; a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at "
+            "most; with u_turns: true it turns round there in a loop"
+        )
+
+
+def _free_lengths(
+    lengths: np.ndarray,
+    turns: np.ndarray,
+    is_loop: np.ndarray,
+    names: list[str],
+) -> np.ndarray:
+    """Returns the lengths (N - 1,) of segments that loops leave free [m].
+
+    Args:
+        lengths: (N - 1,) lengths of the segments between N waypoints [m].
+        turns: (N - 2,) turns at the inner waypoints [rad].
+        is_loop: (N - 2,) whether the car turns round there in a loop.
+        names: names of the N waypoints, for error messages.
+
+    Raises:
+        InputError: a segment is too short for its loops.
+    """
+    taken = np.where(is_loop, _loop_approach(turns), 0.0)
+    taken = np.concatenate([[0.0], taken, [0.0]])
+    free = lengths - taken[:-1] - taken[1:]
+    for k in np.flatnonzero((free < 0) & (lengths > 0)):
+        raise InputError(
+            f"{names[k + 1]}: turning round needs {lengths[k] - free[k]:.2f} "
+            "m between this waypoint and the one before, which are "
+            f"{lengths[k]:.2f} m apart"
+        )
+    return free
+
+
+def _rounded_path(
     corners: np.ndarray, radii: np.ndarray, spacing: float, source: object
 ) -> LanePath:
     """Returns the path along corners (N, 3), rounded with N - 2 radii [m]."""
@@ -150,9 +177,9 @@ def _rounded(
     turns = np.abs(wrapped(np.diff(headings)))
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
-    # The curve passes each corner in the middle of its arc.
     from scipy.interpolate import PchipInterpolator
 
+    # The curve passes each corner in the middle of its arc.
     saved = 2 * radii * tan(turns / 2) - radii * turns
     shortened = np.concatenate([[0.0], np.cumsum(saved)])
     lengths = np.hypot(edges[:, 0], edges[:, 1])
@@ -164,7 +191,7 @@ def _rounded(
     return sample_lane_path(points, np.full(count, np.inf), spacing, source)
 
 
-def _loop_length(turns: np.ndarray) -> np.ndarray:
+def _loop_approach(turns: np.ndarray) -> np.ndarray:
     """Returns the lengths (N,) that loops need before and behind them [m]."""
     aside = cos(turns / 2)
     return LOOP_RADIUS * (
@@ -172,7 +199,9 @@ def _loop_length(turns: np.ndarray) -> np.ndarray:
     )
 
 
-def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
+def _loop_corners_at(
+    place: np.ndarray, heading: float, turn: float
+) -> np.ndarray:
     """Returns the corners of a loop whose far end is a waypoint (2,) [m].
 
     The car arrives with a heading and turns by an angle, positive to the left
@@ -180,7 +209,7 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
     """
     if turn < 0:
         mirror = np.array([1.0, -1.0])
-        return _loop(place * mirror, -heading, -turn) * mirror
+        return _loop_corners_at(place * mirror, -heading, -turn) * mirror
     outwards = heading - (np.pi - turn) / 2
     centre = place - LOOP_RADIUS * np.array(
         [math.cos(outwards), math.sin(outwards)]
@@ -189,66 +218,3 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
     return loop_corners(
         centre, heading, heading + turn, LOOP_RADIUS, aside, aside
     )
-
-
-def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Reads waypoints from a file.
-
-    Returns:
-        (N, 3) positions of the waypoints [m]; the line number of each waypoint.
-
-    Raises:
-        InputError: the file cannot be read, or a line is not usable. The
-            message names file, line and fault.
-    """
-    points, lines = [], []
-    columns = None
-    for line, cells in read_rows(path):
-        where = f"{path}: line {line}"
-        if columns is None:
-            columns = _columns(cells, where)
-            if not _is_number(cells[columns[0]]):
-                continue
-        if max(columns) >= len(cells):
-            raise InputError(
-                f"{where}: {len(cells)} column(s) are too few; give x and y, "
-                "or x, y and z"
-            )
-        values = [cells[column] for column in columns]
-        for value in values:
-            if not _is_number(value):
-                raise InputError(f"{where}: {value!r} is not a finite number")
-            if abs(float(value)) > _FARTHEST:
-                raise InputError(
-                    f"{where}: {value} m are more than {_FARTHEST:.0f} m"
-                )
-        x, y, *z = map(float, values)
-        points.append((x, y, z[0] if z else 0.0))
-        lines.append(line)
-    if not points:
-        raise InputError(f"{path}: the file has no waypoints")
-    return np.array(points), lines
-
-
-def _columns(cells: list[str], where: str) -> list[int]:
-    """Returns the columns of x, y and, if present, z, from the first line."""
-    names = [cell.lower() for cell in cells]
-    if {"x", "y"} <= set(names):
-        wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]
-        for name in repeated(names):
-            if name in wanted:
-                raise InputError(f"{where}: column '{name}' is there twice")
-        return [names.index(name) for name in wanted]
-    if not all(_is_number(cell) for cell in cells):
-        raise InputError(
-            f"{where}: neither numbers nor the names of columns x, y and z"
-        )
-    if len(cells) not in (2, 3):
-        raise InputError(
-            f"{where}: {len(cells)} column(s); it must be x, y or x, y, z"
-        )
-    return list(range(len(cells)))
-
-
-def _is_number(text: str) -> bool:
-    return math.isfinite(to_number(text))

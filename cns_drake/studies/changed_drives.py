@@ -8,7 +8,8 @@ import numpy as np
 
 from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.route import Route, draw_route
+from cns_drake.roads.random_route import draw_route
+from cns_drake.roads.route import Route
 from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario

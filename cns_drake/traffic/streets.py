@@ -14,7 +14,7 @@ import shapely
 
 from cns_drake.base.compiled import compiled
 from cns_drake.base.elementary import arctan2, cos, sin
-from cns_drake.roads.u_turn import outlines
+from cns_drake.roads.car_outline import outlines
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.polylines import distances_along
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE

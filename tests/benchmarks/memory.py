@@ -41,7 +41,7 @@ def print_growth(drive: str, frames: int) -> None:
 
     from cns_drake.recording.schedule import FRAME_PERIOD
     from cns_drake.roads.network import load_road_network
-    from cns_drake.roads.route import draw_route
+    from cns_drake.roads.random_route import draw_route
     from cns_drake.scenarios.scenario_files import load_scenario
 
     scenario = load_scenario(drive)

@@ -3,13 +3,14 @@
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.drives.search import find_drives
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.options import ImportFaults
 from helpers.small_opendrive import (
     TWO_LANES,
     cubic,
@@ -54,6 +55,6 @@ def read_opendrive(folder: Path) -> None:
     except ValueError as error:
         raise InputError(str(error)) from error
     streets = ImportedStreets(split_levels(bands)[0])
-    find_lane_drives(bands)
+    find_drives(BandGraph(bands))
     for one in roads:
         list(thing_structures(one, streets.areas.lane_area, faults))

@@ -30,7 +30,7 @@ from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import furnish
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
-from cns_drake.roads import street_areas
+from cns_drake.roads import surface_heights
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.scene.map_folder import MapFolder
@@ -67,7 +67,7 @@ class Streets(NamedTuple):
     """
 
     areas: Areas
-    surface: street_areas.SurfaceHeights
+    surface: surface_heights.SurfaceHeights
     kerb_height: float
     junctions: BaseGeometry
     margins: BaseGeometry
@@ -75,7 +75,7 @@ class Streets(NamedTuple):
     structures: Sequence[Structure]
     furnish: Callable[[Draft], None]
     park: Callable[[Draft], None]
-    kerbs: street_areas.KerbMap | None = None
+    kerbs: surface_heights.KerbMap | None = None
 
 
 def make_city(world: Path) -> City:
@@ -111,7 +111,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     """
     streets = Streets(
         areas=network.areas,
-        surface=street_areas.RoadSurface(network),
+        surface=surface_heights.RoadSurface(network),
         kerb_height=kerb_height(network),
         junctions=unary_union(list(network.junction_areas.values())),
         margins=Polygon(),

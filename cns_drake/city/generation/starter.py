@@ -23,7 +23,7 @@ from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from cns_drake.roads.route import draw_route
+from cns_drake.roads.random_route import draw_route
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 
 # The generated world extends this far beyond the roads [m].

@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Structure, snap
-from cns_drake.roads import street_areas
+from cns_drake.roads import surface_heights
 
 # Distance of the nodes between which the field is interpolated [m].
 _NODES = 2.0
@@ -77,8 +77,8 @@ class SlopingGround:
 
     def __init__(
         self,
-        surface: street_areas.SurfaceHeights,
-        kerb_height: float | street_areas.KerbMap,
+        surface: surface_heights.SurfaceHeights,
+        kerb_height: float | surface_heights.KerbMap,
         streets: BaseGeometry,
         bounds: tuple[float, float, float, float],
         pads: Sequence[Pad] = (),
@@ -192,8 +192,8 @@ Ground = LevelGround | SlopingGround
 
 
 def make_ground(
-    surface: street_areas.SurfaceHeights,
-    kerb_height: float | street_areas.KerbMap,
+    surface: surface_heights.SurfaceHeights,
+    kerb_height: float | surface_heights.KerbMap,
     streets: BaseGeometry,
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),

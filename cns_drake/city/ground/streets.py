@@ -19,7 +19,7 @@ from cns_drake.city.geometry import (
     wall_mesh,
 )
 from cns_drake.city.ground.coverings import Covering
-from cns_drake.roads import street_areas
+from cns_drake.roads import surface_heights
 from cns_drake.roads.carriageway import Areas
 from cns_drake.roads.network import RoadNetwork
 
@@ -60,7 +60,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
     bays = unary_union(list(network.areas.parking_bays.values()))
     return street_surfaces(
         network.areas,
-        street_areas.RoadSurface(network),
+        surface_heights.RoadSurface(network),
         kerb_height(network),
         [parking_bays(bays)],
     )
@@ -68,8 +68,8 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
 
 def street_surfaces(
     areas: Areas,
-    surface: street_areas.SurfaceHeights,
-    kerb: float | street_areas.KerbMap,
+    surface: surface_heights.SurfaceHeights,
+    kerb: float | surface_heights.KerbMap,
     coverings: Sequence[Covering],
     kerbless: BaseGeometry | None = None,
 ) -> list[Structure]:
@@ -120,7 +120,8 @@ def kerb_area(paved: BaseGeometry) -> MultiPolygon:
 
 
 def _street_heights(
-    surface: street_areas.SurfaceHeights, kerb: float | street_areas.KerbMap
+    surface: surface_heights.SurfaceHeights,
+    kerb: float | surface_heights.KerbMap,
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
 

@@ -17,7 +17,7 @@ from cns_drake.base.errors import validated
 from cns_drake.base.input_models import InputModel
 from cns_drake.base.repetitions import repeated
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.roads.road import MeshStem
+from cns_drake.roads.roads_file import MeshStem
 
 # Greatest extent of a city [m]; the size of the generated files grows with its
 # area.

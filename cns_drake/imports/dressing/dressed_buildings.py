@@ -10,113 +10,21 @@ from shapely.geometry import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.geometry import (
-    MeshShape,
-    Model,
-    UpperSides,
-    looks_up,
-    turned_up,
+from cns_drake.city.geometry import Model, UpperSides, turned_up
+from cns_drake.imports.dressing import facade_pieces, facade_plan, roof_pieces
+from cns_drake.imports.dressing.bare_buildings import (
+    BareBuilding,
+    split_buildings,
 )
-from cns_drake.imports.dressing import facade_pieces, roof_pieces
 from cns_drake.imports.dressing.drive_views import DriveViews
-from cns_drake.imports.dressing.facade_pieces import FacadePlan
-from cns_drake.imports.dressing.styles import Style, make_style
-from cns_drake.imports.dressing.wall_panels import (
-    Panel,
-    find_panels,
-    is_upright,
-)
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.faces import joined
-from cns_drake.imports.foreign_city import (
-    Imported,
-    Street,
-    random_generator,
-    to_mesh,
-)
+from cns_drake.imports.dressing.facade_plan import FacadePlan
+from cns_drake.imports.dressing.wall_panels import Panel, find_panels
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
-
-# A building whose feet are farther from the ground than this was sunk into it
-# [m].
-_LET_IN = 2.0
-
-
-@dataclass(frozen=True)
-class BareBuilding:
-    """An imported building, split into surfaces that details can be added to.
-
-    Attributes:
-        one: the building.
-        walls: triangles (M, 3, 3) of the walls [m].
-        roof: triangles (M, 3, 3) of the roof [m].
-        rest: triangles (M, 3, 3) of all other surfaces [m].
-        base: height of the lowest floor in W [m].
-        style: appearance of the building.
-        is_flat: whether the roof is flat.
-        rng: random generator for the details.
-    """
-
-    one: Imported
-    walls: np.ndarray
-    roof: np.ndarray
-    rest: np.ndarray
-    base: float
-    style: Style
-    is_flat: bool
-    rng: np.random.Generator
-
-
-def split_buildings(
-    buildings: Sequence[Imported], ground: Ground, seed: int
-) -> list[BareBuilding]:
-    """Returns buildings, split into walls, roof and other surfaces.
-
-    A variant of a building, such as a lower building in an earlier stage, has
-    the style of the original.
-
-    Args:
-        buildings: the buildings.
-        ground: the ground on which they stand.
-        seed: seed of the random styles.
-    """
-    found = []
-    styles: dict[str, Style] = {}
-    for one in sorted(buildings, key=lambda one: one.original != ""):
-        some = _split_building(one, ground, seed, styles.get(one.original))
-        styles[one.draw_name] = some.style
-        found.append(some)
-    return found
-
-
-def _split_building(
-    one: Imported, ground: Ground, seed: int, known: Style | None = None
-) -> BareBuilding:
-    """Returns a building, split; `known` is the style of its original."""
-    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
-    for part in one.structure.model.parts:
-        if isinstance(part.shape, MeshShape):
-            mesh = one.structure.model.meshes[part.shape.mesh]
-            surfaces[part.name] = mesh.vertices[mesh.triangles()]
-    body = surfaces["body"]
-    upright, up = is_upright(body), looks_up(body)
-    roof = np.concatenate([surfaces["roof"], body[up]])
-    walls, rest = body[upright], body[~upright & ~up]
-    corners = one.triangles.reshape(-1, 3)
-    foot = float(corners[:, 2].min())
-    below = float(ground.height(corners[:, :2]).min())
-    base = foot if abs(foot - below) < _LET_IN else below
-    width, depth = np.ptp(corners[:, :2], axis=0)
-    top = walls if len(walls) else one.triangles
-    height = max(1.0, float(top[:, :, 2].max()) - base)
-    is_flat = bool(len(roof)) and roof_pieces.is_flat_roof(roof)
-    rng = random_generator(seed, "dressing", one.draw_name)
-    area = 0.8 * float(width * depth)
-    style = make_style(one.tags, one.year, area, height, is_flat, rng)
-    if known is not None:
-        storeys = max(1, round(height / known.storey))
-        style = replace(known, storey=height / storeys)
-    return BareBuilding(one, walls, roof, rest, base, style, is_flat, rng)
-
+from cns_drake.imports.named_randomness import random_generator
+from cns_drake.imports.streets import Street
+from cns_drake.imports.structures import Imported, to_mesh
 
 # Walls farther than this from all drives get no windows [m].
 _WALLS_WITHIN = 60.0
@@ -187,7 +95,7 @@ def dress_buildings(
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
-        views = DriveViews(drives, ground, joined(hiding))
+        views = DriveViews(drives, ground, joined_triangles(hiding))
         upper = UpperSides(turned_up(paving))
         walls = _plan_facades(bare, drives, streets, ground, views, upper)
     paths = MultiLineString([drive.path for drive in drives])
@@ -263,7 +171,7 @@ def _plan_facades(
     before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
     heights = ground.height(before[:, :2])
     plans = [
-        facade_pieces.plan_facade(
+        facade_plan.plan_facade(
             panel,
             bare[panel.building].style,
             bare[panel.building].base,
@@ -296,9 +204,9 @@ def _plan_facades(
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
-                plan = facade_pieces.with_shops(plan, paving)
+                plan = facade_plan.with_shops(plan, paving)
             if k == front:
-                plan = facade_pieces.with_doors(plan, paving)
+                plan = facade_plan.with_doors(plan, paving)
             plans[k] = plan
     return {
         number: [plans[k] for k in members]

@@ -1,7 +1,4 @@
-"""Dresses a city: adds details to its buildings and along its streets.
-
-It also records which structures were added.
-"""
+"""Dresses a city: adds details to its buildings and along its streets."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,21 +9,22 @@ import shapely
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import Structure
+from cns_drake.imports.colours import Rgb
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
+from cns_drake.imports.dressing.guessed_streets import guessed_streets
+from cns_drake.imports.dressing.kerbs import with_kerb
 from cns_drake.imports.dressing.lane_marks import lane_marks
-from cns_drake.imports.dressing.paving import (
-    guessed_streets,
-    missing_sidewalks,
-    near_drives,
-    paved_gaps,
-    with_kerb,
-)
+from cns_drake.imports.dressing.missing_sidewalks import missing_sidewalks
+from cns_drake.imports.dressing.paved_gaps import paved_gaps
+from cns_drake.imports.dressing.paving import near_drives
 from cns_drake.imports.dressing.street_dressing import dress_streets
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.faces import joined
-from cns_drake.imports.foreign_city import ForeignCity, Imported, Rgb
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import joined_triangles
+from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import Ground, ground_structures
 from cns_drake.imports.staged_city import StagedCity
+from cns_drake.imports.streets import Street
+from cns_drake.imports.structures import Imported
 from cns_drake.scene.labels import MAX_INSTANCE
 
 # Colour of paving stones.
@@ -82,30 +80,22 @@ def dress_city(
     is_paved = is_dense(staged.kept)
     kept = staged.kept
     streets = city.streets
-    # Streets and sidewalks that the file does not have.
-    laid: list[Imported] = []
-    if drives:
-        laid += missing_sidewalks(kept, streets, drives)
-        classes = {one.structure.semantic_class for one in kept}
-        if is_paved and streets:
-            laid += paved_gaps([*kept, *laid], drives)
-        elif is_paved and classes.isdisjoint(("road", "sidewalk")):
-            laid += guessed_streets(kept, drives, ground)
+    laid = _laid_paving(kept, streets, drives, ground, is_paved)
     paving = [
         one.triangles
         for one in [*kept, *laid]
         if one.is_ground or one.kind == "Sidewalk"
     ]
     buildings = dress_buildings(
-        kept, drives, streets, ground, seed, always, joined(paving)
+        kept, drives, streets, ground, seed, always, joined_triangles(paving)
     )
     added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
     if drives:
         added += lane_marks(streets, drives)
     bottom = ground_structures(kept, ground)
     everything = [*kept, *added]
-    things = dress_streets(
-        everything, city.things, streets, drives, ground, bottom, seed
+    placed = dress_streets(
+        everything, city.small_objects, streets, drives, ground, bottom, seed
     )
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
@@ -119,22 +109,24 @@ def dress_city(
     if drives:
         walks = [one for one in kept if one.kind == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
-    added += things.structures
-    for thing in city.things:
-        if thing.source in things.sources:
-            things.sources.remove(thing.source)
-            city.faults.take_back(f"{thing.element}, left out")
+    added += placed.structures
+    for one in city.small_objects:
+        if one.source in placed.sources:
+            placed.sources.remove(one.source)
+            city.faults.take_back(f"{one.element}, left out")
     origins = {one.structure.name: "dressed" for one in changed.values()}
-    names = {one.structure.name for one in added} - things.from_file
+    names = {one.structure.name for one in added} - placed.from_file
     origins |= dict.fromkeys(names, "lot")
     facts = {
         "seed": seed,
         "buildings": len(buildings.buildings),
-        "by_file": dict(sorted((buildings.by_file + things.by_file).items())),
-        "at_random": dict(sorted((at_random + things.at_random).items())),
-        "without_room": things.no_room,
+        "by_file": dict(sorted((buildings.by_file + placed.by_file).items())),
+        "at_random": dict(sorted((at_random + placed.at_random).items())),
+        "without_room": placed.no_room,
     }
-    dressed = staged.replaced({**changed, **things.moved}).joined(added)
+    dressed = staged.replaced({**changed, **placed.moved}).with_structures(
+        added
+    )
     if len(dressed.kept) >= MAX_INSTANCE:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"
@@ -144,6 +136,33 @@ def dress_city(
     if is_paved:
         bottom = list(map(in_paving_colour, bottom))
     return Dressing(dressed, origins, facts, bottom)
+
+
+def _laid_paving(
+    kept: Sequence[Imported],
+    streets: Sequence[Street],
+    drives: Sequence[WaypointRoute],
+    ground: Ground,
+    is_paved: bool,
+) -> list[Imported]:
+    """Returns carriageways and sidewalks that the file does not have.
+
+    Args:
+        kept: structures of the city.
+        streets: streets of the city.
+        drives: drives; without drives, nothing is laid.
+        ground: the ground.
+        is_paved: whether ground of unknown kind is paved.
+    """
+    laid: list[Imported] = []
+    if drives:
+        laid += missing_sidewalks(kept, streets, drives)
+        classes = {one.structure.semantic_class for one in kept}
+        if is_paved and streets:
+            laid += paved_gaps([*kept, *laid], drives)
+        elif is_paved and classes.isdisjoint(("road", "sidewalk")):
+            laid += guessed_streets(kept, drives, ground)
+    return laid
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:

@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import LineString
 
 from cns_drake.imports.dressing.wall_panels import Panel
-from cns_drake.imports.drives.search import WaypointRoute
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import Ground
 
 # Distance between the places on drives from which walls are looked at [m].
@@ -77,7 +77,7 @@ class DriveViews:
             panels: the N walls.
             most: greatest distance at which a viewpoint counts [m].
         """
-        pairs = [self._looks(panel, most) for panel in panels]
+        pairs = [self._facing_places(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
         if not sum(counts):
             return np.full(len(panels), np.inf)
@@ -94,7 +94,7 @@ class DriveViews:
         np.minimum.at(found, number[is_seen], distance[is_seen])
         return found
 
-    def _looks(
+    def _facing_places(
         self, panel: Panel, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns (K,) which places face a panel, and their distances [m]."""

@@ -6,14 +6,10 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiLineString
 
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.foreign_city import (
-    WHITE_PAINT,
-    Imported,
-    Street,
-    ends_at_nodes,
-    make_imported,
-)
+from cns_drake.imports.colours import WHITE_PAINT
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.streets import Street, ends_at_nodes
+from cns_drake.imports.structures import Imported, make_imported
 
 # Streets get marks if they are this close to drives [m].
 _MARKS_WITHIN = 80.0

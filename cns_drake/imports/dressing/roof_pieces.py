@@ -39,7 +39,7 @@ _BELOW_RIDGE = 0.35
 # Scale of a chimney relative to the shared mesh.
 _CHIMNEY_SCALE = 0.6
 # Points of a ridge are at most this far below its highest one [m].
-_RIDGE = 0.15
+_RIDGE_TOLERANCE = 0.15
 
 
 def is_flat_roof(roof: np.ndarray) -> bool:
@@ -64,7 +64,7 @@ def add_roof_pieces(
         is_flat: whether the roof is flat.
     """
     items = _ITEMS.get(style.use, "").split()
-    if is_flat and items and (found := _largest_level(roof)) is not None:
+    if is_flat and items and (found := _largest_level_part(roof)) is not None:
         area, z = found
         count = min(_MOST_ITEMS, len(items), int(area.area / _AREA_OF_ITEM) + 1)
         ring = np.array(area.exterior.coords)[:-1]
@@ -73,7 +73,7 @@ def add_roof_pieces(
         _add_chimneys(out, roof)
 
 
-def _largest_level(roof: np.ndarray) -> tuple[Polygon, float] | None:
+def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
     """Returns the largest level part of a roof, without holes, and its z."""
     level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL_COSINE]
     best: tuple[Polygon, float] | None = None
@@ -111,7 +111,7 @@ def _without_holes(area: Polygon) -> Polygon:
 
 def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     corners = roof.reshape(-1, 3)
-    ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE]
+    ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE_TOLERANCE]
     start = ridge[np.lexsort([ridge[:, 1], ridge[:, 0]])[0]]
     end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
     length = float(np.linalg.norm(end - start))

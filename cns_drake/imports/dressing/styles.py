@@ -156,8 +156,8 @@ def make_style(
         float(rng.uniform(*look[size]))
         for size in ("storey", "pitch", "width", "height")
     )
-    drawn_wall = _finish(rng, *look["walls"].split())
-    drawn_roof = _finish(rng, "felts" if is_flat else "tiles")
+    drawn_wall = _random_finish(rng, *look["walls"].split())
+    drawn_roof = _random_finish(rng, "felts" if is_flat else "tiles")
     tint = float(rng.uniform(0.92, 1.06))
     is_old = float(rng.random()) < 0.6
     if year is not None:
@@ -165,11 +165,11 @@ def make_style(
     chances = rng.random(4)
     is_block = use in ("flats", "office", "retail")
     levels = count(tags.get("building:levels")) if tags else None
-    numbered = max(1, round(height / storey))
+    storeys = max(1, round(height / storey))
     if levels and _STOREYS[0] <= height / levels <= _STOREYS[1]:
-        numbered = max(1, round(levels))
+        storeys = max(1, round(levels))
         by_tag.add("levels")
-    storey = max(height / numbered, _STOREYS[0])
+    storey = max(height / storeys, _STOREYS[0])
     window = min(window, 0.58 * storey)
     wall, roof = tagged_finish(tags, "building"), tagged_finish(tags, "roof")
     by_tag |= {"wall"} if wall else set()
@@ -178,7 +178,7 @@ def make_style(
     shops = use == "retail" or (
         is_block
         and not is_tagged
-        and storey * numbered > 6.0
+        and storey * storeys > 6.0
         and chances[0] < 0.4
     )
     return Style(
@@ -193,13 +193,13 @@ def make_style(
         recess=0.22 if is_old else 0.14,
         wall=wall,
         roof=roof or drawn_roof,
-        glass=_finish(rng, "glass"),
-        frame=_finish(rng, "frames"),
+        glass=_random_finish(rng, "glass"),
+        frame=_random_finish(rng, "frames"),
         trim=_tinted(wall, 1.16 if is_old else 0.82),
-        door=_finish(rng, "doors"),
-        sign=_finish(rng, "signs"),
+        door=_random_finish(rng, "doors"),
+        sign=_random_finish(rng, "signs"),
         shops=bool(shops),
-        balconies=bool(use == "flats" and numbered >= 3 and chances[1] < 0.45),
+        balconies=bool(use == "flats" and storeys >= 3 and chances[1] < 0.45),
         plinth=0.0 if use == "shed" else round(0.3 + 0.4 * chances[2], 2),
         cornice=_cornice(use, is_flat, is_old, float(chances[3])),
         by_tag=frozenset(by_tag),
@@ -220,7 +220,7 @@ def _tinted(finish: Finish, factor: float) -> Finish:
     return finish._replace(rgb=triple(rgb))
 
 
-def _finish(rng: np.random.Generator, *palettes: str) -> Finish:
+def _random_finish(rng: np.random.Generator, *palettes: str) -> Finish:
     """Returns a random finish of some palettes."""
     found = [one for name in palettes for one in _LOOKS["palettes"][name]]
     return Finish.given(Dice(rng).pick(found))

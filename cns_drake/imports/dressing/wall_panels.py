@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.geometry.upper_sides import long_normals, unit_normals
-from cns_drake.imports.faces import joined
+from cns_drake.imports.faces import joined_triangles
 
 # A face is vertical if the absolute z of its unit normal is below this.
 _UPRIGHT = 0.02
@@ -110,7 +110,7 @@ def find_panels(
             the greatest x and y of N walls, (N, 2, 2) [m], and returns (N,)
             bool. None for all walls.
     """
-    triangles = joined(walls)
+    triangles = joined_triangles(walls)
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
     if not len(triangles):
         return []
@@ -136,7 +136,7 @@ def find_panels(
     for some in groups:
         number = int(building[some[0]])
         wall = triangles[some], normals[some], areas[some]
-        panel = _panel(number, *wall)
+        panel = _make_panel(number, *wall)
         if panel.is_plane:
             found.append(panel)
         else:
@@ -157,7 +157,7 @@ def _plane_pieces(
     """Returns a wall that bends as plane pieces, as long as possible.
 
     `facets` (M,) are the numbers of the plane facets to which triangles belong.
-    The other arguments are as in `_panel`.
+    The other arguments are as in `_make_panel`.
     """
     x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]
@@ -165,7 +165,7 @@ def _plane_pieces(
     def of(members: Sequence[int]) -> Panel:
         here = np.isin(facets, members)
         one = triangles[here], normals[here], areas[here]
-        return _panel(wall.building, *one, _MOST_PIECE_BENT)
+        return _make_panel(wall.building, *one, _MOST_PIECE_BENT)
 
     found: list[Panel] = []
     members: list[int] = []
@@ -209,7 +209,7 @@ def _panel_numbers(
     return np.asarray(component)
 
 
-def _panel(
+def _make_panel(
     building: int,
     triangles: np.ndarray,
     normals: np.ndarray,

@@ -6,12 +6,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
-from cns_drake.imports.drives.search import (
+from cns_drake.imports.drives.steerable_drives import (
     Obstacle,
-    WayGraph,
     WaypointRoute,
     simplified_drive,
 )
+from cns_drake.imports.drives.way_graph import WayGraph
 
 # Paths prefer to be this far from walls [m].
 _COMFORT = 6.0

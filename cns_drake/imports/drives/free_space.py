@@ -8,9 +8,10 @@ from scipy import ndimage
 import shapely
 from shapely import STRtree
 
-from cns_drake.imports.faces import joined, surface_samples
-from cns_drake.imports.foreign_city import Imported, boxes_of
+from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
+from cns_drake.imports.structures import Imported, boxes_of
+from cns_drake.imports.surface_samples import surface_samples
 
 CELL = 1.0  # [m]
 # A car passes below things higher than this above the ground [m].
@@ -107,7 +108,7 @@ def find_free_space(
         (in_water, [o for o in structures if _is_water(o)]),
     ):
         # In one call: thousands of small groups would take far longer.
-        surfaces = joined(one.triangles for one in some)
+        surfaces = joined_triangles(one.triangles for one in some)
         for row, column in _covered_cells(surfaces, window):
             covered[row, column] = True
     walls = []
@@ -127,7 +128,7 @@ def find_free_space(
         least = _FROM_EDGE
     elif blocked.any():
         free &= _between_buildings(blocked)
-    outlines = joined(walls)[:, [0, 1, 2, 0], :2]
+    outlines = joined_triangles(walls)[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),

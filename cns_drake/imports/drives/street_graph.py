@@ -9,20 +9,16 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from cns_drake.imports.drives.free_space import FreeSpace
-from cns_drake.imports.drives.search import (
-    LONGEST,
+from cns_drake.imports.drives.search import LONGEST
+from cns_drake.imports.drives.steerable_drives import (
     Obstacle,
-    WayGraph,
     WaypointRoute,
     evenly_spaced,
     simplified_drive,
 )
-from cns_drake.imports.foreign_city import (
-    SHARPEST_TURN_DEG,
-    Street,
-    cut_at_nodes,
-)
+from cns_drake.imports.drives.way_graph import WayGraph
 from cns_drake.imports.options import DriveOn
+from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
 
 # Distance between the points of a way along lanes [m].
 _LANE_SPACING = 1.0

@@ -13,7 +13,7 @@ import numpy as np
 # Nodes of the Gauss-Legendre rule; it is exact on a panel to 1e-14 m.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 # Greatest change of a spiral's heading on a panel [rad].
-_TURN = 0.5
+_PANEL_TURN = 0.5
 # If a road turns by more than this, the file is at fault [rad].
 _MOST_TURN = 10_000.0
 # Number of panels on which the arc length of a cubic curve is integrated.
@@ -65,7 +65,7 @@ class Spiral:
             raise ValueError(f"turns by up to {turn:.0f} rad")
         self._start = start
         self._growth = (end - start) / length
-        panels = math.ceil(turn / _TURN) + 1
+        panels = math.ceil(turn / _PANEL_TURN) + 1
         self._panel = length / panels
         ends = np.arange(panels) * self._panel
         steps = self._steps(ends, np.full(panels, self._panel))

@@ -31,16 +31,16 @@ _SPACING = 2.0
 # Greatest error of chords of the reference line, of widths and of heights:
 # edges are then exact to 5 mm [m].
 SAG = 0.002
-# Narrower stretches of a lane count as none [m].
+# A lane counts as absent where it is narrower than this [m].
 LEAST_WIDTH = 0.1
 # Greatest number of places on the edges of a road.
 _MOST_STATIONS = 200_000
 # No lane is farther from the reference line than this along x or y [m].
-_FARTHEST = 50_000.0
-# No lane is farther above or below it than this [m].
-_HIGHEST = 10_000.0
+_FARTHEST_LANE = 50_000.0
+# No lane is farther above or below the reference line than this [m].
+_HIGHEST_LANE = 10_000.0
 # Distances along the road that differ by less than this are the same [m].
-_INWARDS = 1e-6
+_JOINT_TOLERANCE = 1e-6
 
 
 def lane_class(kind: str) -> str | None:
@@ -120,7 +120,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
             road, section.start, section.end, _cubics_of(section)
         )
         _, _, _, heading, roll = road.reference(s, inside).T
-        grade = road.elevation.at(s, inside, is_slope=True)
+        grade = road.elevation.slopes(s, inside)
         offset = road.lane_offset.at(s, inside)
         middle_line = road.points(s, inside, offset)
         for side in (1, -1):
@@ -149,19 +149,19 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                 else:
                     outer = road.points(s, inside, beyond)
                 _check_place(road, number, outer)
-                yield _band(
+                yield _at_own_height(
                     LaneBand(
                         road=road,
                         section=k,
                         lane=lane,
-                        kind=_kind(road, section, lane),
+                        kind=_kind_of(road, section, lane),
                         inner=inner,
                         outer=outer,
                         middle=(inner + outer) / 2.0,
                         heading=heading,
                         roll=own_roll,
                         grade=grade,
-                        rise=_rise(lane, s, inside),
+                        rise=_edge_heights(lane, s, inside),
                         s=s,
                     )
                 )
@@ -177,14 +177,14 @@ def _across(
     return np.column_stack([flat, width * np.sin(roll)])
 
 
-def _rise(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+def _edge_heights(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
     if not lane.inner_height:
         return np.full((len(s), 2), np.nan)
     both = lane.inner_height, lane.outer_height
     return np.stack([one.at(s, inside) for one in both], axis=1)
 
 
-def _band(band: LaneBand) -> LaneBand:
+def _at_own_height(band: LaneBand) -> LaneBand:
     """Returns a lane with its own height, if it is at road level."""
     if not band.lane.inner_height or is_raised(band.kind, band.lane.height):
         return band
@@ -195,7 +195,10 @@ def _band(band: LaneBand) -> LaneBand:
 
 
 def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
-    for reach, axes in ((_FARTHEST, edge[:, :2]), (_HIGHEST, edge[:, 2])):
+    for reach, axes in (
+        (_FARTHEST_LANE, edge[:, :2]),
+        (_HIGHEST_LANE, edge[:, 2]),
+    ):
         farthest = float(np.abs(axes).max())
         # NaN counts as too far.
         if not farthest <= reach:
@@ -205,7 +208,7 @@ def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
             )
 
 
-def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
+def _kind_of(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
     if lane.kind != "none" or road.junction is not None:
         return lane.kind
     beyond = [
@@ -265,15 +268,18 @@ def stations(
     )
     joints = np.unique(np.clip(joints, start, end))
     between = joints[
-        (joints > start + 4.0 * _INWARDS) & (joints < end - 4.0 * _INWARDS)
+        (joints > start + 4.0 * _JOINT_TOLERANCE)
+        & (joints < end - 4.0 * _JOINT_TOLERANCE)
     ]
-    between = between[np.diff(between, prepend=-math.inf) > 4.0 * _INWARDS]
+    between = between[
+        np.diff(between, prepend=-math.inf) > 4.0 * _JOINT_TOLERANCE
+    ]
     ends = np.concatenate([[start], between, [end]])
     starts = np.array([piece.s for piece in road.pieces])
     places, inside = [], []
     total = 0
     for a, b in pairwise(ends):
-        piece = int(np.searchsorted(starts, a + _INWARDS, "right")) - 1
+        piece = int(np.searchsorted(starts, a + _JOINT_TOLERANCE, "right")) - 1
         sharpest = road.pieces[max(0, piece)].shape.sharpest
         bend = max(sharpest, *(one.bend(a, b) for one in cubics))
         step = _SPACING
@@ -285,5 +291,5 @@ def stations(
             raise ValueError(f"road {road.name}: too many bends")
         s = np.linspace(a, b, number)
         places.append(s)
-        inside.append(np.clip(s, a + _INWARDS, b - _INWARDS))
+        inside.append(np.clip(s, a + _JOINT_TOLERANCE, b - _JOINT_TOLERANCE))
     return np.concatenate(places), np.concatenate(inside)

@@ -38,7 +38,7 @@ class RoadHeights:
 
     def __init__(self, bands: Sequence[LaneBand]):
         """Takes all lanes on the ground, at least one."""
-        places = np.concatenate([_places(band) for band in bands])
+        places = np.concatenate([_middle_places(band) for band in bands])
         self._p = places[:, :3]
         heading, roll, grade = places[:, 3:].T
         across = np.tan(roll)
@@ -116,7 +116,7 @@ class KerbHeights:
         return np.where(near, own, self._usual)
 
 
-def _places(band: LaneBand) -> np.ndarray:
+def _middle_places(band: LaneBand) -> np.ndarray:
     """Returns (N, 6): places in the middle, and heading, roll and grade."""
     return _interpolated(
         band,

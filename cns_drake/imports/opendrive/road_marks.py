@@ -1,4 +1,12 @@
-"""Painted road marks of OpenDRIVE roads, as structures on the carriageway."""
+"""Painted road marks of OpenDRIVE roads, as structures on the carriageway.
+
+Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
+lane's outer border, and the mark of lane 0 in the middle of the road. Double
+lines are listed from the inside outwards; double lines in the middle of the
+road are listed from left to right. A line on the border between two lanes lies
+half on each lane. If one of these lanes is not carriageway, the kerb stones
+would hide half of the line, so the import moves the line onto the carriageway.
+"""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -8,10 +16,11 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Finish, Structure, triangulate
+from cns_drake.imports.colours import Rgb
 from cns_drake.imports.faces import parts_of
-from cns_drake.imports.foreign_city import Rgb, make_imported
 from cns_drake.imports.opendrive.lanes import LaneBand
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
+from cns_drake.imports.structures import make_imported
 
 # The edges of carriageways and of lanes differ by less than this, which is also
 # the distance of lines from a kerb [m].
@@ -158,7 +167,7 @@ def road_marks(
             # In the middle, the second line is on the right.
             lines.append((band.inner, section.middle_marks, -1.0))
         for border, marks, side in lines:
-            for colour, quads in _painted(
+            for colour, quads in _painted_quads(
                 border,
                 band.s,
                 band.heading,
@@ -197,7 +206,7 @@ def road_marks(
         ).structure
 
 
-def _painted(
+def _painted_quads(
     border: np.ndarray,
     s: np.ndarray,
     heading: np.ndarray,

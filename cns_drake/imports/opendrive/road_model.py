@@ -67,12 +67,8 @@ class Cubics:
         """Distances along the road at which the cubic pieces begin [m]."""
         return self._table[:, 0]
 
-    def at(
-        self, s: np.ndarray, inside: np.ndarray, is_slope: bool = False
-    ) -> np.ndarray:
-        """Returns the function's values (N,), or its first derivatives.
-
-        Values and derivatives are 0 before the first piece.
+    def at(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Returns the function's values (N,), which are 0 before all pieces.
 
         Args:
             s: (N,) distances along the road [m] at which the function is
@@ -80,19 +76,38 @@ class Cubics:
             inside: (N,) for each distance, any point of the cubic piece that is
                 used [m]. This is usually `s`. At a joint, a point before or
                 after `s` selects the piece before or after the joint.
-            is_slope: whether to return the derivatives.
+        """
+        is_there, ds, coefficients = self._pieces_at(s, inside)
+        value = np.zeros(len(s))
+        for power in range(4):
+            value += coefficients[:, power] * ds**power
+        return np.where(is_there, value, 0.0)
+
+    def slopes(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Returns the function's first derivatives (N,).
+
+        The derivatives are 0 before all pieces. `s` and `inside` are as in
+        `at`.
+        """
+        is_there, ds, coefficients = self._pieces_at(s, inside)
+        value = np.zeros(len(s))
+        for power in range(1, 4):
+            value += power * coefficients[:, power] * ds ** (power - 1)
+        return np.where(is_there, value, 0.0)
+
+    def _pieces_at(
+        self, s: np.ndarray, inside: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns which distances have a piece (N,), and these pieces.
+
+        A piece is given by the distance from its start to `s` (N,) [m], and by
+        its coefficients (N, 4), of ds^0 first.
         """
         if not self:
-            return np.zeros(len(s))
+            return np.zeros(len(s), bool), s, np.zeros((len(s), 4))
         index = np.searchsorted(self.starts, inside, side="right") - 1
         rows = self._table[np.maximum(index, 0)]
-        ds = s - rows[:, 0]
-        value = np.zeros(len(s))
-        for power in range(is_slope, 4):
-            factor = power if is_slope else 1
-            value += factor * rows[:, 1 + power] * ds ** (power - is_slope)
-        # Before the first piece, the value is 0.
-        return np.where(index < 0, 0.0, value)
+        return index >= 0, s - rows[:, 0], rows[:, 1:]
 
     def bend(self, start: float, end: float) -> float:
         """Returns the greatest absolute second derivative of the function.

@@ -1,6 +1,6 @@
 """Signals and objects beside OpenDRIVE roads, as structures."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 import math
 import zlib
@@ -11,173 +11,24 @@ import shapely
 from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.xml_elements import Element
 from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.placement.draft import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import tree
-from cns_drake.imports.faces import extruded
-from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lanes import TYPES, stations
 from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.solids import extruded
+from cns_drake.imports.structures import make_imported
 
-_MOST_REPEATS = 10_000
-# Distance of trees that are repeated without a distance [m].
-_TREES = 4.0
-_LARGEST = 1000.0  # [m]
 # Things of these types are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
 _LEAST_HEIGHT = 0.05
 _LEAST_SIDE = 0.05
 _LEAST_AREA = 1e-4
 # Places that are closer than this are one place [m].
-_SAME = 1e-4
+_SAME_PLACE = 1e-4
 _HALF_TURN = math.pi
-
-
-def read_things(
-    road: Element, name: str, faults: ImportFaults
-) -> Iterator[Thing]:
-    """Yields the signals and objects beside a road.
-
-    `road` is the road in the file, and `name` its name. What is not read is
-    counted in `faults`.
-
-    Raises:
-        ValueError: there is text in place of a number; the error names the
-            line.
-    """
-    for k, one in enumerate(road.all("signals", "signal")):
-        yield Thing(
-            name=f"signal_{name}_{k}",
-            is_signal=True,
-            kind=one.value("type", "").lower(),
-            s=one.number("s"),
-            t=one.number("t"),
-            z=one.number("zOffset", 0.0),
-            heading=one.number("hOffset", 0.0),
-            size=(0.0, one.number("width", 0.0), one.number("height", 0.0)),
-            is_dynamic=one.value("dynamic", "no") == "yes",
-            faces_back=one.value("orientation", "none") == "-",
-        )
-    for k, one in enumerate(road.all("objects", "object")):
-        thing = _object(one, f"object_{name}_{k}")
-        for _ in list(one.all("outlines", "outline"))[1:]:
-            faults.add("further outline of an object, not read", thing.name)
-        repeats = list(one.all("repeat"))
-        if not repeats:
-            yield thing
-        for m, repeat in enumerate(repeats):
-            yield from _repeated(thing, repeat, m, faults)
-
-
-def _object(one: Element, name: str) -> Thing:
-    radius = one.number("radius", 0.0)
-    size = (
-        one.number("length", 2.0 * radius),
-        one.number("width", 2.0 * radius),
-        one.number("height", 0.0),
-    )
-    if not all(0.0 <= side <= _LARGEST for side in size):
-        raise ValueError(
-            f"line {one.line}: object: a size of {size} m is not in 0 to "
-            f"{_LARGEST:g} m"
-        )
-    outline = next(one.all("outlines", "outline"), one.first("outline"))
-    corners = _corners(outline, "cornerLocal", "uvz")
-    road_corners = _corners(outline, "cornerRoad", ("s", "t", "dz"))
-    return Thing(
-        name=name,
-        is_signal=False,
-        kind=one.value("type", one.value("name", "none")).lower(),
-        s=one.number("s"),
-        t=one.number("t"),
-        z=one.number("zOffset", 0.0),
-        heading=one.number("hdg", 0.0),
-        size=size,
-        outline=corners,
-        road_outline=road_corners,
-        is_open=outline is not None and outline.value("closed", "") == "false",
-    )
-
-
-def _corners(
-    outline: Element | None, tag: str, names: Sequence[str]
-) -> np.ndarray | None:
-    if outline is None:
-        return None
-    x, y, z = names
-    rows = [
-        (
-            one.number(x),
-            one.number(y),
-            one.number(z, 0.0),
-            one.number("height", 0.0),
-        )
-        for one in outline.all(tag)
-    ]
-    return np.array(rows) if len(rows) >= 2 else None
-
-
-def _repeated(
-    thing: Thing, repeat: Element, number: int, faults: ImportFaults
-) -> Iterator[Thing]:
-    start, length = repeat.number("s"), repeat.number("length")
-    distance = repeat.number("distance", 0.0)
-    _, width, height = thing.size
-    if thing.outline is not None:
-        width = width or float(np.ptp(thing.outline[:, 1]))
-        height = height or float(thing.outline[:, 3].max())
-
-    def ends(name: str, default: float) -> tuple[float, float]:
-        first = repeat.number(f"{name}Start", default)
-        return first, repeat.number(f"{name}End", first)
-
-    if distance <= 0.0 < length and not thing.kind.startswith("tree"):
-        columns = (
-            (start, start + length),
-            ends("t", thing.t),
-            ends("zOffset", thing.z),
-            ends("width", width),
-            ends("height", height),
-        )
-        swept = np.array(columns).T
-        if swept[:, 3:].max() > _LARGEST:
-            raise ValueError(
-                f"line {repeat.line}: repeat: a size of over {_LARGEST:g} m"
-            )
-        begin = max(start, 0.0) if start + length > 0.0 else start
-        yield thing._replace(
-            name=f"{thing.name}_{number}", s=begin, swept=swept
-        )
-        return
-    step = distance if distance > 0.0 else _TREES
-    count = max(math.floor(length / step + 1e-9), 0) + 1
-    if count > _MOST_REPEATS:
-        faults.add(
-            f"object repeated more than {_MOST_REPEATS} times, left out",
-            thing.name,
-        )
-        return
-    for k in range(count):
-        at = k * step
-        part = min(1.0, at / length) if length > 0.0 else 0.0
-
-        def value(name: str, default: float, part: float = part) -> float:
-            first, last = ends(name, default)
-            return first + part * (last - first)
-
-        own, width, height = thing.size
-        size = (own, value("width", width), value("height", height))
-        yield thing._replace(
-            name=f"{thing.name}_{number}_{k}",
-            s=start + at,
-            t=value("t", thing.t),
-            z=value("zOffset", thing.z),
-            size=size,
-            road_outline=None,
-        )
 
 
 def thing_structures(
@@ -196,52 +47,61 @@ def thing_structures(
                 "object beyond the end of its road, left out", thing.name
             )
             continue
-        name = thing.name
-        x, y, z, heading = _place(road, thing)
+        made: Structure | None
         if thing.is_signal:
-            key = _by_type(thing.kind, "signs", "sign_rectangular")
-            if thing.is_dynamic:
-                key = "traffic_light_post"
-            builder = OBJECTS[key]
-            facing = heading + thing.heading
-            facing += 0.0 if thing.faces_back else _HALF_TURN
-            if thing.is_dynamic:
-                # The front of traffic lights in the file is their left side
-                # here.
-                facing -= _HALF_TURN / 2.0
-            one = Structure(
-                name,
-                builder.semantic_class,
-                builder.build(_rng(name)),
-                (x, y, z),
-                round(math.remainder(facing, 2.0 * math.pi), 5),
-                ("signal",),
-                name_stem(key),
-            )
-            if one.footprint_W.intersects(lanes):
-                faults.add("signal over a lane, left out", name)
-            else:
-                yield one
+            made = _signal(road, thing)
+            if made.footprint_W.intersects(lanes):
+                faults.add("signal over a lane, left out", thing.name)
+                continue
         elif thing.kind.startswith(_FLAT):
-            faults.add("object that is painted on the road, left out", name)
+            kind = "object that is painted on the road, left out"
+            faults.add(kind, thing.name)
+            continue
         elif thing.kind.startswith("tree"):
-            model = tree(
-                _rng(name), species="lime_tree", height=thing.size[2] or None
-            )
-            yield Structure(
-                name, "vegetation", model, (x, y, z), 0.0, ("object",), "tree"
-            )
+            made = _tree(road, thing)
         elif thing.swept is not None:
-            solid = _swept(road, thing, thing.swept, faults)
-            if solid is not None:
-                yield solid
+            made = _swept_object(road, thing, thing.swept, faults)
         else:
-            solid = _solid(road, thing, name, (x, y, z, heading), faults)
-            if solid is not None:
-                yield solid
+            made = _extruded_object(road, thing, faults)
+        if made is not None:
+            yield made
 
 
-def _place(
+def _signal(road: ImportedRoad, thing: Thing) -> Structure:
+    x, y, z, heading = _foot_of(road, thing)
+    key = _name_by_type(thing.kind, "signs", "sign_rectangular")
+    if thing.is_dynamic:
+        key = "traffic_light_post"
+    builder = OBJECTS[key]
+    facing = heading + thing.heading
+    facing += 0.0 if thing.faces_back else _HALF_TURN
+    if thing.is_dynamic:
+        # The front of traffic lights in the file is their left side here.
+        facing -= _HALF_TURN / 2.0
+    return Structure(
+        thing.name,
+        builder.semantic_class,
+        builder.build(_generator_of(thing.name)),
+        (x, y, z),
+        round(math.remainder(facing, 2.0 * math.pi), 5),
+        ("signal",),
+        name_stem(key),
+    )
+
+
+def _tree(road: ImportedRoad, thing: Thing) -> Structure:
+    x, y, z, _ = _foot_of(road, thing)
+    model = tree(
+        _generator_of(thing.name),
+        species="lime_tree",
+        height=thing.size[2] or None,
+    )
+    return Structure(
+        thing.name, "vegetation", model, (x, y, z), 0.0, ("object",), "tree"
+    )
+
+
+def _foot_of(
     road: ImportedRoad, thing: Thing
 ) -> tuple[float, float, float, float]:
     """Returns x, y, z [m] of a thing's foot, and the heading of the road."""
@@ -253,7 +113,7 @@ def _place(
     return round(x, 3), round(y, 3), round(z + low, 3), heading
 
 
-def _by_type(kind: str, table: str, otherwise: str) -> str:
+def _name_by_type(kind: str, table: str, otherwise: str) -> str:
     """Returns the name in a table whose beginnings match a type."""
     for name, beginnings in TYPES[table].items():
         if kind.startswith(tuple(beginnings)):
@@ -261,45 +121,27 @@ def _by_type(kind: str, table: str, otherwise: str) -> str:
     return otherwise
 
 
-def _solid(
-    road: ImportedRoad,
-    thing: Thing,
-    name: str,
-    place: tuple[float, float, float, float],
-    faults: ImportFaults,
+def _extruded_object(
+    road: ImportedRoad, thing: Thing, faults: ImportFaults
 ) -> Structure | None:
-    """Returns an object extruded from its outline; None without an outline."""
-    x, y, z, heading = place
-    length, width, high = thing.size
-    is_open = thing.is_open
-    if thing.road_outline is not None:
-        s, t, rise, heights = thing.road_outline.T
-        s = np.clip(s, 0.0, road.length)
-        inside = np.clip(s, 1e-6, road.length - 1e-6)
-        corners = road.points(s, inside, t)
-        low = corners[:, 2] + rise
-        line = LineString(corners[:, :2])
-    elif thing.outline is None and length == width == 0.0:
+    """Returns an object that is extruded from its outline.
+
+    The result is None if the object has no size, height or area.
+    """
+    name = thing.name
+    found = _placed_outline(road, thing)
+    if found is None:
         faults.add("object without a size, left out", name)
         return None
-    else:
-        half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
-        footprint: LineString = box(-half[0], -half[1], *half).exterior
-        heights = rise = np.zeros(len(footprint.coords))
-        if thing.outline is not None:
-            footprint = LineString(thing.outline[:, :2])
-            rise, heights = thing.outline[:, 2:].T
-        else:
-            is_open = False
-        low = z + rise
-        line = placed(footprint, (x, y), heading + thing.heading)
+    line, low, heights = found
     if not heights.any():
-        heights = np.full(len(low), high)
+        heights = np.full(len(low), thing.size[2])
     if heights.max() < _LEAST_HEIGHT:
         faults.add("object without a height, left out", name)
         return None
     places = shapely.get_coordinates(line)
-    if is_open or len(places) == 2:
+    has_outline = thing.outline is not None or thing.road_outline is not None
+    if (thing.is_open and has_outline) or len(places) == 2:
         polygon = line.buffer(_LEAST_SIDE, cap_style="flat", join_style="mitre")
     else:
         polygon = Polygon(places)
@@ -327,16 +169,49 @@ def _solid(
     _, nearest = cKDTree(places).query(triangles[..., :2])
     is_top = triangles[..., 2] > foot
     triangles[..., 2] = low[nearest] + is_top * heights[nearest]
-    return _structure(thing, triangles, shapely.union_all(pieces))
+    return _object_structure(thing, triangles, shapely.union_all(pieces))
 
 
-def _swept(
+def _placed_outline(
+    road: ImportedRoad, thing: Thing
+) -> tuple[LineString, np.ndarray, np.ndarray] | None:
+    """Returns the outline of an object in W, and the heights of its corners.
+
+    Returns:
+        The outline with N corners, z of the foot below each corner (N,), and
+        the heights of the corners above this foot (N,) [m]. Without an outline
+        in the file, the outline is the box of the object. None if the object
+        has no size.
+    """
+    if thing.road_outline is not None:
+        s, t, rise, heights = thing.road_outline.T
+        s = np.clip(s, 0.0, road.length)
+        inside = np.clip(s, 1e-6, road.length - 1e-6)
+        corners = road.points(s, inside, t)
+        return LineString(corners[:, :2]), corners[:, 2] + rise, heights
+    length, width, _ = thing.size
+    if thing.outline is not None:
+        footprint = LineString(thing.outline[:, :2])
+        rise, heights = thing.outline[:, 2:].T
+    elif length == width == 0.0:
+        return None
+    else:
+        half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
+        footprint = box(-half[0], -half[1], *half).exterior
+        heights = rise = np.zeros(len(footprint.coords))
+    x, y, z, heading = _foot_of(road, thing)
+    line = placed(footprint, (x, y), heading + thing.heading)
+    return line, z + rise, heights
+
+
+def _swept_object(
     road: ImportedRoad, thing: Thing, ends: np.ndarray, faults: ImportFaults
 ) -> Structure | None:
     """Returns an object without gaps along a road, such as a wall.
 
-    Its middle line is parallel to the reference line, or leads away from it,
-    and its foot follows the road. `ends` is the thing's `swept`.
+    The middle line of the object is parallel to the reference line or leads
+    away from this line; the foot of the object follows the road. `ends` is the
+    thing's `swept`. The result is None if the object has no height or no area.
     """
     start, end = ends[:, 0]
     if end > road.length + 1.0 or start < 0.0:
@@ -350,7 +225,9 @@ def _swept(
         return None
     middle = road.points(s, inside, t)
     # Joints of the road are there twice.
-    is_new = np.linalg.norm(np.diff(middle[:, :2], axis=0), axis=1) > _SAME
+    is_new = (
+        np.linalg.norm(np.diff(middle[:, :2], axis=0), axis=1) > _SAME_PLACE
+    )
     kept = np.append(True, is_new)
     middle, rise, width, height = (
         one[kept] for one in (middle, rise, width, height)
@@ -381,11 +258,14 @@ def _swept(
     triangles = np.concatenate([around[:, [0, 1, 2]], around[:, [0, 2, 3]]])
     below = np.concatenate([before[:, [0, 3]], after[:, [3, 0]]], axis=1)
     area = shapely.make_valid(shapely.polygons(below[..., :2]))
-    return _structure(thing, triangles, shapely.union_all(area))
+    return _object_structure(thing, triangles, shapely.union_all(area))
 
 
 def _to_left(places: np.ndarray) -> np.ndarray:
-    """Returns vectors (N, 2) from a line to a line 1 m on its left."""
+    """Returns vectors (N, 2) from a line to the line 1 m to its left [m].
+
+    `places` (N, 2) are the corners of the line [m].
+    """
     along = np.diff(places, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -397,12 +277,12 @@ def _to_left(places: np.ndarray) -> np.ndarray:
     return left
 
 
-def _structure(
+def _object_structure(
     thing: Thing, triangles: np.ndarray, footprint: BaseGeometry
 ) -> Structure:
     one = make_imported(
         thing.name,
-        _by_type(thing.kind, "objects", "other-object"),
+        _name_by_type(thing.kind, "objects", "other-object"),
         "Object",
         {"body": triangles},
         {},
@@ -412,5 +292,5 @@ def _structure(
     return replace(one, model=model, tags=("object",))
 
 
-def _rng(name: str) -> np.random.Generator:
+def _generator_of(name: str) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(name.encode()))

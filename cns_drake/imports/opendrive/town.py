@@ -1,40 +1,34 @@
-"""Builds a town on an imported road network, and writes its files.
-
-Road marks follow ASAM OpenDRIVE 1.7, 11.9. The mark of a lane lies on the
-lane's outer border, and the mark of lane 0 in the middle of the road. Double
-lines are listed from the inside outwards; double lines in the middle of the
-road are listed from left to right. A line on the border between two lanes lies
-half on each lane. If one of these lanes is not carriageway, the kerb stones
-would hide half of the line, so the import moves the line onto the carriageway.
-"""
+"""Builds a town on an imported road network."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely import GEOSException
 from shapely.geometry import MultiLineString
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import City, Streets, build_along
-from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.starter import starter_plan, starter_stages
-from cns_drake.city.geometry import Structure, polygons_of
+from cns_drake.city.geometry import Structure
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
-from cns_drake.imports import map_files
-from cns_drake.imports.drives import search
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.opendrive import imported_streets, lane_drives
+from cns_drake.imports.drives import search, steerable_drives
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive import bridges, imported_streets
+from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
+from cns_drake.imports.opendrive.lane_traffic import lanes_for_traffic
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_bands
 from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
@@ -42,38 +36,24 @@ from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.options import ImportFaults, ImportOptions, ImportReport
-from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
+from cns_drake.imports.options import ImportOptions
 
-# Default height of sidewalks [m].
-_KERB = 0.1
-_KERBS = (0.03, 0.3)
-# Greatest area that the generator fills with ground [m^2, m].
+# Height of sidewalks above the road if the file states none [m].
+_KERB_HEIGHT = 0.1
+# Least and greatest height of sidewalks above the road [m].
+_KERB_HEIGHTS = (0.03, 0.3)
+# Greatest area that the generator fills with ground [m^2].
 _LARGEST_AREA = 8e6
+# Greatest extent of this area along x or y [m].
 _LONGEST_SIDE = 9000.0
 # Least and greatest length of a bay of a parking lane [m].
-_BAY = (5.8, 7.4)
+_BAY_LENGTHS = (5.8, 7.4)
 # Share of the bays that are taken.
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
-# About the radius of a tree's crown, in pictures [m].
-_CROWN = 1.5
-# Least and greatest speed of a drive [m/s].
-_SPEEDS = (3.0, 12.0)
-# Classes that the picture from above shows; small things could not be seen.
-_SHOWN = (
-    "road",
-    "parking",
-    "sidewalk",
-    "other-ground",
-    "building",
-    "vegetation",
-)
-
-
 # Classes of the ground, which is kept whole however far the drives are.
-_GROUND = ("road", "parking", "sidewalk", "terrain", "other-ground")
+_GROUND_CLASSES = ("road", "parking", "sidewalk", "terrain", "other-ground")
 
 
 @dataclass(frozen=True)
@@ -145,36 +125,16 @@ def _build(
     for band in raised:
         if band.lane.inner_height and is_raised(band.kind, band.lane.height):
             faults.add("kerb on a bridge, level with its road", band.road.name)
-    ends = imported_streets.bridge_ends(raised)
+    ends = bridges.bridge_ends(raised)
     streets = ImportedStreets(ground, ends)
-    if streets.areas.carriageway.is_empty:
-        raise InputError(f"{source}: no lane in it has an area")
-    x0, y0, x1, y1 = streets.areas.carriageway.bounds
-    sides = x1 - x0, y1 - y0
-    if sides[0] * sides[1] > _LARGEST_AREA or max(sides) > _LONGEST_SIDE:
-        raise InputError(
-            f"{source}: roads of {sides[0]:.0f} m by {sides[1]:.0f} m; cut out"
-            f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
-            f" {_LONGEST_SIDE / 1000:.0f} km"
-        )
+    _check_extent(source, streets.areas.carriageway)
     plan = CityPlan.model_validate(starter_plan(streets.areas, options.seed))
-    lanes = streets.areas.lane_area
-    things = [
-        one
-        for road in roads.roads
-        for one in thing_structures(road, lanes, faults)
-    ]
-    decks = list(imported_streets.bridge_decks(raised))
-    kerb = _kerb_height(ground)
-    kerbs = KerbHeights(ground, kerb)
     surface = RoadHeights(ground)
-    marks: list[Structure] = []
-    if options.dressed:
-        _count_spans(roads, {band.road.name for band in raised}, faults)
-        marks += road_marks(
-            "marks", ground, surface.heights, streets.areas.carriageway
-        )
-        marks += road_marks("bridge_marks", raised)
+    of_file = _structures_of_file(
+        roads, ground, raised, streets, surface, options.dressed, faults
+    )
+    kerb = _median_kerb_height(ground)
+    kerbs = KerbHeights(ground, kerb)
     doing(f"building along {len(roads.roads)} roads")
     city = build_along(
         Streets(
@@ -187,7 +147,7 @@ def _build(
             reserved=shapely.union_all(
                 [
                     *(imported_streets.lane_polygon(band) for band in raised),
-                    *(one.footprint_W for one in things),
+                    *(one.footprint_W for one in of_file.things),
                 ]
             ),
             structures=(
@@ -198,9 +158,9 @@ def _build(
                     streets.coverings,
                     ends,
                 ),
-                *decks,
-                *things,
-                *marks,
+                *of_file.decks,
+                *of_file.things,
+                *of_file.marks,
             ),
             furnish=lambda draft: None,
             park=lambda draft: _park_cars(draft, ground, plan.cars),
@@ -209,15 +169,15 @@ def _build(
         str(source),
     )
     drives = (
-        lane_drives.find_lane_drives(bands)
+        search.find_drives(BandGraph(bands))
         if own is None
-        else search.with_ground_heights(own, surface.heights, faults)
+        else steerable_drives.with_ground_heights(own, surface.heights, faults)
     )
     if options.within is not None:
         city = _near_drives(city, drives, options.within, faults)
-    imported = {one.name for one in (*decks, *things, *marks)}
+    imported = {one.name for some in of_file for one in some}
     generated = [one for one in city.structures if one.name not in imported]
-    lanes_of_traffic = lane_drives.lanes_for_traffic(bands, kerbs)
+    lanes_of_traffic = lanes_for_traffic(bands, kerbs)
     if lanes_of_traffic is None:
         faults.add(
             "no lanes for traffic: each comes to a dead end", source.name
@@ -232,9 +192,76 @@ def _build(
         streets,
         drives,
         lanes_of_traffic,
-        _kinds(roads, things, decks, marks, generated),
+        _counts_by_kind(roads, of_file, generated),
         faults,
     )
+
+
+class _StructuresOfFile(NamedTuple):
+    """Structures of a town that the file determines.
+
+    Attributes:
+        decks: decks of bridges.
+        things: signals and objects.
+        marks: road marks.
+    """
+
+    decks: list[Structure]
+    things: list[Structure]
+    marks: list[Structure]
+
+
+def _structures_of_file(
+    roads: RoadMap,
+    ground: Sequence[LaneBand],
+    raised: Sequence[LaneBand],
+    streets: ImportedStreets,
+    surface: RoadHeights,
+    dressed: bool,
+    faults: ImportFaults,
+) -> _StructuresOfFile:
+    """Returns the structures of a town that the file determines.
+
+    Args:
+        roads: the roads of the file.
+        ground: the lanes on the ground.
+        raised: the lanes on bridges.
+        streets: areas of the streets on the ground.
+        surface: heights of these streets.
+        dressed: whether the town has road marks.
+        faults: counts parts that are left out.
+    """
+    things = [
+        one
+        for road in roads.roads
+        for one in thing_structures(road, streets.areas.lane_area, faults)
+    ]
+    marks: list[Structure] = []
+    if dressed:
+        _count_spans(roads, {band.road.name for band in raised}, faults)
+        marks += road_marks(
+            "marks", ground, surface.heights, streets.areas.carriageway
+        )
+        marks += road_marks("bridge_marks", raised)
+    return _StructuresOfFile(list(bridges.bridge_decks(raised)), things, marks)
+
+
+def _check_extent(source: Path, carriageway: BaseGeometry) -> None:
+    """Checks that an area is not too large to be filled with a town.
+
+    Raises:
+        InputError: `carriageway` is empty or too large.
+    """
+    if carriageway.is_empty:
+        raise InputError(f"{source}: no lane in it has an area")
+    x0, y0, x1, y1 = carriageway.bounds
+    sides = x1 - x0, y1 - y0
+    if sides[0] * sides[1] > _LARGEST_AREA or max(sides) > _LONGEST_SIDE:
+        raise InputError(
+            f"{source}: roads of {sides[0]:.0f} m by {sides[1]:.0f} m; cut out"
+            f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
+            f" {_LONGEST_SIDE / 1000:.0f} km"
+        )
 
 
 def _near_drives(
@@ -256,7 +283,7 @@ def _near_drives(
     shapely.prepare(ways)
     kept = []
     for one in city.structures:
-        if one.semantic_class in _GROUND or shapely.dwithin(
+        if one.semantic_class in _GROUND_CLASSES or shapely.dwithin(
             ways, one.footprint_W, distance
         ):
             kept.append(one)
@@ -282,7 +309,7 @@ def _count_spans(
                 faults.add(kind, road.name)
 
 
-def _kerb_height(bands: Sequence[LaneBand]) -> float:
+def _median_kerb_height(bands: Sequence[LaneBand]) -> float:
     """Returns the height of sidewalks above the road [m].
 
     The height is the median of the heights in the file, within usual limits.
@@ -292,7 +319,11 @@ def _kerb_height(bands: Sequence[LaneBand]) -> float:
         for band in bands
         if band.kind == "sidewalk" and band.lane.height > 0.0
     ]
-    return float(np.clip(np.median(kerbs), *_KERBS)) if kerbs else _KERB
+    return (
+        float(np.clip(np.median(kerbs), *_KERB_HEIGHTS))
+        if kerbs
+        else _KERB_HEIGHT
+    )
 
 
 def _park_cars(
@@ -307,23 +338,21 @@ def _park_cars(
         )
         steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
-        place = float(rng.uniform(*_BAY)) / 2.0
+        place = float(rng.uniform(*_BAY_LENGTHS)) / 2.0
         backwards = (band.lane.number > 0) != band.road.keeps_left
-        while place < along[-1] - _BAY[0] / 2.0:
+        while place < along[-1] - _BAY_LENGTHS[0] / 2.0:
             x, y = (np.interp(place, along, band.middle[:, k]) for k in (0, 1))
             nearest = int(np.abs(along - place).argmin())
             yaw = float(band.heading[nearest]) + (np.pi if backwards else 0.0)
             taken = rng.uniform() < _TAKEN_SHARE
             if taken:
                 place_car(draft, cars, (float(x), float(y)), yaw, rng, ("bay",))
-            place += float(rng.uniform(*_BAY))
+            place += float(rng.uniform(*_BAY_LENGTHS))
 
 
-def _kinds(
+def _counts_by_kind(
     roads: RoadMap,
-    things: Sequence[Structure],
-    decks: Sequence[Structure],
-    marks: Sequence[Structure],
+    of_file: _StructuresOfFile,
     generated: Sequence[Structure],
 ) -> dict[str, int]:
     junctions = [
@@ -334,108 +363,11 @@ def _kinds(
         "roads": len(roads.roads) - len(junctions),
         "roads in junctions": len(junctions),
         "junctions": len(set(junctions)),
-        "signals": sum("signal" in one.tags for one in things),
-        "objects": sum("object" in one.tags for one in things),
-        "bridges": sum(one.semantic_class == "road" for one in decks),
-        "roads with marks": len(marks),
+        "signals": sum("signal" in one.tags for one in of_file.things),
+        "objects": sum("object" in one.tags for one in of_file.things),
+        "bridges": sum(one.semantic_class == "road" for one in of_file.decks),
+        "roads with marks": len(of_file.marks),
         "buildings, sampled at random": drawn["building"],
         "plants, sampled at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
-
-
-def write_town(
-    draft: Path, source: Path, town: Town
-) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
-    """Writes all files of a town to a map folder.
-
-    Args:
-        draft: the folder, which has the map's name.
-        source: imported file, named in messages and comments.
-        town: the town.
-
-    Returns:
-        What was imported, and name of a stage -> numbers of its structures and
-        of its triangles.
-
-    Raises:
-        InputError: the town has more structures than there are instance ids.
-    """
-    stages = town.stages.stages
-    files, sizes = render_stages(
-        draft.name,
-        town.city,
-        town.stages,
-        stages,
-        source,
-        origin=f"Imported by cns-drake from {source.name}.",
-    )
-    (draft / MESH_FOLDER).mkdir(exist_ok=True)
-    for name, text in files.items():
-        (draft / name).write_text(text, "utf-8")
-    if town.lanes is not None:
-        (draft / LANES_NAME).write_text(town.lanes, "utf-8")
-    map_files.write_facts(
-        draft,
-        source,
-        {
-            "reference_system": town.roads.reference_system or "unknown",
-            "origin": list(town.roads.origin),
-            "seed": town.seed,
-            "stages": {name: plan.story for name, plan in stages.items()},
-        },
-        town.faults,
-        "# Where the roads of this map come from; all else is random."
-        "\n# A place of the map plus the origin is one of the source [m].\n",
-    )
-    map_files.write_drives(
-        draft,
-        {
-            stage: "" if stage == list(stages)[-1] else ", not all of it built"
-            for stage in stages
-        },
-        [drive.waypoints for drive in town.drives],
-        [
-            float(np.clip(drive.limit or _SPEEDS[1], *_SPEEDS))
-            for drive in town.drives
-        ],
-    )
-    map_files.draw_overview(
-        draft / "from_above.png",
-        list(_seen_from_above(town.city.structures)),
-        None,
-        town.drives,
-    )
-    report = ImportReport(
-        kinds=town.kinds,
-        triangles=sum(one.model.num_triangles for one in town.city.structures),
-        stages={stage: size[0] for stage, size in sizes.items()},
-        undated=0,
-        dated=0,
-        drives=tuple(drive.length for drive in town.drives),
-        faults=town.faults.rows(),
-    )
-    return report, sizes
-
-
-def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
-    """Yields the footprints of structures as flat triangles."""
-    for one in structures:
-        if one.semantic_class not in _SHOWN:
-            continue
-        area = one.footprint_W
-        if one.semantic_class == "vegetation":
-            # About the radius of the crown.
-            area = area.buffer(_CROWN)
-        pieces = polygons_of(area)
-        cut = shapely.constrained_delaunay_triangles(
-            shapely.multipolygons(pieces)
-        )
-        corners = [
-            shapely.get_coordinates(triangle)[:3]
-            for triangle in shapely.get_parts(cut)
-        ]
-        if corners:
-            xy = np.array(corners)
-            z = np.zeros((*xy.shape[:2], 1))
-            yield Imported(one, "", None, np.concatenate([xy, z], axis=2))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,17 +12,20 @@ from shapely.geometry import Polygon
 from shapely.strtree import STRtree
 
 from cns_drake.imports.building_years import construction_year, year_of_date
-from cns_drake.imports.faces import extruded, parts_of, sound_parts
-from cns_drake.imports.foreign_city import RED_ROOF, Imported, make_imported
-from cns_drake.imports.openstreetmap.passages import Passage, Passages
-from cns_drake.imports.openstreetmap.reading import Local, OsmArea, Tags
-from cns_drake.imports.openstreetmap.tags import (
+from cns_drake.imports.colours import RED_ROOF
+from cns_drake.imports.faces import parts_of, valid_parts
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.openstreetmap.building_tags import (
     building_kind,
-    has_tag,
     heights,
     why_absent,
 )
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.openstreetmap.features import OsmArea, Tags
+from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.passages import Passage, Passages
+from cns_drake.imports.openstreetmap.tags import has_tag
+from cns_drake.imports.solids import extruded
+from cns_drake.imports.structures import Imported, make_imported
 
 # How the report counts buildings that are not made as in the file.
 TWICE = "building drawn twice, taken once"
@@ -103,39 +107,12 @@ def make_buildings(
         passages: ways for which buildings are opened.
     """
     through = Passages(passages)
-    outlines: list[_Block] = []
-    parts: list[_Block] = []
-    for name, tags, polygons in areas:
-        low, high, roof = heights(tags, (name, faults))
-        group = parts if has_tag(tags, "building:part") else outlines
-        for polygon in polygons:
-            for one in sound_parts(local.polygon(polygon), name, faults):
-                group.append(_Block(name, tags, one, low, high, roof))
+    outlines, parts = _outlines_and_parts(areas, local, faults)
     if once:
         outlines, nested = _taken_once(outlines, faults)
         parts += nested
-    of_outline: dict[int, list[_Block]] = {}
-    # Parts do not belong to what once stood in their place.
-    outlines.sort(key=lambda one: is_gone(one.tags))
-    tree_of_outlines = STRtree(
-        [one.polygon for one in outlines if not is_gone(one.tags)]
-    )
-    alone = []
-    for part in parts:
-        inside = tree_of_outlines.query(
-            part.polygon.representative_point(), predicate="within"
-        )
-        if len(inside):
-            of_outline.setdefault(int(inside.min()), []).append(part)
-        else:
-            alone.append([part])
-    groups = [
-        (one, _with_parts(one, of_outline.get(k, [])))
-        for k, one in enumerate(outlines)
-    ]
-    groups += [(some[0], some) for some in alone]
-    taken: dict[str, int] = {}
-    for whole, blocks in groups:
+    copies: Counter[str] = Counter()
+    for whole, blocks in _grouped_by_building(outlines, parts):
         walls, roofs = [], []
         for block in _solids_with_openings(blocks, through, faults):
             wall, top = extruded(
@@ -149,8 +126,8 @@ def make_buildings(
             )
             walls.append(wall)
             roofs.append(top)
-        taken[whole.name] = taken.get(whole.name, 0) + 1
-        copy = taken[whole.name]
+        copies[whole.name] += 1
+        copy = copies[whole.name]
         number = f"_{copy}" if copy > 1 else ""
         made = make_imported(
             f"building_{whole.name}{number}",
@@ -166,6 +143,52 @@ def make_buildings(
             narrower=building_kind(whole.tags),
         )
         yield replace(made, is_gone=True) if is_gone(whole.tags) else made
+
+
+def _outlines_and_parts(
+    areas: Iterable[OsmArea], local: Local, faults: ImportFaults
+) -> tuple[list[_Block], list[_Block]]:
+    """Returns the outlines of buildings, and the building parts, as solids."""
+    outlines: list[_Block] = []
+    parts: list[_Block] = []
+    for name, tags, polygons in areas:
+        low, high, roof = heights(tags, (name, faults))
+        group = parts if has_tag(tags, "building:part") else outlines
+        for polygon in polygons:
+            for one in valid_parts(local.polygon(polygon), name, faults):
+                group.append(_Block(name, tags, one, low, high, roof))
+    return outlines, parts
+
+
+def _grouped_by_building(
+    outlines: Iterable[_Block], parts: Iterable[_Block]
+) -> list[tuple[_Block, list[_Block]]]:
+    """Returns each building: its outline, and the solids that it consists of.
+
+    A part that lies in no outline is a building of its own. Parts do not belong
+    to a former building that once stood in their place.
+    """
+    outlines = sorted(outlines, key=lambda one: is_gone(one.tags))
+    standing = STRtree(
+        [one.polygon for one in outlines if not is_gone(one.tags)]
+    )
+    of_outline: dict[int, list[_Block]] = {}
+    alone = []
+    for part in parts:
+        inside = standing.query(
+            part.polygon.representative_point(), predicate="within"
+        )
+        if len(inside):
+            of_outline.setdefault(int(inside.min()), []).append(part)
+        else:
+            alone.append((part, [part]))
+    return [
+        *(
+            (one, _with_parts(one, of_outline.get(k, [])))
+            for k, one in enumerate(outlines)
+        ),
+        *alone,
+    ]
 
 
 def _solids_with_openings(

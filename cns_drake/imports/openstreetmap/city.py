@@ -1,4 +1,4 @@
-"""OpenStreetMap: buildings, streets, trees and land as structures.
+"""Imports a city from an OpenStreetMap file.
 
 OpenStreetMap has no heights above sea level, so the ground is level.
 https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
@@ -6,7 +6,7 @@ https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 import re
@@ -19,31 +19,48 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.trees import tree
-from cns_drake.imports.faces import extruded
-from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.openstreetmap import reading, streets
+from cns_drake.imports.openstreetmap.bridges import (
+    Bridges,
+    bridges_of,
+    parapets,
+)
+from cns_drake.imports.openstreetmap.building_tags import heights
 from cns_drake.imports.openstreetmap.buildings import (
     TWICE,
     is_gone,
     make_buildings,
     standing_buildings,
 )
+from cns_drake.imports.openstreetmap.crossing_stripes import crossing_stripes
+from cns_drake.imports.openstreetmap.element_kinds import (
+    is_building,
+    was_building,
+)
+from cns_drake.imports.openstreetmap.features import OsmArea, OsmFeatures
+from cns_drake.imports.openstreetmap.grounds import ground_areas
+from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.passages import (
+    Passage,
     WayOpenings,
-    note_walled_up,
+    count_walled_up,
     passages_of,
 )
-from cns_drake.imports.openstreetmap.reading import Local
+from cns_drake.imports.openstreetmap.sea import coasts_of, sea
+from cns_drake.imports.openstreetmap.small_objects import make_small_objects
 from cns_drake.imports.openstreetmap.tags import (
     TABLES,
     has_tag,
-    heights,
     is_inside,
     length,
     tag_value,
 )
-from cns_drake.imports.openstreetmap.things import make_things
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.solids import extruded
+from cns_drake.imports.streets import Street
+from cns_drake.imports.structures import Imported
 
 # Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
@@ -81,45 +98,24 @@ def import_openstreetmap(
     """
     features = reading.read_openstreetmap(path)
     faults = features.faults
-    buildings = [
-        one
-        for one in features.areas
-        if reading.is_building(one.tags)
-        or (dressed and reading.was_building(one.tags))
-    ]
-    standing = standing_buildings(buildings, faults, dressed)
-    buildings = list(_without_outers(standing, features))
+    buildings = _used_buildings(features, dressed)
     if not buildings:
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
-    local = reading.Local(longitude, latitude)
+    local = Local(longitude, latitude)
     size = local.metres(high - low)
     if size.max() > _LARGEST:
         raise InputError(
             f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
             f" most {_LARGEST / 1000:.0f} km"
         )
-    bridges = (
-        streets.bridges_of(features.ways, local)
-        if dressed
-        else streets.Bridges()
-    )
-    coasts = streets.coasts_of(features.ways) if dressed else []
+    bridges = bridges_of(features.ways, local) if dressed else Bridges()
+    coasts = coasts_of(features.ways) if dressed else []
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     passages = passages_of(features.ways, local, faults)
     driven = streets.drivable_streets(features.ways, local, bridges)
-    note_walled_up(
-        [(one.name, LineString(one.line)) for one in driven],
-        [
-            (local.polygon(polygon), heights(one.tags)[0])
-            for one in buildings
-            if not is_gone(one.tags)
-            for polygon in one.polygons
-        ],
-        passages,
-        faults,
-    )
+    _count_walled_up(driven, buildings, local, passages, faults)
     found = [
         *make_buildings(
             buildings,
@@ -130,10 +126,10 @@ def import_openstreetmap(
             passages=passages,
         ),
         *streets.street_surfaces(features, local, bridges),
-        *streets.crossing_stripes(features, local),
-        *streets.ground_areas(features, local, dressed),
-        *streets.sea(coasts, local, limits, faults),
-        *streets.parapets(features.ways, bridges, local),
+        *crossing_stripes(features, local),
+        *ground_areas(features, local, dressed),
+        *sea(coasts, local, limits, faults),
+        *parapets(features.ways, bridges, local),
         *_barriers(features, local),
         *_trees(features, local),
     ]
@@ -146,17 +142,50 @@ def import_openstreetmap(
         faults,
         driven,
         streets.street_places(features, local),
-        any(
-            tags.get("driving_side") == "left"
-            for _, tags, _, _ in features.ways
-        ),
-        things=list(make_things(features, local)),
+        any(way.tags.get("driving_side") == "left" for way in features.ways),
+        small_objects=list(make_small_objects(features, local)),
+    )
+
+
+def _used_buildings(features: OsmFeatures, dressed: bool) -> list[OsmArea]:
+    """Returns the buildings of a file from which structures are made.
+
+    For a dressed city, they include buildings that were demolished at an
+    unknown date.
+    """
+    areas = [
+        one
+        for one in features.areas
+        if is_building(one.tags) or (dressed and was_building(one.tags))
+    ]
+    standing = standing_buildings(areas, features.faults, dressed)
+    return list(_without_outers(standing, features))
+
+
+def _count_walled_up(
+    driven: Iterable[Street],
+    buildings: Iterable[OsmArea],
+    local: Local,
+    passages: Sequence[Passage],
+    faults: ImportFaults,
+) -> None:
+    """Counts streets that lead through buildings without a passage."""
+    count_walled_up(
+        [(one.name, LineString(one.line)) for one in driven],
+        [
+            (local.polygon(polygon), heights(one.tags)[0])
+            for one in buildings
+            if not is_gone(one.tags)
+            for polygon in one.polygons
+        ],
+        passages,
+        faults,
     )
 
 
 def _without_outers(
-    buildings: Iterable[reading.OsmArea], features: reading.OsmFeatures
-) -> Iterator[reading.OsmArea]:
+    buildings: Iterable[OsmArea], features: OsmFeatures
+) -> Iterator[OsmArea]:
     """Yields buildings without ways that are the outlines of multipolygons.
 
     If such a way has the same tags as its multipolygon, it would fill its
@@ -185,7 +214,7 @@ def _no_buildings(faults: ImportFaults) -> str:
 
 
 def _bounds(
-    buildings: Iterable[reading.OsmArea],
+    buildings: Iterable[OsmArea],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and the greatest longitude and latitude (2,) [deg].
 
@@ -200,7 +229,7 @@ def _bounds(
 
 
 def _count_unused(
-    features: reading.OsmFeatures,
+    features: OsmFeatures,
     found: Iterable[Imported],
     also: AbstractSet[str],
 ) -> None:
@@ -213,9 +242,7 @@ def _count_unused(
         for one in found
         for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
     }
-    used |= {
-        one.name for one in features.areas if reading.is_building(one.tags)
-    }
+    used |= {one.name for one in features.areas if is_building(one.tags)}
     used |= also
     tagged = {one.name: one.tags for one in features.ways}
     tagged |= {one.name: one.tags for one in features.areas}
@@ -232,9 +259,7 @@ def _count_unused(
             features.faults.add(f"{kind}, left out", name)
 
 
-def _barriers(
-    features: reading.OsmFeatures, local: Local
-) -> Iterator[Imported]:
+def _barriers(features: OsmFeatures, local: Local) -> Iterator[Imported]:
     openings = WayOpenings(features.ways, local)
     for way in features.ways:
         name, tags, line, _ = way
@@ -252,13 +277,11 @@ def _barriers(
         course = LineString(local(line))
         strip: BaseGeometry = course.buffer(width / 2.0, cap_style="flat")
         strip = strip.difference(openings.across(way, course, features.faults))
-        look = streets.Look("Barrier", semantic_class, None, high)
-        yield from streets.raised_structure(
-            f"{kind}_{name}", look, [strip], where
-        )
+        look = Look("Barrier", semantic_class, None, high)
+        yield from raised_structure(f"{kind}_{name}", look, [strip], where)
 
 
-def _trees(features: reading.OsmFeatures, local: Local) -> Iterator[Imported]:
+def _trees(features: OsmFeatures, local: Local) -> Iterator[Imported]:
     for name, tags, place in features.trees:
         if is_inside(tags):
             continue

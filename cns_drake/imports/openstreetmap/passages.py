@@ -15,18 +15,21 @@ from shapely import STRtree
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.openstreetmap.reading import Local, OsmWay, Tags
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.openstreetmap.features import OsmWay, Tags
+from cns_drake.imports.openstreetmap.local_metres import Local
 from cns_drake.imports.openstreetmap.tags import (
     has_tag,
     is_inside,
+    length,
+    tag_value,
+)
+from cns_drake.imports.openstreetmap.way_tags import (
     is_railway,
     is_tunnel,
-    length,
     street_width,
-    tag_value,
     way_width,
 )
-from cns_drake.imports.options import ImportFaults
 
 # Usual clear height of a passage for a street [m].
 _STREET_HEIGHT = 4.5
@@ -65,7 +68,7 @@ class Passage(NamedTuple):
     height: float
 
 
-def _on_the_ground(tags: Tags) -> bool:
+def _is_on_the_ground(tags: Tags) -> bool:
     is_above = not re.fullmatch(r"-?0*|.*;.*", tags.get("level", "0"))
     return not (is_tunnel(tags) or is_inside(tags) or is_above)
 
@@ -83,7 +86,7 @@ def passages_of(
     for name, tags, line, _ in ways:
         is_passage = has_tag(tags, "tunnel") or has_tag(tags, "covered")
         width = way_width(tags)
-        if not (is_passage and width and _on_the_ground(tags)):
+        if not (is_passage and width and _is_on_the_ground(tags)):
             continue
         usual = _STREET_HEIGHT if street_width(tags) else _PATH_HEIGHT
         if is_railway(tags):
@@ -127,7 +130,7 @@ class Passages:
     def through(
         self, polygon: Polygon, low: float
     ) -> tuple[BaseGeometry, float] | None:
-        """Returns area and clear height of the passages through a solid.
+        """Returns the area and the clear height of passages through a solid.
 
         Args:
             polygon: footprint of the solid in W [m].
@@ -149,7 +152,7 @@ class Passages:
         return area, max(one.height for one in found)
 
 
-def note_walled_up(
+def count_walled_up(
     streets: Iterable[tuple[str, LineString]],
     solids: Sequence[tuple[Polygon, float]],
     passages: Sequence[Passage],
@@ -183,7 +186,7 @@ class WayOpenings:
             way
             for way in ways
             if way_width(way.tags)
-            and _on_the_ground(way.tags)
+            and _is_on_the_ground(way.tags)
             and not (has_tag(way.tags, "bridge") or has_tag(way.tags, "area"))
         ]
         self._ways = used
@@ -208,7 +211,7 @@ class WayOpenings:
         `faults` counts the openings, and also the ways that cross the barrier
         without a common node. `course` is the line of the barrier in W [m].
         """
-        on_it = self._crossings(barrier, shapely.get_coordinates(course))
+        on_it = self._crossed_nodes(barrier, shapely.get_coordinates(course))
         edges = {frozenset(pair) for pair in pairwise(barrier.nodes)}
         areas = []
         for k in self._tree.query(course, "intersects"):
@@ -224,11 +227,11 @@ class WayOpenings:
             faults.add("barrier across a way, opened", barrier.name)
         return shapely.union_all(areas)
 
-    def _crossings(self, barrier: OsmWay, places: np.ndarray) -> set[int]:
+    def _crossed_nodes(self, barrier: OsmWay, places: np.ndarray) -> set[int]:
         """Returns the nodes of a barrier at which ways lead to both sides.
 
-        At its ends, where another barrier may begin, two ways are enough.
-        `places` are the places of its nodes in W [m].
+        At an end of the barrier, where another barrier may begin, any two ways
+        are enough. `places` (N, 2) are the places of the nodes in W [m].
         """
         found = set()
         last = len(places) - 1
@@ -242,17 +245,23 @@ class WayOpenings:
                 continue
             before = places[k - 1 if k else last - 1]
             after = places[k + 1 if k < last else 1]
-            to_before = _turn_angle(places[k], after, before)
+            to_before = _angle_between(places[k], after, before)
             sides = {
-                _turn_angle(places[k], after, arm) < to_before for arm in arms
+                _angle_between(places[k], after, arm) < to_before
+                for arm in arms
             }
             if len(sides) > 1:
                 found.add(node)
         return found
 
 
-def _turn_angle(place: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
-    """Returns the angle from one direction to another, from 0 to 2 pi."""
+def _angle_between(
+    place: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> float:
+    """Returns the angle at a place, from a start to an end, counter-clockwise.
+
+    The three places are (2,) [m]. The angle is from 0 to 2 pi.
+    """
     first, second = start - place, end - place
     angle = math.atan2(second[1], second[0]) - math.atan2(first[1], first[0])
     return angle % (2.0 * math.pi)

@@ -12,8 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from cns_drake.imports.foreign_city import Street, ends_at_nodes
-from cns_drake.imports.openstreetmap.streets import KERB_HEIGHT
+from cns_drake.imports.streets import KERB_HEIGHT, Street, ends_at_nodes
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.polylines import resampled
 
@@ -71,7 +70,7 @@ def find_walkways(
     strips = _Strips(
         [
             strip
-            for piece in _pieces(lines, walked)
+            for piece in _parts_in_area(lines, walked)
             for strip in shapely.get_parts(piece)
             if strip.geom_type == "LineString" and strip.length >= _LEAST_STRIP
         ]
@@ -103,8 +102,8 @@ class _Strips:
 
     Attributes:
         lines: middle line of each strip in W [m].
-        nodes: place on a strip -> the number of the node there; grows with the
-            ways that are asked for.
+        nodes: place on a strip -> number of the node at this place. Nodes are
+            added when ways that begin or end at their places are made.
     """
 
     lines: Sequence[shapely.LineString]
@@ -117,7 +116,11 @@ class _Strips:
     def crossing(
         self, street: Street, k: int
     ) -> tuple[lane_graph.Crossing, tuple[_Place, _Place]] | None:
-        """Returns a crossing and its ends on strips; None without strips."""
+        """Returns a crossing of a street, and its two ends on strips.
+
+        The crossing is at the k-th point of the street. The result is None if
+        there is no strip on either side of the street.
+        """
         line = street.line
         along = line[min(k + 1, len(line) - 1)] - line[max(k - 1, 0)]
         if not along.any():
@@ -125,18 +128,18 @@ class _Strips:
         left = np.array([-along[1], along[0]]) / np.hypot(*along)
         half = street.width / 2.0
         first, last = (
-            self._on_strip(line[k] + side * (half + _FROM_KERB) * left)
+            self._nearest_place(line[k] + side * (half + _FROM_KERB) * left)
             for side in (1.0, -1.0)
         )
         if first is None or last is None or first[0] == last[0]:
             return None
-        self._node(first)
-        self._node(last)
+        self._node_at(first)
+        self._node_at(last)
         kerbs = np.array([line[k] + side * half * left for side in (1.0, -1.0)])
         course = np.column_stack([kerbs, np.zeros(2)])
         return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
 
-    def _on_strip(self, place: np.ndarray) -> _Place | None:
+    def _nearest_place(self, place: np.ndarray) -> _Place | None:
         point = shapely.Point(place)
         near = self._tree.query_nearest(point, max_distance=_STRIP_WITHIN)
         if not len(near):
@@ -144,7 +147,7 @@ class _Strips:
         number = int(near[0])
         return number, float(self.lines[number].project(point))
 
-    def _node(self, place: _Place) -> int:
+    def _node_at(self, place: _Place) -> int:
         return self.nodes.setdefault(place, len(self.nodes))
 
     def links(self, walked: BaseGeometry) -> Iterator[tuple[_Place, _Place]]:
@@ -170,12 +173,12 @@ class _Strips:
                 and way.length > 0.5
                 and walked.covers(way)
             ):
-                self._node(ends[a])
-                self._node(ends[b])
+                self._node_at(ends[a])
+                self._node_at(ends[b])
                 yield ends[a], ends[b]
 
     def walkways(self) -> Iterator[lane_graph.Walkway]:
-        """Yields the strips, divided where others begin."""
+        """Yields the strips as walkways, divided where other walkways begin."""
         cuts: defaultdict[int, set[float]] = defaultdict(set)
         for k, s in self.nodes:
             cuts[k].add(s)
@@ -184,7 +187,7 @@ class _Strips:
                 if b - a < 0.5:
                     # Pedestrians between the same two places use the same
                     # piece.
-                    self.nodes[k, b] = self._node((k, a))
+                    self.nodes[k, b] = self._node_at((k, a))
                     continue
                 part = substring(strip, a, b)
                 yield self._walkway(
@@ -209,13 +212,13 @@ class _Strips:
         return lane_graph.Walkway(
             resampled(np.column_stack([line, height])),
             _HALF_STRIP if crossing < 0 else _CROSSING_HALF_PATH,
-            self._node(a),
-            self._node(b),
+            self._node_at(a),
+            self._node_at(b),
             crossing,
         )
 
 
-def _pieces(
+def _parts_in_area(
     lines: Sequence[BaseGeometry], area: BaseGeometry
 ) -> Iterator[BaseGeometry]:
     """Yields the part of each line that is in an area."""

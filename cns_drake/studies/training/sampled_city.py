@@ -17,7 +17,7 @@ from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.city.generation.starter import start_city
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import draw_route
+from cns_drake.roads.random_route import draw_route
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps

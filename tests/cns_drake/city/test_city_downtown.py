@@ -11,7 +11,7 @@ import shapely
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.city.ground.streets import kerb_height
-from cns_drake.roads.street_areas import RoadSurface
+from cns_drake.roads.surface_heights import RoadSurface
 
 pytestmark = [pytest.mark.slow, pytest.mark.night]
 

@@ -17,7 +17,7 @@ from cns_drake.city.ground.elevation import (
     relaxed,
 )
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.street_areas import RoadSurface
+from cns_drake.roads.surface_heights import RoadSurface
 
 KERB = 0.2
 BOUNDS = (-50.0, -40.0, 150.0, 60.0)

@@ -8,7 +8,7 @@ from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.drives.search import WaypointRoute
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.options import ImportOptions

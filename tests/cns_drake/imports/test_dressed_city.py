@@ -18,25 +18,24 @@ from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
-from cns_drake.imports.cityjson_structures import import_cityjson
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
-from cns_drake.imports.dressing.facade_pieces import (
-    add_facade,
-    plan_facade,
-    with_doors,
-)
+from cns_drake.imports.dressing.facade_pieces import add_facade
+from cns_drake.imports.dressing.facade_plan import plan_facade, with_doors
 from cns_drake.imports.dressing.styles import (
     building_use,
     make_style,
     tagged_finish,
 )
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.faces import extruded
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.ground import ground_of
+from cns_drake.imports.grown_city import grow
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.options import ImportFaults, ImportOptions
-from cns_drake.imports.staged_city import grow, stage_city
+from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.solids import extruded
+from cns_drake.imports.staged_city import stage_city
 from cns_drake.scenarios.drive_table import write_table
 
 # The digest of an import as it was before dressing existed, but for a count of

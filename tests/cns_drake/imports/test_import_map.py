@@ -18,11 +18,11 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.map_files import draw_overview
 from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.overview import draw_overview
+from cns_drake.imports.structures import make_imported
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.clouds.cloud_files import read_cloud

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import shapely
 
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
-from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.imports.options import ImportOptions
 
 RADIUS = 50.0
 # A bend to the left, from its middle; two lanes of 3.5 m, one line in the

@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
-from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.imports.options import ImportOptions
 
 LINE = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
 LANES = section(0.0, *TWO_LANES)

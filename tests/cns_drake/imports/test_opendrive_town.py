@@ -24,21 +24,22 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import ground_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.map_files import REPORT_NAME
+from cns_drake.imports.drives.search import find_drives
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     lane_polygon,
 )
-from cns_drake.imports.opendrive.lane_drives import (
-    find_lane_drives,
-    lanes_for_traffic,
-)
+from cns_drake.imports.opendrive.lane_traffic import lanes_for_traffic
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
-from cns_drake.imports.opendrive.town import build_town, write_town
-from cns_drake.imports.options import ImportFaults, ImportOptions
+from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.opendrive.town_files import write_town
+from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.report import REPORT_NAME
 from cns_drake.scenarios.drive_table import write_table
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
@@ -259,7 +260,7 @@ def test_left_hand_traffic_keeps_left(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, rule="LHT")
     )
-    (drive,) = find_lane_drives(bands_of(path))
+    (drive,) = find_drives(BandGraph(bands_of(path)))
     step = drive.path[-1] - drive.path[0]
     assert drive.path[0, 1] * step[0] > 0.0
     assert abs(drive.path[0, 1]) == pytest.approx(1.75)
@@ -495,7 +496,7 @@ def test_a_reversed_lane_leads_the_other_way(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, lanes=(one,))
     )
-    (drive,) = find_lane_drives(bands_of(path))
+    (drive,) = find_drives(BandGraph(bands_of(path)))
     assert (drive.path[-1] - drive.path[0])[0] > 100.0
 
 
@@ -511,7 +512,7 @@ def test_a_short_slow_part_does_not_slow_a_drive(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=slow_end(200))
     )
-    (drive,) = find_lane_drives(bands_of(path))
+    (drive,) = find_drives(BandGraph(bands_of(path)))
     assert drive.limit == 12.0
 
 

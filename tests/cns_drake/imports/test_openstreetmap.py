@@ -2,6 +2,7 @@
 
 import re
 
+from helpers.imported_osm import bounds, import_osm, volume
 from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
 import pyproj
@@ -9,41 +10,27 @@ import pytest
 from shapely.geometry import Polygon
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.faces import extruded
-from cns_drake.imports.import_map import ImportOptions, import_city
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.reading import Local
-from cns_drake.imports.openstreetmap.tags import (
-    count,
-    heights,
-    length,
-    sidewalk_sides,
-    street_width,
-    why_absent,
-)
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.solids import extruded
 
-
-def read(path, year_attribute=None):
-    city = import_openstreetmap(path, year_attribute)
-    return city, {one.structure.name: one for one in city.structures}
-
-
-def bounds(one):
-    corners = one.triangles.reshape(-1, 3)
-    return corners.min(axis=0), corners.max(axis=0)
-
-
-def volume(triangles):
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
+SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
+DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>
+<osm version="0.6"><node id="1" lat="0" lon="0"><tag k="b" v="&b;"/></node>
+</osm>"""
 
 
 def test_buildings_have_places_and_heights_of_the_file(tmp_path):
     osm = OsmWriter()
     first = osm.box(-100, -50, 20, 10, building="yes", height="12.5 m")
     last = osm.box(80, 40, 20, 10, building="house", start_date="1910")
-    city, found = read(osm.write(tmp_path / "city.osm"))
+    city, found = import_osm(osm.write(tmp_path / "city.osm"))
     assert city.origin == (LAT, LON)
     low, high = bounds(found[f"building_w{first}"])
     # The origin is rounded to a millionth of a degree.
@@ -59,7 +46,7 @@ def test_a_building_with_parts_is_what_these_are(tmp_path):
     outline = osm.box(0, 0, 20, 20, building="yes", height="50")
     osm.box(0, 0, 10, 20, building__part="yes", height="10")
     osm.box(10, 0, 10, 20, building__part="yes", height="20", min_height="5")
-    _, found = read(osm.write(tmp_path / "city.osm"))
+    _, found = import_osm(osm.write(tmp_path / "city.osm"))
     (one,) = found.values()
     assert one.structure.name == f"building_w{outline}"
     assert bounds(one)[1][2] == 20.0
@@ -87,11 +74,6 @@ def test_roofs_hold_their_volume(roof, part, turned):
     assert faults.rows() == []
     normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
     assert (normals[:, 2] > 0).all()
-
-
-L_SHAPE = [(0, 0), (30, 0), (30, 8), (8, 8), (8, 30), (0, 30)]
-SHORT_L = [(0, 0), (12, 0), (12, 10), (10, 10), (10, 12), (0, 12)]
-DART = [(0, 0), (10, 4), (20, 0), (10, 20)]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +140,7 @@ def test_streets_have_width_and_sidewalks(tmp_path):
     osm.way([(0, -50), (0, 15)], highway="footway", width="3")
     osm.way([(-50, 8), (50, 8)], highway="primary", tunnel="yes")
     osm.way([(-50, 9), (50, 9)], railway="rail")
-    _, found = read(osm.write(tmp_path / "city.osm"))
+    _, found = import_osm(osm.write(tmp_path / "city.osm"))
     kinds = {one.kind for one in found.values()}
     assert kinds == {"Building", "Road", "Sidewalk"}
     low, high = bounds(found[f"road_w{road}"])
@@ -183,7 +165,7 @@ def test_trees_water_and_hedges(tmp_path):
     number = osm.node(30, 30, natural="tree", height="9")
     water = osm.box(40, 0, 10, 10, natural="water")
     hedge = osm.way([(-30, 0), (-30, 20)], barrier="hedge", height="1.5")
-    _, found = read(osm.write(tmp_path / "city.osm"))
+    _, found = import_osm(osm.write(tmp_path / "city.osm"))
     tree = found[f"tree_n{number}"].structure
     assert tree.semantic_class == "vegetation"
     tops = [
@@ -194,63 +176,6 @@ def test_trees_water_and_hedges(tmp_path):
     assert max(tops) == pytest.approx(9.0, abs=0.02)
     assert found[f"land_w{water}"].kind == "WaterBody"
     assert bounds(found[f"hedge_w{hedge}"])[1][2] == 1.5
-
-
-@pytest.mark.parametrize(
-    ("text", "metres"),
-    [
-        ("12", 12.0),
-        ("12.5 m", 12.5),
-        ("12,5", 12.5),
-        ("40'", 12.192),
-        ("5'6\"", 1.6764),
-        ("12'6\"", 3.81),
-        ("12' 6\"", 3.81),
-        ("12’6”", 3.81),
-        ("12 ft", 3.6576),
-        ("12ft 6in", 3.81),
-        ("12.5M", 12.5),
-        ("12,5 m", 12.5),
-        ("~15", 15.0),
-        ("ca. 15 m", 15.0),
-        ("10 - 12", 12.0),
-        ("9;12.5", 12.5),
-        ("150 cm", 1.5),
-        ("0.01 mi", 16.09344),
-        ("-5", None),
-        ("12 parsecs", None),
-        ("12 m high", None),
-        ("", None),
-        (";", None),
-        ("9;tall", None),
-        ("tall", None),
-        ("1e300", None),
-        ("99999", 99999.0),
-        (None, None),
-    ],
-)
-def test_lengths(text, metres):
-    expected = metres if metres is None else pytest.approx(metres)
-    assert length(text) == expected
-
-
-def test_heights_widths_and_sides():
-    assert heights({"building:levels": "4"}) == (0.0, 12.0, 0.0)
-    roof = {"building:levels": "2", "roof:shape": "gabled"}
-    assert heights(roof) == (0.0, 9.0, 3.0)
-    assert heights({"height": "0"})[1] > 0.0
-    low, high, _ = heights({"height": "5", "min_height": "50"})
-    assert low < high
-    assert street_width({"highway": "residential", "oneway": "yes"}) < 6.5
-    assert street_width({"highway": "primary_link", "width": "5"}) == 5.0
-    assert street_width({"highway": "footway"}) is None
-    assert sidewalk_sides({"sidewalk": "right"}) == (False, True)
-
-
-BOMB = """<?xml version="1.0"?>
-<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>
-<osm version="0.6"><node id="1" lat="0" lon="0"><tag k="b" v="&b;"/></node>
-</osm>"""
 
 
 @pytest.mark.parametrize(
@@ -331,7 +256,7 @@ def test_limits_that_cannot_be_read_are_noted(tmp_path):
     osm.way(ends, highway="tertiary", maxspeed="30", maxspeed__type="sign")
     fast = osm.way(ends, highway="tertiary", maxspeed="fast")
     back = osm.way(ends, highway="tertiary", maxspeed__backward="999")
-    city, _ = read(osm.write(tmp_path / "city.osm"))
+    city, _ = import_osm(osm.write(tmp_path / "city.osm"))
     told = "unreadable or implausible, the usual one taken"
     assert city.faults.rows() == [
         (f"maxspeed {told}", 1, f"w{fast}"),
@@ -415,7 +340,7 @@ def test_objects_cut_off_at_the_edge_are_noted(tmp_path):
         node = re.findall(r'ref="(\d+)"', refs)[place]
         text = re.sub(rf'<node id="{node}".*\n', "", text)
     path.write_text(text)
-    city, _ = read(path)
+    city, _ = import_osm(path)
     assert sorted(city.faults.rows()) == [
         (
             "building whose outline does not close or crosses itself, left out",
@@ -425,107 +350,6 @@ def test_objects_cut_off_at_the_edge_are_noted(tmp_path):
         ("building whose outline does not close, left out", 1, f"w{house}"),
         ("place of a way that is not in the file, left out", 1, f"w{street}"),
     ]
-
-
-@pytest.mark.parametrize("number", ["-7", "7"])
-def test_new_things_of_editors_have_negative_numbers(tmp_path, number):
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes")
-    tree = osm.node(20, 20, natural="tree")
-    path = osm.write(tmp_path / "city.osm")
-    text = path.read_text().replace(
-        f'<node id="{tree}"', f'<node id="{number}"'
-    )
-    path.write_text(text)
-    _, found = read(path)
-    assert f"tree_n{number}" in found
-
-
-@pytest.mark.parametrize(
-    ("text", "number"),
-    [
-        ("3", 3.0), ("2.5", 2.5), ("2,5", 2.5), ("3;4", 4.0), ("1; 2;3", 3.0),
-        ("3-4", 4.0), ("3 – 5", 5.0), ("3 to 4", 4.0), ("~4", 4.0),
-        ("many", None), ("-2", None), ("3 m", None), ("3;x", None),
-    ],
-)  # fmt: skip
-def test_levels(text, number):
-    assert count(text) == number
-
-
-@pytest.mark.parametrize(
-    "tags",
-    [
-        {"height": "-5"},
-        {"height": "0"},
-        {"height": "851"},
-        {"height": "tall"},
-        {"building:levels": "1000"},
-        {"building:levels": "0"},
-        {"building:levels": "some"},
-        {"min_height": "1e9"},
-        {"roof:height": "x"},
-    ],
-)
-def test_heights_that_cannot_be_are_the_usual_and_counted(tags):
-    faults = ImportFaults()
-    assert heights(tags, ("w7", faults)) == heights({})
-    ((kind, number, example),) = faults.rows()
-    (key,) = tags
-    assert kind.startswith(f"{key} unreadable or implausible")
-    assert (number, example) == (1, "w7")
-
-
-def test_levels_in_the_roof_are_above_the_others():
-    tags = {"building:levels": "2", "roof:levels": "1"}
-    assert heights(tags)[1] == 9.0
-    assert heights(tags | {"roof:shape": "gabled"}) == (0.0, 9.0, 3.0)
-    assert heights({"building:levels": "0", "roof:levels": "1"})[1] == 3.0
-
-
-@pytest.mark.parametrize(
-    ("tags", "why"),
-    [
-        ({"building": "yes", "location": "underground"}, "underground"),
-        ({"building": "yes", "layer": "-1"}, "underground"),
-        ({"building": "yes", "tunnel": "yes"}, "underground"),
-        (
-            {
-                "building": "garage",
-                "building:levels": "0",
-                "building:levels:underground": "2",
-            },
-            "underground",
-        ),
-        ({"building": "demolished"}, "demolished"),
-        ({"building": "house", "demolished": "yes"}, "demolished"),
-        ({"building": "proposed"}, "proposed"),
-        ({"building": "yes", "proposed": "yes"}, "proposed"),
-        ({"building": "construction", "construction": "house"}, "unfinished"),
-        ({"building": "ruins", "layer": "1"}, None),
-        ({"building": "yes", "tunnel": "building_passage"}, None),
-        (
-            {
-                "building": "house",
-                "building:levels": "0",
-                "roof:levels": "1",
-                "building:levels:underground": "1",
-            },
-            None,
-        ),
-        ({"building": "yes", "demolished": "no"}, None),
-    ],
-)
-def test_which_buildings_stand(tmp_path, tags, why):
-    assert why_absent(tags) == why
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes")
-    osm.box(40, 0, 10, 10, **{k.replace(":", "__"): v for k, v in tags.items()})
-    city, found = read(osm.write(tmp_path / "city.osm"))
-    assert len(found) == (1 if why else 2)
-    kinds = {kind: number for kind, number, _ in city.faults.rows()}
-    expected = {f"{why} building, left out": 1} if why else {}
-    assert kinds == expected
 
 
 def height_above(one, x, y):
@@ -556,7 +380,7 @@ def test_a_part_takes_the_place_of_what_it_covers(tmp_path):
     osm.box(20, 40, 40, 10, building__part="yes", height="9")
     osm.box(20, 50, 40, 10, building__part="yes", height="8", min_height="4")
     # The origin is the middle: (0, 25).
-    _, found = read(osm.write(tmp_path / "city.osm"))
+    _, found = import_osm(osm.write(tmp_path / "city.osm"))
     one = found[f"building_w{tower}"]
     # The block below the part stands, and the rest of the outline.
     assert height_above(one, 25.0, -25.0) == [30.0, 30.0, 40.0]
@@ -586,7 +410,7 @@ def test_what_has_no_place_in_the_city_is_counted(tmp_path):
     water = osm.way([(0, 70), (90, 70)], waterway="river")
     osm.relation({"": [water]}, type="waterway", name="a")
     path = osm.write(tmp_path / "city.osm")
-    city, _ = read(path)
+    city, _ = import_osm(path)
     counts = {kind: number for kind, number, _ in city.faults.rows()}
     (hostile,) = [kind for kind in counts if kind.startswith("shop=")]
     assert hostile.isprintable()
@@ -604,136 +428,6 @@ def test_what_has_no_place_in_the_city_is_counted(tmp_path):
     }
 
 
-def shuffled(path, order, change=lambda row: row):
-    """Rewrites a file with its rows changed, kinds of things in an order."""
-    rows = path.read_text().splitlines()[1:-1]
-    rows = [change(row) for row in rows]
-    kinds = ("<node", "<way", "<relation")
-    rows.sort(key=lambda r: order.index(kinds.index(r.split(maxsplit=1)[0])))
-    path.write_text('<osm version="0.6">\n' + "\n".join(rows) + "\n</osm>\n")
-    return path
-
-
-def negated(row):
-    """Numbers as editors give them to new things: -1, -2, and so on."""
-    row = re.sub(r'(<\w+ id=")', r"\1-", row)
-    return re.sub(r'ref="(\d+)"', r'ref="-\1"', row)
-
-
-def reversed_numbers(row):
-    return re.sub(
-        r'(id|ref)="(\d+)"', lambda m: f'{m[1]}="{1000 - int(m[2])}"', row
-    )
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0), (2, 0, 1)])
-@pytest.mark.parametrize("change", [str, negated, reversed_numbers])
-def test_no_order_of_things_matters(tmp_path, order, change):
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes", height="7")
-    hole = osm.box(34, 4, 2, 2)
-    outer = osm.box(30, 0, 10, 10)
-    osm.relation(
-        {"outer": [outer], "inner": [hole]},
-        type="multipolygon", building="yes", height="5",
-    )  # fmt: skip
-    osm.way([(0, 30), (60, 30)], highway="residential")
-    osm.node(5, 40, natural="tree")
-    path = shuffled(osm.write(tmp_path / "a.osm"), order, change)
-    city, found = read(path)
-    sizes = sorted(
-        round(volume(one.triangles))
-        for name, one in found.items()
-        if name.startswith("building")
-    )
-    assert sizes == [480, 700]
-    assert len(city.streets) == 1
-    assert [name for name in found if "tree" in name]
-    assert city.faults.rows() == []
-    for name in found:
-        assert re.search(r"-?\d+$", name) is None or "1000000" not in name
-        if name.startswith(("building", "tree")):
-            assert ("-" in name) == (change is negated)
-
-
-def test_places_that_only_ways_have(tmp_path):
-    """As Overpass writes geometries."""
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes", height="7")
-    osm.box(30, 0, 10, 10, building="yes", height="7")
-    path = osm.write(tmp_path / "a.osm")
-    text = path.read_text()
-    for number, place in re.findall(
-        r'<node id="(\d+)" version="1"(.*?)>', text
-    ):
-        text = text.replace(f'ref="{number}"', f'ref="{number}"{place}')
-    path.write_text(re.sub(r"<node.*\n", "", text))
-    _, found = read(path)
-    assert [round(volume(one.triangles)) for one in found.values()] == [700] * 2
-
-
-@pytest.mark.parametrize(
-    ("more", "height", "fault"),
-    [
-        # Overpass writes things again, without tags.
-        ('<way id="{w}" version="1">{refs}</way>', 7.0, "twice"),
-        ('<way id="{w}" version="2">{refs}{tags}</way>', 12.0, "twice"),
-        ('<way id="{w}" version="0">{refs}{tags}</way>', 7.0, "twice"),
-        # A version that deletes the way.
-        ('<way id="{w}" version="2" visible="false"/>', None, "deleted"),
-    ],
-)
-def test_things_that_are_there_twice(tmp_path, more, height, fault):
-    osm = OsmWriter()
-    osm.box(30, 0, 10, 10, building="yes", height="9")
-    way = osm.box(0, 0, 10, 10, building="yes", height="7")
-    path = osm.write(tmp_path / "a.osm")
-    refs = re.search(
-        rf'<way id="{way}" version="1">(.*?)<tag', path.read_text()
-    )
-    tags = '<tag k="building" v="yes"/><tag k="height" v="12"/>'
-    more = more.format(w=way, refs=refs[1], tags=tags)
-    path.write_text(path.read_text().replace("</osm>", more + "</osm>"))
-    city, found = read(path)
-    one = found.get(f"building_w{way}")
-    assert (one is None) == (height is None)
-    if one is not None:
-        assert bounds(one)[1][2] == height
-    assert len(found) == (1 if height is None else 2)
-    assert any(fault in kind for kind, _, _ in city.faults.rows())
-
-
-@pytest.mark.parametrize(
-    "mark", ['visible="false"', 'action="delete"', "action='delete'"]
-)
-def test_deleted_things_are_not_built(tmp_path, mark):
-    osm = OsmWriter()
-    osm.box(30, 0, 10, 10, building="yes", height="9")
-    way = osm.box(0, 0, 10, 10, building="yes", height="7")
-    tree = osm.node(5, 40, natural="tree")
-    path = osm.write(tmp_path / "a.osm")
-    text = path.read_text()
-    for one in (f'<way id="{way}"', f'<node id="{tree}"'):
-        text = text.replace(one, f"{one} {mark}")
-    path.write_text(text)
-    city, found = read(path)
-    assert len(found) == 1
-    assert city.faults.rows() == [
-        ("deleted thing, left out", 2, f"n{tree}"),
-    ]
-
-
-def test_a_remark_of_overpass_is_named(tmp_path):
-    osm = OsmWriter()
-    osm.box(0, 0, 10, 10, building="yes")
-    path = osm.write(tmp_path / "a.osm")
-    remark = "<remark> runtime error: Query timed out </remark></osm>"
-    path.write_text(path.read_text().replace("</osm>", remark))
-    city, _ = read(path)
-    kind = "the file may be cut off: runtime error: Query timed out"
-    assert city.faults.rows() == [(kind, 1, "its remark")]
-
-
 def test_tags_that_are_not_read_are_counted(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes", roof__orientation="across")
@@ -742,7 +436,7 @@ def test_tags_that_are_not_read_are_counted(tmp_path):
     osm.way([(0, 60), (60, 60)], highway="residential", oneway="reversible")
     osm.way([(0, 90), (60, 90)], highway="residential", oneway="-1")
     osm.node(5, 40, natural="tree", diameter_crown="9")
-    city, _ = read(osm.write(tmp_path / "a.osm"))
+    city, _ = import_osm(osm.write(tmp_path / "a.osm"))
     assert {kind: number for kind, number, _ in city.faults.rows()} == {
         "tag roof:orientation, not read": 1,
         "tag placement, not read": 1,
@@ -770,9 +464,9 @@ def test_things_within_buildings_or_the_ground_are_not_seen(
     osm.box(0, 0, 10, 10, building="yes")
     osm.node(20, 20, natural="tree", **tags)
     osm.node(30, 20, amenity="bench", **tags)
-    city, found = read(osm.write(tmp_path / "a.osm"))
+    city, found = import_osm(osm.write(tmp_path / "a.osm"))
     assert len(found) == 1 + is_there
-    assert len(city.things) == is_there
+    assert len(city.small_objects) == is_there
     kinds = {kind for kind, _, _ in city.faults.rows()}
     assert ("natural=tree, left out" in kinds) == (not is_there)
 
@@ -785,7 +479,7 @@ def test_things_face_where_their_tag_says(tmp_path, direction, degrees):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")
     osm.node(30, 20, amenity="bench", direction=direction)
-    city, _ = read(osm.write(tmp_path / "a.osm"))
-    (thing,) = city.things
+    city, _ = import_osm(osm.write(tmp_path / "a.osm"))
+    (thing,) = city.small_objects
     turn = np.degrees(thing.yaw) - degrees
     assert turn % 360.0 == pytest.approx(0.0, abs=1e-9)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from cns_drake.imports.openstreetmap.tags import lane_layout, speed_limit
+from cns_drake.imports.openstreetmap.lane_tags import lane_layout
+from cns_drake.imports.openstreetmap.speed_tags import speed_limit
 
 
 def tags(**values):

@@ -8,10 +8,11 @@ import pytest
 import shapely
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.drives.search import WaypointRoute
-from cns_drake.imports.import_map import ImportOptions, import_city
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
+from cns_drake.imports.options import ImportOptions
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario

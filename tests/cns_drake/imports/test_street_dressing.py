@@ -14,15 +14,16 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.object_models import HEADROOM
 from cns_drake.city.ground.coverings import GROUND_TAG
-from cns_drake.imports.cityjson_structures import import_cityjson
+from cns_drake.imports.cityjson.structures import import_cityjson
 from cns_drake.imports.dressing import dressed_city
 from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.dressing.paving import missing_sidewalks, with_kerb
+from cns_drake.imports.dressing.kerbs import with_kerb
+from cns_drake.imports.dressing.missing_sidewalks import missing_sidewalks
 from cns_drake.imports.dressing.street_dressing import dress_streets
-from cns_drake.imports.drives.search import WaypointRoute
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.things import object_of
+from cns_drake.imports.openstreetmap.small_objects import object_kind
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.staged_city import stage_city
 
@@ -57,7 +58,7 @@ def dressed(city, seed=0):
     ground = ground_of(city.structures)
     return dress_streets(
         city.structures,
-        city.things,
+        city.small_objects,
         city.streets,
         [drive_of(city)],
         ground,
@@ -90,7 +91,7 @@ def corners(structure):
      ({"amenity": "cafe"}, None), ({"amenity": "no"}, None), ({}, None)],
 )  # fmt: skip
 def test_objects_of_tags(tags, name):
-    assert object_of(tags) == name
+    assert object_kind(tags) == name
 
 
 def test_things_of_the_file_stand_at_their_place(tmp_path):

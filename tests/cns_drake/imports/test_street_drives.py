@@ -6,17 +6,17 @@ import pytest
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.drives.search import driven_path
+from cns_drake.imports.drives.steerable_drives import driven_path
 from cns_drake.imports.drives.street_graph import lane_links, make_lanes
-from cns_drake.imports.foreign_city import Street
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.tags import (
+from cns_drake.imports.openstreetmap.crossing_stripes import is_marked
+from cns_drake.imports.openstreetmap.way_tags import (
     driven_directions,
-    is_marked,
     lanes_beside,
 )
 from cns_drake.imports.options import ImportOptions
+from cns_drake.imports.streets import Street
 from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.waypoints import make_waypoint_path

@@ -7,9 +7,10 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
-from cns_drake.imports.cityjson_structures import import_cityjson
-from cns_drake.imports.dressing.paving import guessed_streets, paved_gaps
-from cns_drake.imports.drives.search import WaypointRoute
+from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.dressing.guessed_streets import guessed_streets
+from cns_drake.imports.dressing.paved_gaps import paved_gaps
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 

@@ -5,7 +5,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import draw_route, make_lane_path
+from cns_drake.roads.random_route import draw_route
+from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.shipped import shipped_maps
 
 

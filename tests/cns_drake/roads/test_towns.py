@@ -7,7 +7,7 @@ import pytest
 from shapely.geometry import LineString, Point, Polygon
 
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.street_areas import RoadSurface
+from cns_drake.roads.surface_heights import RoadSurface
 from cns_drake.scenarios.shipped import shipped_maps
 
 # Figures of CARLA's towns: extents of the centrelines in x and y [m], length

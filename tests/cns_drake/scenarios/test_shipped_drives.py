@@ -13,7 +13,7 @@ from shapely import contains, distance, linestrings, points, polygons, prepare
 
 from cns_drake.recording.schedule import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.street_areas import RoadSurface
+from cns_drake.roads.surface_heights import RoadSurface
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import shipped_drives

@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import draw_route
+from cns_drake.roads.random_route import draw_route
 from cns_drake.studies.redrawing import marked_yaml
 from cns_drake.studies.training import batches, descent
 from cns_drake.studies.training.batches import BatchSampler, TrainingScans
@@ -18,11 +18,7 @@ from cns_drake.studies.training.network import (
     start_parameters,
 )
 from cns_drake.studies.training.sampled_streets import draw_streets
-from cns_drake.studies.training.weights import (
-    MAPS,
-    TrainingPlan,
-    write_weights,
-)
+from cns_drake.studies.training.weights import MAPS, TrainingPlan, write_weights
 from evaluation.methods.learned import Learned, LearnedConfig, LearnedScan
 from evaluation.methods.polar_images import CHANNELS, RINGS, SECTORS
 

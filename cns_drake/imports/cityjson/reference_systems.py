@@ -21,6 +21,8 @@ _ROWS = {
 }
 # A city may be at most this far outside its system's area of use [deg].
 _NEAR_AREA_DEG = 0.5
+# A projection that changes lengths by more than this share is refused.
+_MOST_STRETCHED = 0.005
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
@@ -88,7 +90,7 @@ class ReferenceSystem:
 
 
 def horizontal_system(name: str) -> pyproj.CRS:
-    """Returns the system of the first two coordinates.
+    """Returns the system of the first two coordinates of a system, by name.
 
     A system that is composed of codes, such as EPSG:31468+5783, has no area of
     use; its horizontal part does.
@@ -100,9 +102,12 @@ def horizontal_system(name: str) -> pyproj.CRS:
 def to_degrees(
     system: pyproj.CRS, first: float, second: float
 ) -> tuple[float, float]:
-    """Returns the longitude and latitude of a place [deg]."""
-    to_degrees = pyproj.Transformer.from_crs(system, "OGC:CRS84")
-    longitude, latitude = to_degrees.transform(first, second)
+    """Returns the longitude and latitude of a place [deg].
+
+    `first` and `second` are the coordinates of the place in the system.
+    """
+    transformer = pyproj.Transformer.from_crs(system, "OGC:CRS84")
+    longitude, latitude = transformer.transform(first, second)
     return longitude, latitude
 
 
@@ -154,3 +159,36 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
         matrix[row, column] = sign * meanings[column][2]
     words = tuple(f"{direction} [{unit}]" for direction, unit, _ in meanings)
     return ReferenceSystem(name, words, matrix, heights_assumed)
+
+
+def check_lengths(name: str, place: np.ndarray, where: str) -> None:
+    """Checks that a metre of a reference system is a metre on the ground.
+
+    A place outside of the system's area of use is not checked, because its
+    coordinates may belong to another system.
+
+    Args:
+        name: name of the reference system.
+        place: (3,) place at which lengths are compared: metres east, north and
+            up.
+        where: place of the name in the file, for error messages.
+
+    Raises:
+        InputError: lengths differ by more than 0.5 %, as in Web Mercator
+            (EPSG:3857).
+    """
+    defined = reference_system(name, where)
+    first, second, _ = np.linalg.solve(defined.matrix, place).tolist()
+    if not defined.has_place(first, second):
+        return
+    system = horizontal_system(name)
+    degrees = to_degrees(system, first, second)
+    factors = pyproj.Proj(system).get_factors(*degrees)
+    extremes = factors.tissot_semimajor, factors.tissot_semiminor
+    stretch = max(extremes, key=lambda factor: abs(factor - 1.0))
+    if _MOST_STRETCHED < abs(stretch - 1.0) < np.inf:
+        raise InputError(
+            f"{where}: in {name}, 1 m on the ground is {stretch:.3g} m long;"
+            " project the file to another system first (for example with cjio's"
+            " crs_reproject)"
+        )

@@ -12,22 +12,23 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Finish
-from cns_drake.imports import foreign_city
+from cns_drake.imports import colours, structures
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.cityjson import (
+from cns_drake.imports.cityjson.city_file import (
     CityFile,
     CityGeometry,
     CityObject,
-    read_cityjson,
 )
-from cns_drake.imports.faces import face_triangles, joined
-from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.options import ImportFaults
+from cns_drake.imports.cityjson.reading import read_cityjson
+from cns_drake.imports.faces import face_triangles, joined_triangles
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.structures import Imported
 
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
 _COVERED = 0.5
-_WATER = Finish(foreign_city.WATER, "water")
+_WATER = Finish(colours.WATER, "water")
 # Beginning of a type -> its class, and a finish if that of the class would
 # mislead.
 _CLASSES: dict[str, tuple[str, Finish | None]] = {
@@ -43,7 +44,7 @@ _CLASSES: dict[str, tuple[str, Finish | None]] = {
     "Waterway": ("other-ground", _WATER),
     "WaterBody": ("other-ground", _WATER),
     "LandUse": ("other-ground", None),
-    "PlantCover": ("terrain", Finish(foreign_city.LAWN)),
+    "PlantCover": ("terrain", Finish(colours.LAWN)),
     "SolitaryVegetationObject": ("vegetation", None),
     "TINRelief": ("terrain", None),
     "CityFurniture": ("other-object", None),
@@ -98,8 +99,8 @@ def import_structures(
     found = []
     for root, members in groups.items():
         first = city.objects[root]
-        chosen = _geometries(members, lod, city.faults)
-        surfaces = _surfaces(chosen, root, city.faults, origin)
+        chosen = _chosen_geometries(members, lod, city.faults)
+        surfaces = _triangles_by_part(chosen, root, city.faults, origin)
         if not any(map(len, surfaces.values())):
             kind = "object without a surface"
             if not chosen and any(one.geometries for one in members):
@@ -113,12 +114,12 @@ def import_structures(
             for one in members
         ]
         found.append(
-            foreign_city.make_imported(
+            structures.make_imported(
                 name,
                 semantic_class,
                 first.kind,
                 surfaces,
-                {"body": finish, "roof": foreign_city.RED_ROOF},
+                {"body": finish, "roof": colours.RED_ROOF},
                 next((year for year in years if year is not None), None),
                 tags={
                     key: str(value)
@@ -174,7 +175,7 @@ def _unique_names(ids: Iterable[str]) -> dict[str, str]:
     return names
 
 
-def _geometries(
+def _chosen_geometries(
     members: list[CityObject], lod: float | None, faults: ImportFaults
 ) -> list[CityGeometry]:
     """Returns the geometries of an object and its parts that are used.
@@ -198,8 +199,8 @@ def _geometries(
         better = [
             other
             for owner, other in chosen
-            if _is_house(one)
-            and _is_house(owner)
+            if _is_building_body(one)
+            and _is_building_body(owner)
             and other.lod > geometry.lod
             and (is_whole or int(other.lod) > int(geometry.lod))
         ]
@@ -210,7 +211,7 @@ def _geometries(
     return kept
 
 
-def _is_house(one: CityObject) -> bool:
+def _is_building_body(one: CityObject) -> bool:
     """Returns whether an object is a building or its part, not a balcony."""
     return not one.parents or one.kind.endswith("Part")
 
@@ -232,7 +233,7 @@ def _footprint(geometries: Iterable[CityGeometry]) -> BaseGeometry:
     return shapely.union_all([one for one in polygons if one.area > 0.0])
 
 
-def _surfaces(
+def _triangles_by_part(
     geometries: Iterable[CityGeometry],
     name: str,
     faults: ImportFaults,
@@ -248,7 +249,7 @@ def _surfaces(
             face_triangles([ring - origin for ring in face], name, faults)
             for face in geometry.faces
         ]
-        if geometry.is_solid and _volume(faces) < -1e-3:
+        if geometry.is_solid and _enclosed_volume(faces) < -1e-3:
             faults.add("solid turned inside out, reversed", name)
             faces = [triangles[:, ::-1] for triangles in faces]
         for triangles, kind in zip(faces, geometry.kinds, strict=True):
@@ -260,9 +261,9 @@ def _surfaces(
     return {part: np.concatenate(found[part]) for part in sorted(found)}
 
 
-def _volume(faces: list[np.ndarray]) -> float:
+def _enclosed_volume(faces: list[np.ndarray]) -> float:
     """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
-    triangles = joined(faces)
+    triangles = joined_triangles(faces)
     if len(triangles) == 0:
         return 0.0
     a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)

@@ -1,4 +1,4 @@
-"""Finds drives, and lanes for traffic, in an imported road network."""
+"""A graph of OpenDRIVE lanes, in which drives are searched."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -7,18 +7,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.angles import wrapped
-from cns_drake.imports.drives import search
-from cns_drake.imports.drives.search import Obstacle, WaypointRoute
+from cns_drake.imports.drives import search, steerable_drives, way_graph
+from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand
-from cns_drake.imports.opendrive.road_heights import KerbHeights
-from cns_drake.traffic.lane_file import lane_text
-from cns_drake.traffic.lane_graph import Walkway
-from cns_drake.traffic.lane_joining import DirectedLane, join_lanes, usual_limit
-from cns_drake.traffic.polylines import resampled
+from cns_drake.traffic.lane_joining import usual_limit
 
 # A lane follows another one if its start is within this distance of the other's
 # end [m].
-_NEAR = 0.6
+_JOINED_WITHIN = 0.6
 # Their headings differ by less than this [rad].
 _ASTRAY = np.radians(20.0)
 # A lane at least this long may be a ring that follows itself [m].
@@ -27,25 +23,16 @@ _SHORTEST_RING = 10.0
 _LEAST_WIDTH = 1.8
 _LEAST_LENGTH = 0.05
 # Distance between waypoints [m].
-_SPACING = 2.0
+_WAYPOINT_SPACING = 2.0
 # Numbers of waypoints to both sides in the running mean of a drive, tried in
 # turn.
 _SMOOTHING = (0, 1, 2, 3)
 # Speed limit where the file gives none [m/s].
-_LIMIT = 13.9
-_SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Least distance of pedestrians from the edges of a sidewalk [m].
-_FROM_EDGE = 0.45
-# Greatest distance of pedestrians from the middle of a sidewalk [m].
-_MOST_HALF_WIDTH = 1.05
-# There are no pedestrians where this distance would be smaller [m].
-_LEAST_HALF_WIDTH = 0.3
-# Least length of a sidewalk with pedestrians [m].
-_SHORTEST_WALKWAY = 5.0
+_DEFAULT_LIMIT = 13.9
 
 
-class BandGraph(search.WayGraph):
-    """A `cns_drake.imports.drives.search.WayGraph` of OpenDRIVE lanes.
+class BandGraph(way_graph.WayGraph):
+    """A `cns_drake.imports.drives.way_graph.WayGraph` of OpenDRIVE lanes.
 
     Each lane of a road section is a piece. Edges lead in driving direction.
     """
@@ -60,13 +47,17 @@ class BandGraph(search.WayGraph):
         # A drive may use each of these only once: a road, or a lane of a
         # junction.
         self._roads = np.array([band.road.name for band in self.bands])
-        before, after = self._link(lengths)
+        before, after = self._followers(lengths)
         # The second lane of a pair follows the first one.
         self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
         others = before != after
         super().__init__(np.array(lengths), before[others], after[others])
 
-    def _link(self, lengths: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    def _followers(self, lengths: list[float]) -> tuple[np.ndarray, np.ndarray]:
+        """Returns pairs of lanes, where the second lane follows the first.
+
+        The result is two arrays (L,) of lane numbers.
+        """
         lines = self.lines
         starts = np.array([line[0] for line in lines]).reshape(-1, 3)
         ends = np.array([line[-1] for line in lines]).reshape(-1, 3)
@@ -74,7 +65,7 @@ class BandGraph(search.WayGraph):
         if lines:
             first = [_heading(line[:2]) for line in lines]
             last = [_heading(line[-2:]) for line in lines]
-            near = cKDTree(starts).query_ball_point(ends, _NEAR)
+            near = cKDTree(starts).query_ball_point(ends, _JOINED_WITHIN)
             for k, some in enumerate(near):
                 for m in sorted(some):
                     turn = wrapped(first[m] - last[k])
@@ -105,15 +96,15 @@ class BandGraph(search.WayGraph):
 
     def drive(self, way: Sequence[int]) -> WaypointRoute | Obstacle:
         line = np.concatenate([self.lines[k] for k in way])
-        points = search.evenly_spaced(_without_backward_points(line), _SPACING)[
-            : int(search.LONGEST / _SPACING) + 1
-        ]
+        points = steerable_drives.evenly_spaced(
+            _without_backward_points(line), _WAYPOINT_SPACING
+        )[: int(search.LONGEST / _WAYPOINT_SPACING) + 1]
         found: WaypointRoute | Obstacle = points[0, :2]
         for window in _SMOOTHING:
-            found = search.steerable_drive(_smoothed(points, window))
+            found = steerable_drives.steerable_drive(_smoothed(points, window))
             if isinstance(found, WaypointRoute):
                 some = [self.bands[k] for k in way]
-                return replace(found, limit=_usual_limit(some))
+                return replace(found, limit=usual_limit_of(some))
         return found
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
@@ -122,15 +113,6 @@ class BandGraph(search.WayGraph):
             for k in way
         ]
         return np.array([way[int(np.argmin(distances))]])
-
-
-def find_lane_drives(bands: Sequence[LaneBand]) -> list[WaypointRoute]:
-    """Returns two drives along lanes that share a part of their paths.
-
-    The list contains only one drive, or no drive, if the search finds no more.
-    `bands` contains the lanes of the whole network, including bridges.
-    """
-    return search.find_drives(BandGraph(bands))
 
 
 def _is_driven(band: LaneBand) -> bool:
@@ -153,13 +135,13 @@ def _driven_line(band: LaneBand) -> np.ndarray:
     return line[kept]
 
 
-def _usual_limit(bands: Iterable[LaneBand]) -> float:
+def usual_limit_of(bands: Iterable[LaneBand]) -> float:
     """Returns the median of the speed limit along lanes [m/s]."""
     limits, lengths = [], []
     for band in bands:
         middle = (band.s[1:] + band.s[:-1]) / 2.0
         limit = band.road.limits.at(middle, middle)
-        limits.append(np.where(limit > 0.0, limit, _LIMIT))
+        limits.append(np.where(limit > 0.0, limit, _DEFAULT_LIMIT))
         lengths.append(np.diff(band.s))
     return usual_limit(np.concatenate(limits), np.concatenate(lengths))
 
@@ -191,44 +173,3 @@ def _without_backward_points(line: np.ndarray) -> np.ndarray:
         if size > 0.05 and step @ last > 0.5 * size * np.hypot(*last):
             kept.append(point)
     return np.array(kept)
-
-
-def lanes_for_traffic(
-    bands: Sequence[LaneBand], kerbs: KerbHeights
-) -> str | None:
-    """Returns the text of a lane file; None if there is no lane to drive on.
-
-    `bands` contains the lanes of the whole network, and `kerbs` the heights of
-    sidewalks above the road.
-    """
-    graph = BandGraph(bands)
-    lanes = [
-        DirectedLane(
-            line,
-            _usual_limit([band]),
-            band.road.junction is not None,
-        )
-        for band, line in zip(graph.bands, graph.lines, strict=True)
-    ]
-    joined = join_lanes(lanes, graph.followers)
-    if not joined.pieces:
-        return None
-    walks = [band for band in bands if band.lane.kind in _SIDEWALKS]
-    return lane_text(joined, _walkways(walks, kerbs))
-
-
-def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
-    """Returns a walkway for each sidewalk; pedestrians turn at its ends."""
-    found: list[Walkway] = []
-    for band in bands:
-        half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
-        steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
-        if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST_WALKWAY:
-            continue
-        first = 2 * len(found)
-        kerb = kerbs(band.middle[:, :2])
-        points = resampled(
-            np.column_stack([band.middle[:, :2], band.middle[:, 2] + kerb])
-        )
-        found.append(Walkway(points, half, first, first + 1))
-    return found

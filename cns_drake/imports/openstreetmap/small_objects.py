@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString
 
-from cns_drake.imports.foreign_city import Thing
-from cns_drake.imports.openstreetmap import reading
-from cns_drake.imports.openstreetmap.reading import Local
+from cns_drake.imports.foreign_city import SmallObject
+from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
+from cns_drake.imports.openstreetmap.local_metres import Local
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag, is_inside
 
 # Names of directions, clockwise from north.
@@ -24,7 +24,7 @@ _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
 
 
-def object_of(tags: reading.Tags) -> str | None:
+def object_kind(tags: Tags) -> str | None:
     """Returns the kind of small object that a node's tags describe.
 
     The kind is a key of `cns_drake.city.placement.objects.OBJECTS`, or None for
@@ -47,18 +47,20 @@ def object_of(tags: reading.Tags) -> str | None:
     return name
 
 
-def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
+def make_small_objects(
+    features: OsmFeatures, local: Local
+) -> Iterator[SmallObject]:
     """Yields small objects: those at nodes, and the trees of tree rows.
 
     `local` converts places of the file to metres in W.
     """
     kinds = features.kinds
     for name, tags, place in features.nodes:
-        kind = object_of(tags)
+        kind = object_kind(tags)
         if kind is not None and not is_inside(tags):
             x, y = local(np.array([place]))[0].tolist()
             direction = _direction(tags)
-            yield Thing(name, kinds[name], kind, (x, y), direction)
+            yield SmallObject(name, kinds[name], kind, (x, y), direction)
     for name, tags, line, _ in features.ways:
         if tags.get("natural") == "tree_row":
             needles = tags.get("leaf_type") == "needleleaved"
@@ -70,10 +72,10 @@ def make_things(features: reading.OsmFeatures, local: Local) -> Iterator[Thing]:
             )
             kind = "spruce" if needles else "lime_tree"
             for x, y in shapely.get_coordinates(points).tolist():
-                yield Thing(name, kinds[name], kind, (x, y), None)
+                yield SmallObject(name, kinds[name], kind, (x, y), None)
 
 
-def _direction(tags: reading.Tags) -> float | None:
+def _direction(tags: Tags) -> float | None:
     """Returns the heading in a thing's tags [rad]; None if they have none."""
     text = tags.get("direction", "")
     if text.upper() in _COMPASS:

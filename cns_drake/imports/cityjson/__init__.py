@@ -1,0 +1,1 @@
+"""Imports cities from CityJSON and CityJSONSeq files."""

@@ -1,0 +1,120 @@
+"""The order in which a CityJSON file has the coordinates east and north."""
+
+from collections.abc import Iterator
+import itertools
+
+import numpy as np
+
+from cns_drake.imports.cityjson.city_file import CityFile
+
+# A city is mirrored if less than this share of its geometries look outwards.
+_MIRRORED_SHARE = 0.1
+# At most this many geometries are judged.
+_MOST_JUDGED = 1000
+# A geometry is judged if six times the volume of a solid [m^3], or twice the
+# area of other surfaces as seen from above [m^2], is greater than this.
+_LEAST_JUDGED = 1e-3
+_BEYOND = "coordinates beyond the area of their reference system"
+
+
+def settle_axes(city: CityFile, vertices: np.ndarray) -> None:
+    """Decides on the order of the first two coordinates, if the place allows.
+
+    Many programs write east first although the definition of the reference
+    system says north first. East first is assumed if only this order brings the
+    middle vertex of the file into the system's area of use. If both orders
+    bring the vertex there, the order stays open, and `exchange_mirrored_axes`
+    decides by the faces. Assumptions are counted as faults of the city.
+
+    Args:
+        city: the city, whose objects are not read yet.
+        vertices: (N, 3) vertices of the file in its own coordinates, N > 0.
+    """
+    defined = city.system
+    if not defined.name:
+        city.faults.add(
+            "no reference system; metres east, north and up assumed", "the file"
+        )
+        return
+    first, second, _ = vertices[len(vertices) // 2].tolist()
+    is_there = defined.has_place(first, second)
+    city.order_is_open = defined.has_place(second, first)
+    if city.order_is_open and not is_there and defined.is_north_first:
+        city.order_is_open = False
+        _exchange_axes(city)
+    elif not is_there:
+        city.faults.add(_BEYOND, defined.name)
+    if defined.heights_assumed and not defined.is_plain:
+        city.faults.add(
+            "reference system without heights; its horizontal unit taken for "
+            "them",
+            defined.name,
+        )
+
+
+def _exchange_axes(city: CityFile) -> None:
+    """Exchanges the first two coordinates of the system and of all faces."""
+    defined = city.system
+    city.system = defined.exchanged()
+    turn = city.system.matrix @ np.linalg.inv(defined.matrix)
+    for face in city.faces():
+        face[:] = [ring @ turn.T for ring in face]
+    order = [axis.partition(" ")[0] for axis in defined.axes[:2]]
+    city.faults.add(
+        f"reference system with {order[0]} first, but coordinates with"
+        f" {order[1]} first; read as {order[1]} first",
+        defined.name,
+    )
+
+
+def exchange_mirrored_axes(city: CityFile) -> None:
+    """Exchanges the first two coordinates if the city would be mirrored.
+
+    The corners of a face are counter-clockwise as seen from outside; in a
+    mirrored city, faces are inside out. Coordinates are exchanged only if both
+    orders are possible; otherwise, a mirrored city is counted as a fault.
+    """
+    if city.system.name and not city.order_is_open:
+        return
+    outwards = list(itertools.islice(_look_outwards(city), _MOST_JUDGED))
+    if not outwards:
+        if city.system.is_north_first:
+            kind = "order of axes that no face shows, taken as defined"
+            city.faults.add(kind, city.system.name)
+    elif sum(outwards) < _MIRRORED_SHARE * len(outwards):
+        if city.order_is_open:
+            _exchange_axes(city)
+            if any(kind == _BEYOND for kind, _, _ in city.faults.rows()):
+                city.faults.take_back(_BEYOND)
+        elif len(outwards) > 1:
+            city.faults.add(
+                "all inside out: the city may be mirrored (north first?)",
+                "the file",
+            )
+
+
+def _look_outwards(city: CityFile) -> Iterator[bool]:
+    """Yields for each geometry whether its faces look outwards.
+
+    A solid whose faces look outwards has a positive volume. Roofs and terrains
+    must look upwards, and floors downwards.
+    """
+    for one in city.objects.values():
+        above = {"RoofSurface": 1.0, "GroundSurface": -1.0}
+        if one.kind == "TINRelief":
+            above[""] = 1.0
+        for geometry in one.geometries:
+            if not geometry.faces:
+                continue
+            middle = geometry.faces[0][0][0]
+            total = 0.0
+            for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
+                for ring in face:
+                    p = ring - middle
+                    twice = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+                    if geometry.is_solid:
+                        total += float(p[0] @ twice)
+                    else:
+                        total += above.get(kind, 0.0) * float(twice[2])
+            if abs(total) > _LEAST_JUDGED:
+                yield total > 0.0

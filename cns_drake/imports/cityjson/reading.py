@@ -1,0 +1,214 @@
+"""Reads CityJSON 1.0 to 2.0 and CityJSONSeq files.
+
+https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
+objects. In a sequence (.jsonl), the first line is of type CityJSON, and each
+further line is a feature with its own vertices. pyproj defines the order,
+direction and units of the axes of the file's reference system.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base.json_text import parse_json
+from cns_drake.imports.cityjson.axes import exchange_mirrored_axes, settle_axes
+from cns_drake.imports.cityjson.city_file import CityFile, CityObject
+from cns_drake.imports.cityjson.geometries import Templates, read_geometry
+from cns_drake.imports.cityjson.reference_systems import (
+    ReferenceSystem,
+    check_lengths,
+    reference_system,
+)
+from cns_drake.imports.cityjson.vertices import read_vertices
+from cns_drake.imports.faults import ImportFaults
+
+# Members of objects that are read, or that do not place anything.
+_KNOWN_MEMBERS = {
+    "type", "geometry", "attributes", "parents", "children", "children_roles",
+    "geographicalExtent", "address", "bbox", "extent", "members",
+}  # fmt: skip
+
+
+def read_cityjson(path: Path) -> CityFile:
+    """Reads a CityJSON file.
+
+    Raises:
+        InputError: the file cannot be read, is not CityJSON, has no surface, or
+            has coordinates that cannot be converted to metres.
+    """
+    city = _read_documents(path)
+    if not city.objects:
+        raise InputError(f"{path}: the file has no objects")
+    if not any(city.faces()):
+        raise InputError(f"{path}: no object has a surface")
+    exchange_mirrored_axes(city)
+    low, high = city.bounds()
+    within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
+    if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
+        raise InputError(
+            f"{path}: coordinates look like degrees; project them to metres"
+            " first (for example with cjio's crs_reproject)"
+        )
+    if city.system.name:
+        check_lengths(
+            city.system.name,
+            (low + high) / 2.0,
+            f"{path}: metadata.referenceSystem",
+        )
+    return city
+
+
+def _read_documents(path: Path) -> CityFile:
+    """Returns the objects of all documents of a file.
+
+    Raises:
+        InputError: a document cannot be read, or is not CityJSON.
+    """
+    city = CityFile()
+    whole: dict = {}
+    whole_system = ""
+    templates = Templates({}, "")
+    for number, document in _documents(path):
+        kind = document.get("type")
+        where = str(path) if number == 0 else f"{path}: line {number}"
+        if kind == "CityJSON":
+            whole = document
+            _check_version(document, where)
+            system = _reference_system(document, where)
+            if city.objects and system.name != whole_system:
+                raise InputError(
+                    f"{where}: metadata.referenceSystem: not that of the lines"
+                    f" before, {whole_system or 'none'}"
+                )
+            if not city.objects:
+                city.system, whole_system = system, system.name
+            templates = Templates(document, where)
+        elif kind != "CityJSONFeature" or not whole:
+            raise InputError(f"{where}: type {kind!r} is not CityJSON")
+        _read_objects(document, whole, templates, where, city)
+    return city
+
+
+def _check_version(document: dict, where: str) -> None:
+    version = str(document.get("version", ""))
+    if not re.match(r"[12]\.", version):
+        raise InputError(
+            f"{where}: CityJSON of version {version!r}, not 1.0 to 2.0"
+        )
+
+
+def _documents(path: Path) -> Iterator[tuple[int, dict]]:
+    """Yields each JSON object with its line number, 0 for a whole file."""
+    check_regular(path)
+    with user_errors(path):
+        if path.suffix == ".jsonl":
+            with path.open("rb") as stream:
+                for number, line in enumerate(stream, start=1):
+                    if line.strip():
+                        yield (
+                            number,
+                            _json_object(line, f"{path}: line {number}"),
+                        )
+        else:
+            yield 0, _json_object(path.read_bytes(), str(path))
+
+
+def _json_object(text: bytes, where: str) -> dict:
+    try:
+        value = parse_json(text)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{where}: not UTF-8 ({error.reason})") from error
+    except RecursionError as error:
+        raise InputError(f"{where}: nested too deeply") from error
+    except ValueError as error:
+        raise InputError(f"{where}: no JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: no JSON object")
+    return value
+
+
+def _reference_system(document: dict, where: str) -> ReferenceSystem:
+    metadata = document.get("metadata")
+    if not isinstance(metadata, dict):
+        return ReferenceSystem()
+    found = metadata.get("referenceSystem", metadata.get("crs", ""))
+    if isinstance(found, dict):
+        found = f"EPSG:{found.get('epsg', '')}"
+    return reference_system(str(found), f"{where}: metadata.referenceSystem")
+
+
+def _read_objects(
+    document: dict,
+    whole: dict,
+    templates: Templates,
+    where: str,
+    city: CityFile,
+) -> None:
+    """Adds the objects of a document to a city.
+
+    Args:
+        document: the document, a JSON object.
+        whole: the last document of type CityJSON, whose transform the document
+            has if it has none of its own.
+        templates: the templates of `whole`.
+        where: place of the document, for error messages.
+        city: the city, which gets the objects.
+    """
+    objects = document.get("CityObjects", {})
+    if not isinstance(objects, dict):
+        raise InputError(f"{where}: CityObjects: not an object")
+    if not objects:
+        return
+    transform = document.get("transform", whole.get("transform"))
+    if transform is None and not str(whole.get("version")).startswith("1.0"):
+        city.faults.add("no transform; vertices taken as coordinates", where)
+    vertices = read_vertices(document, transform, where)
+    if not city.objects and len(vertices):
+        settle_axes(city, vertices)
+    templates.vertices = city.system.to_metres(vertices)
+    templates.system = city.system
+    for name, value in objects.items():
+        if not isinstance(value, dict) or not isinstance(
+            value.get("type"), str
+        ):
+            city.faults.add("object without a type, left out", name)
+            continue
+        if name in city.objects:
+            city.faults.add("object that is there twice, its last taken", name)
+        city.objects[name] = _read_object(name, value, templates, city.faults)
+    _add_parents(objects, city)
+
+
+def _read_object(
+    name: str, value: dict, templates: Templates, faults: ImportFaults
+) -> CityObject:
+    for key in value.keys() - _KNOWN_MEMBERS:
+        faults.add(f"{key} of an object, not read", name)
+    listed = value.get("geometry") or []
+    geometries = [
+        read_geometry(geometry, templates, name, faults)
+        for geometry in (listed if isinstance(listed, list) else [listed])
+    ]
+    parents = value.get("parents") or []
+    attributes = value.get("attributes")
+    return CityObject(
+        name,
+        value["type"],
+        attributes if isinstance(attributes, dict) else {},
+        list(map(str, parents if isinstance(parents, list) else [])),
+        [one for one in geometries if one is not None],
+    )
+
+
+def _add_parents(objects: dict, city: CityFile) -> None:
+    """Adds the parents that only the children of an object name."""
+    for name, value in objects.items():
+        children = value.get("children") if isinstance(value, dict) else None
+        for child in children if isinstance(children, list) else []:
+            part = city.objects.get(str(child))
+            if part is not None and not part.parents:
+                city.objects[part.name] = part._replace(parents=[name])

@@ -1,0 +1,103 @@
+"""Carriageways and sidewalks along drives, for a city without roads."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiLineString
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry import looks_up, turned_up
+from cns_drake.imports.dressing.paving import (
+    GRID,
+    SIDEWALK_WIDTH,
+    area_outside,
+    near_drives,
+    paved_structure,
+    triangles_from_above,
+)
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import flat_surface, joined_triangles, parts_of
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.ground import Ground
+from cns_drake.imports.streets import KERB_HEIGHT
+from cns_drake.imports.structures import Imported
+
+# Half the width of a street of unknown width [m].
+HALF_STREET = 3.9
+# A carriageway ends this far from walls [m].
+_FROM_WALL = 0.5
+# Sidewalks narrower than this are left out [m].
+_NARROWEST_SIDEWALK = 0.6
+# A carriageway is this far above the ground that it covers [m].
+_ABOVE_GROUND = 0.02
+
+
+def guessed_streets(
+    structures: Sequence[Imported],
+    drives: Sequence[WaypointRoute],
+    ground: Ground,
+) -> Iterator[Imported]:
+    """Yields structures for a carriageway and sidewalks along drives.
+
+    Use this function for a city whose file has no roads: the drives are assumed
+    to be in the middle of the streets.
+    """
+    paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
+    near = near_drives(structures, drives)
+    houses = [o for o in near if o.structure.semantic_class == "building"]
+    roofs = triangles_from_above(houses, with_downward=False)
+    reach = paths.buffer(HALF_STREET + SIDEWALK_WIDTH + _FROM_WALL)
+    shapely.prepare(reach)
+    roofs = roofs[shapely.intersects(reach, roofs)]
+    walls = shapely.union_all(roofs, grid_size=GRID)
+    street = area_outside(
+        paths.buffer(HALF_STREET, 4), walls.buffer(_FROM_WALL, 1)
+    )
+    beside = area_outside(paths.buffer(HALF_STREET + SIDEWALK_WIDTH, 4), street)
+    beside = area_outside(beside, walls)
+    half = _NARROWEST_SIDEWALK / 2.0
+    wide = beside.buffer(-half, 2).buffer(half, 2)
+    sidewalks = wide.intersection(beside)
+    terrain = (one for one in structures if one.kind == "TINRelief")
+    below = turned_up(joined_triangles(one.triangles for one in terrain))
+    if not len(below):
+        mesh = ground.to_mesh()
+        below = mesh.vertices[mesh.triangles()]
+        heights = ground.height(below.reshape(-1, 3)[:, :2])
+        below[..., 2] = heights.reshape(below.shape[:2])
+    below = below[looks_up(below)]
+    outlines = np.asarray(shapely.polygons(below[:, [0, 1, 2, 0], :2]))
+    tree = shapely.STRtree(outlines)
+    for name, semantic_class, area, above in (
+        ("carriageway", "road", street, _ABOVE_GROUND),
+        ("sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
+    ):
+        for number, part in enumerate(parts_of(area)):
+            hit = np.sort(tree.query(part, "intersects"))
+            surface = _draped(part, below[hit], outlines[hit], above)
+            if len(surface):
+                yield paved_structure(
+                    f"{name}_{number}", semantic_class, surface
+                )
+
+
+def _draped(
+    area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
+) -> np.ndarray:
+    """Returns an area laid above a ground, as triangles (N, 3, 3) [m].
+
+    The triangles (M, 3, 3) of the ground look upwards and meet the area.
+    `outlines` (M,) are these triangles seen from above.
+    """
+    pieces = shapely.intersection(outlines, area, grid_size=GRID)
+    found = [np.zeros((0, 3, 3))]
+    for triangle, piece in zip(ground, pieces, strict=True):
+        a, b, c = triangle
+        normal = np.cross(b - a, c - a)
+        for part in parts_of(piece):
+            flat = flat_surface(part, 0.0, "street", ImportFaults())
+            aside = (flat - a)[..., :2] @ normal[:2]
+            flat[..., 2] = a[2] - aside / normal[2] + above
+            found.append(flat)
+    return np.concatenate(found)

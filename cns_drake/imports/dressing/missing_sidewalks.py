@@ -1,0 +1,94 @@
+"""Sidewalks for streets whose tags do not mention sidewalks."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely import STRtree
+from shapely.geometry import LineString, MultiLineString
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.imports.dressing.paving import (
+    GRID,
+    PAVED_WITHIN,
+    SIDEWALK_WIDTH,
+    area_outside,
+    near_drives,
+    paved_structure,
+    triangles_from_above,
+)
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import flat_surface, parts_of
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.streets import KERB_HEIGHT, Street
+from cns_drake.imports.structures import Imported
+
+# Streets of these kinds have sidewalks unless their tags say otherwise.
+_WITH_SIDEWALKS = (
+    "primary",
+    "secondary",
+    "tertiary",
+    "unclassified",
+    "residential",
+)
+
+
+def missing_sidewalks(
+    structures: Sequence[Imported],
+    streets: Sequence[Street],
+    drives: Sequence[WaypointRoute],
+) -> Iterator[Imported]:
+    """Yields sidewalks for streets whose tags do not mention sidewalks.
+
+    Only the larger streets within 80 m of a drive get sidewalks. The ground
+    must be level.
+
+    Args:
+        structures: structures of the city, which the sidewalks must not
+            overlap.
+        streets: the streets.
+        drives: the drives, at least one.
+    """
+    paths = MultiLineString([drive.path for drive in drives])
+    near = [
+        (street, LineString(street.line))
+        for street in streets
+        if LineString(street.line).distance(paths) < PAVED_WITHIN
+    ]
+    lacking = [
+        (street, line)
+        for street, line in near
+        if street.tags.get("highway") in _WITH_SIDEWALKS
+        and not any(key.startswith("sidewalk") for key in street.tags)
+    ]
+    if not lacking:
+        return
+    shapes = [
+        one
+        for one in near_drives(structures, drives)
+        if one.structure.semantic_class in ("building", "road", "sidewalk")
+        or one.kind.startswith("Water")
+    ]
+    lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
+    taken = np.concatenate([triangles_from_above(shapes), lanes])
+    # The union of a whole city takes long, so only polygons near each street
+    # are used.
+    tree = STRtree(taken)
+    made: list[BaseGeometry] = []
+    for street, line in lacking:
+        strip = line.buffer(street.width / 2.0 + SIDEWALK_WIDTH, 4)
+        others = [
+            *taken[tree.query(strip, "intersects")],
+            *(area for area in made if area.intersects(strip)),
+        ]
+        covered = shapely.union_all(others, grid_size=GRID)
+        area = area_outside(strip, covered)
+        made.append(area)
+        surface = [
+            flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
+            for part in parts_of(area)
+            if not part.buffer(-0.3).is_empty
+        ]
+        if surface:
+            laid = np.concatenate(surface)
+            yield paved_structure(f"sidewalk_{street.name}", "sidewalk", laid)

@@ -1,0 +1,225 @@
+"""Room for small objects in a city, and the objects that are placed."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, MultiLineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.geometry import (
+    Occupancy,
+    Structure,
+    UpperSides,
+    ground_triangles,
+    placed,
+    turned_up,
+)
+from cns_drake.city.placement.draft import name_stem
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.imports.dressing.round_parts import without_curves
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import joined_triangles
+from cns_drake.imports.ground import Ground
+from cns_drake.imports.structures import Imported
+
+# Least distance of objects from the middle of a drive [m].
+_FROM_DRIVE = 1.7
+# Least distance of objects from walls [m].
+_FROM_WALL = 0.25
+# Least distance between two objects [m].
+_BETWEEN_OBJECTS = 0.2
+# Nothing stands where the ground below it falls by more than this [m].
+_MOST_FALL = 0.5
+# A street this far above the guessed ground is a bridge or a roof, and no
+# object stands on it [m].
+_BRIDGE_HEIGHT = 1.0
+# Radius around the middle of a trunk that no other object takes [m].
+_TRUNK_RADIUS = 0.4
+# Classes of structures that nothing may touch.
+_SOLID_CLASSES = ("building", "fence", "other-structure")
+
+
+@dataclass
+class PlacedObjects:
+    """The small objects that were placed along streets, and their counts.
+
+    Attributes:
+        structures: the objects.
+        from_file: names of the structures that come from the file.
+        moved: original -> moved tree, for trees of the file that stood on a
+            carriageway.
+        sources: ids, in the file, of the objects that were placed.
+        by_file: kind of object -> number of objects from the file.
+        at_random: kind of object -> number of random objects.
+        no_room: number of objects of the file that are left out, because they
+            would block a drive or stand in a wall or another object.
+    """
+
+    structures: list[Imported] = field(default_factory=list)
+    from_file: set[str] = field(default_factory=set)
+    moved: dict[Imported, Imported] = field(default_factory=dict)
+    sources: set[str] = field(default_factory=set)
+    by_file: Counter[str] = field(default_factory=Counter)
+    at_random: Counter[str] = field(default_factory=Counter)
+    no_room: int = 0
+
+
+class StreetRoom:
+    """Places small objects in a city where there is room.
+
+    The objects are added to `found` (a `PlacedObjects`). `lamps` lists the
+    positions (x, y) of the street lamps among these objects [m].
+    """
+
+    def __init__(
+        self,
+        structures: Sequence[Imported],
+        drives: Sequence[WaypointRoute],
+        ground: Ground,
+        bottom: Sequence[Structure],
+        found: PlacedObjects,
+    ):
+        """Takes the ground of everything that stands already.
+
+        Args:
+            structures: structures of the city.
+            drives: the drives, which are kept free.
+            ground: the ground on which objects stand.
+            bottom: structures of a guessed ground; none if the file has
+                terrain.
+            found: gets the objects that are placed.
+        """
+        self.found = found
+        self._ground = ground
+        self.paths = MultiLineString([drive.path for drive in drives])
+        shapely.prepare(self.paths)
+
+        def triangles(is_wanted: Callable[[Imported], bool]) -> np.ndarray:
+            return joined_triangles(
+                o.triangles for o in structures if is_wanted(o)
+            )
+
+        solids = triangles(
+            lambda o: o.structure.semantic_class in _SOLID_CLASSES
+        )
+        self._solids = UpperSides(solids)
+        roads = triangles(lambda o: o.kind == "Road")
+        self._roads = UpperSides(turned_up(roads))
+        paved = triangles(lambda o: o.is_ground or o.kind == "Sidewalk")
+        laid = joined_triangles([paved, ground_triangles(bottom)])
+        self._laid = UpperSides(turned_up(laid))
+        self._taken = Occupancy()
+        self._names = {one.structure.name for one in structures}
+        self.lamps: list[tuple[float, float]] = []
+
+    def is_near(self, line: np.ndarray, distance: float) -> bool:
+        """Returns whether a line (N, 2) is within a distance of a drive [m]."""
+        return bool(shapely.dwithin(LineString(line), self.paths, distance))
+
+    def keep_tree(self, tree: Imported) -> None:
+        """Marks the place of a tree's trunk as occupied."""
+        x, y, _ = tree.structure.xyz
+        self._taken.add(Point(x, y).buffer(_TRUNK_RADIUS, 4))
+
+    def has_tree_pit(self, xy: np.ndarray) -> bool:
+        """Returns whether a tree could stand at a place.
+
+        There is no room for a trunk on a road, in a structure, or close to the
+        path of one of the map's drives. `xy` (2,) is the place in W [m].
+        """
+        pit = Point(xy).buffer(_TRUNK_RADIUS, 2)
+        around = shapely.get_coordinates(pit)
+        return not (
+            np.isfinite(self._roads.heights(around)).any()
+            or self.paths.distance(pit) < _FROM_DRIVE
+            or self._is_built(pit)
+        )
+
+    def place(
+        self,
+        name: str,
+        kind: str,
+        xy: tuple[float, float],
+        yaw: float,
+        rng: np.random.Generator,
+    ) -> bool:
+        """Places an object if there is room; returns whether there was room.
+
+        The object stands at the height of the lowest ground below it. Only cars
+        are placed on carriageways.
+
+        Args:
+            name: name of the new structure.
+            kind: kind of object, a key of
+                `cns_drake.city.placement.objects.OBJECTS`.
+            xy: position of the object's centre in W [m].
+            yaw: heading of the object in W [rad].
+            rng: random generator for the object's variant and colours.
+        """
+        builder = OBJECTS[kind]
+        at = np.array([xy])
+        is_car = kind in PARKED_CARS
+        if not is_car and np.isfinite(self._roads.heights(at)[0]):
+            return False
+        model = without_curves(builder.build(rng))
+        x, y = round(xy[0], 3), round(xy[1], 3)
+        structure = Structure(
+            name,
+            builder.semantic_class,
+            model,
+            (x, y, 0.0),
+            round(yaw, 4),
+            kind=name_stem(kind),
+        )
+        feet = structure.p_WFs[:, :2]
+        heights, guessed = self._laid.heights(feet), self._ground.height(feet)
+        # A street far above the guessed ground is a bridge or a roof.
+        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)
+        heights = np.where(is_laid, heights, guessed)
+        z = round(float(heights.min()), 3)
+        footprint = placed(model.footprint, xy, yaw)
+        if (
+            np.ptp(heights) > _MOST_FALL
+            or self.paths.distance(footprint) < _FROM_DRIVE
+            or not self._taken.is_free(footprint, _BETWEEN_OBJECTS)
+            or self._is_built(footprint)
+        ):
+            return False
+        self._taken.add(footprint)
+        while name in self._names:
+            name += "_"
+        self._names.add(name)
+        structure = replace(structure, name=name, xyz=(x, y, z))
+        self.found.structures.append(
+            Imported(
+                structure,
+                title_of(kind),
+                None,
+                _bounding_triangles(footprint, z),
+            )
+        )
+        if kind == "lamp_post":
+            self.lamps.append((x, y))
+        return True
+
+    def _is_built(self, footprint: BaseGeometry) -> bool:
+        around = footprint.buffer(_FROM_WALL, quad_segs=1)
+        xy = shapely.get_coordinates(around.exterior)
+        xy = np.concatenate([xy, shapely.get_coordinates(footprint.centroid)])
+        z = self._ground.height(xy)
+        return bool(self._solids.hides(np.column_stack([xy, z + 0.5])).any())
+
+
+def title_of(kind: str) -> str:
+    return kind.replace("_", " ").capitalize()
+
+
+def _bounding_triangles(footprint: BaseGeometry, z: float) -> np.ndarray:
+    """Returns the bounding box of a footprint as triangles (2, 3, 3) [m]."""
+    x0, y0, x1, y1 = footprint.bounds
+    a, b, c, d = ((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
+    return np.array([(a, b, c), (a, c, d)])

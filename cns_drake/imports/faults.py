@@ -1,0 +1,54 @@
+"""Counts of the faults that an import finds in a file."""
+
+from collections import Counter
+
+_LONGEST_TEXT = 100
+
+
+class ImportFaults:
+    """Counts the repaired and omitted parts of a file, by kind of fault.
+
+    For each kind, the name of one object is kept as an example.
+    """
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._examples: dict[str, str] = {}
+
+    def add(self, kind: str, example: str, number: int = 1) -> None:
+        """Adds `number` faults of one kind to the counts.
+
+        `kind` describes the fault and its remedy in words. `example` is the
+        name of an object that has the fault.
+        """
+        kind = _printable(kind)
+        self._counts[kind] += number
+        self._examples.setdefault(kind, _printable(example))
+
+    def take_back(self, kind: str) -> None:
+        """Removes one fault of a kind from the counts.
+
+        Use this function for a counted fault that turns out not to matter, such
+        as an object that was left out at first and is placed later.
+        """
+        kind = _printable(kind)
+        self._counts[kind] -= 1
+        if not self._counts[kind]:
+            del self._counts[kind], self._examples[kind]
+
+    def rows(self) -> list[tuple[str, int, str]]:
+        """Returns kind, count and example of faults, most frequent first."""
+        return [
+            (kind, number, self._examples[kind])
+            for kind, number in sorted(
+                self._counts.items(), key=lambda item: (-item[1], item[0])
+            )
+        ]
+
+
+def _printable(text: str) -> str:
+    """Returns a text without control characters, cut to 100 characters."""
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    if len(shown) <= _LONGEST_TEXT:
+        return shown
+    return f"{shown[: _LONGEST_TEXT - 3]}..."

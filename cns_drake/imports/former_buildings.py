@@ -1,0 +1,50 @@
+"""Past cities, with former buildings in place of their successors."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from shapely import STRtree
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.imports.structures import Imported
+
+# Two buildings stand in the same place if they share this much of the smaller
+# outline.
+_SHARED = 0.3
+
+
+def with_gone(
+    gone: Sequence[Imported], others: Iterable[Imported]
+) -> list[Imported]:
+    """Returns the structures of a past city: `others`, and former buildings.
+
+    Where a building of today stands in the place of a former building, the
+    result contains only one of the two: the building of today if its year of
+    construction is known, and otherwise the former building.
+
+    Args:
+        gone: the former buildings, demolished at an unknown date.
+        others: structures of today, which stood in the past city as well.
+    """
+    others = list(others)
+    later = [one for one in others if one.kind.startswith("Building")]
+    tree = STRtree([one.structure.model.footprint for one in later])
+    stood: list[Imported] = []
+    replaced: set[Imported] = set()
+    for one in gone:
+        outline = one.structure.model.footprint
+        there = [
+            later[k]
+            for k in np.sort(tree.query(outline, "intersects"))
+            if _share_place(outline, later[k].structure.model.footprint)
+        ]
+        if any(new.year is not None for new in there):
+            continue
+        stood.append(one)
+        replaced.update(there)
+    return [one for one in others if one not in replaced] + stood
+
+
+def _share_place(one: BaseGeometry, other: BaseGeometry) -> bool:
+    shared = one.intersection(other).area
+    return bool(shared > _SHARED * min(one.area, other.area))

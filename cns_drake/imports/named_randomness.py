@@ -1,0 +1,27 @@
+"""Random numbers that depend only on a seed, a purpose and a name."""
+
+import hashlib
+
+import numpy as np
+
+
+def random_share(seed: int, purpose: str, name: str) -> float:
+    """Returns a random number from 0 to 1 that depends only on the arguments.
+
+    `purpose` says what the number is used for, and `name` for which object.
+    """
+    return _hashed_number(seed, purpose, name) / 2.0**64
+
+
+def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
+    """Returns a random generator whose seed depends only on the arguments.
+
+    `purpose` and `name` say for what it is used, and for which object.
+    """
+    return np.random.default_rng(_hashed_number(seed, purpose, name))
+
+
+def _hashed_number(seed: int, purpose: str, name: str) -> int:
+    text = f"{seed}/{purpose}/{name}".encode()
+    digest = hashlib.blake2b(text, digest_size=8).digest()
+    return int.from_bytes(digest, "big")

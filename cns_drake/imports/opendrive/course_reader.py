@@ -1,0 +1,89 @@
+"""Reads the courses of roads in plan view from an OpenDRIVE file."""
+
+from collections.abc import Iterable
+from itertools import pairwise
+import math
+
+import numpy as np
+
+from cns_drake.base.xml_elements import Element
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive import curves, road_model
+
+LONGEST_ROAD = 100_000.0
+# Pieces of a road's course that are farther apart are counted [m].
+WIDEST_JOINT = 0.1
+# Greatest curvature of a curve [1/m].
+_SHARPEST = 100.0
+# Shorter pieces are left out [m].
+SHORTEST_PIECE = 1e-5
+
+
+def read_course(
+    elements: Iterable[Element], name: str, faults: ImportFaults
+) -> list[road_model.Piece]:
+    found: list[road_model.Piece] = []
+    for one in elements:
+        length = one.number("length")
+        if length < 0.0:
+            raise ValueError(f"line {one.line}: geometry: length: {length:g}")
+        if length < SHORTEST_PIECE:
+            faults.add("geometry without length, left out", name)
+            continue
+        if length > LONGEST_ROAD:
+            raise ValueError(
+                f"line {one.line}: geometry: length: {length:g} m are more"
+                f" than {LONGEST_ROAD:g} m"
+            )
+        try:
+            shape = _read_curve(one, length)
+        except ValueError as error:
+            at = f"line {one.line}: geometry: "
+            text = str(error)
+            prefix = "" if text.startswith("line") else at
+            raise ValueError(prefix + text) from error
+        s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
+        found.append(road_model.Piece(s, x, y, heading, length, shape))
+    found.sort(key=lambda piece: piece.s)
+    for piece, after in pairwise(found):
+        end = piece.evaluate(np.array([after.s]))[0]
+        gap = math.hypot(end[0] - after.x, end[1] - after.y)
+        if max(gap, abs(piece.s + piece.length - after.s)) > WIDEST_JOINT:
+            faults.add("gap of over 0.1 m in the course of a road", name)
+    return found
+
+
+def _read_curve(geometry: Element, length: float) -> curves.Shape:
+    """Returns the curve of a `geometry` element.
+
+    Raises:
+        ValueError: if it has no curve, or one that is too sharp.
+    """
+    shape: curves.Shape | None = None
+    for one in geometry.all("*"):
+        if one.tag == "line":
+            shape = curves.Arc(0.0)
+        elif one.tag == "arc":
+            shape = curves.Arc(one.number("curvature"))
+        elif one.tag == "spiral":
+            ends = one.number("curvStart"), one.number("curvEnd")
+            if max(map(abs, ends)) > _SHARPEST:
+                raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
+            shape = curves.Spiral(*ends, length)
+        elif one.tag == "poly3":
+            v = [one.number(k) for k in "abcd"]
+            # At the curve's length in the file, u is not greater than that
+            # length.
+            shape = curves.Cubic(
+                (0, 1, 0, 0), v, length, length, stretched=False
+            )
+        elif one.tag == "paramPoly3":
+            u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
+            by_arc = one.value("pRange", "normalized") == "arcLength"
+            last = length if by_arc else 1.0
+            shape = curves.Cubic(u, v, last, length, by_parameter=by_arc)
+    if shape is None:
+        raise ValueError("neither a line nor a known curve")
+    if shape.sharpest > _SHARPEST:
+        raise ValueError(f"a curve of curvature {shape.sharpest:g} 1/m")
+    return shape

@@ -1,0 +1,121 @@
+"""Reads lanes, section by section, from an OpenDRIVE file."""
+
+from collections.abc import Iterable
+
+from cns_drake.base.xml_elements import Element
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive import road_model
+from cns_drake.imports.opendrive.course_reader import SHORTEST_PIECE
+from cns_drake.imports.opendrive.mark_reader import read_marks
+
+# Greatest width of a lane [m].
+_WIDEST_LANE = 100.0
+# Greatest height of a kerb [m].
+_HIGHEST_LANE = 1.0
+
+
+def read_cubics(
+    elements: Iterable[Element], start: str, offset: float = 0.0
+) -> road_model.Cubics:
+    return road_model.Cubics(
+        [
+            (
+                one.number(start, 0.0) + offset,
+                *(one.number(k, 0.0) for k in "abcd"),
+            )
+            for one in elements
+        ]
+    )
+
+
+def step_function(rows: Iterable[tuple[float, float]]) -> road_model.Cubics:
+    """Returns a step function; each row is a start and the value from there."""
+    return road_model.Cubics([(*row, 0.0, 0.0, 0.0) for row in rows])
+
+
+def read_sections(
+    road: Element, length: float, name: str, faults: ImportFaults
+) -> list[road_model.LaneSection]:
+    elements = list(road.all("lanes", "laneSection"))
+    elements.sort(key=lambda one: one.number("s"))
+    starts = [one.number("s") for one in elements]
+    ends = [*starts[1:], length][: len(starts)]
+    found = []
+    before: dict[int, road_model.Lane] = {}
+    for one, start, end in zip(elements, starts, ends, strict=True):
+        start, end = max(start, 0.0), min(end, length)
+        if end - start < SHORTEST_PIECE:
+            continue
+        lanes: dict[int, road_model.Lane] = {}
+        for side in ("left", "right"):
+            for element in one.all(side, "lane"):
+                lane = _read_lane(element, start, name, faults)
+                if lane.number == 0:
+                    continue
+                if lane.number in lanes:
+                    raise ValueError(
+                        f"line {element.line}: lane {lane.number}: duplicate"
+                        " id, that of a lane before it"
+                    )
+                lanes[lane.number] = lane
+        middle = [
+            mark
+            for element in one.all("center", "lane")
+            for mark in read_marks(element, start, name, faults)
+        ]
+        if is_single_sided(one):
+            # The lanes of the other side continue.
+            sides = {number > 0 for number in lanes}
+            lanes |= {k: v for k, v in before.items() if (k > 0) not in sides}
+        before = lanes
+        found.append(road_model.LaneSection(start, end, lanes, tuple(middle)))
+    return found
+
+
+def is_single_sided(section: Element) -> bool:
+    return section.value("singleSide", "false").lower() in ("true", "1")
+
+
+def _read_lane(
+    element: Element, start: float, name: str, faults: ImportFaults
+) -> road_model.Lane:
+    number = element.number("id")
+    if number != int(number):
+        raise ValueError(
+            f"line {element.line}: lane: id: {number} is not a valid id"
+        )
+    heights = sorted(
+        (
+            one.number("sOffset", 0.0) + start,
+            one.number("inner", 0.0),
+            one.number("outer", one.number("inner", 0.0)),
+        )
+        for one in element.all("height")
+    )
+    if any(
+        abs(value) > _HIGHEST_LANE for _, *both in heights for value in both
+    ):
+        faults.add("lane more than 1 m above its road, laid on it", name)
+        heights = []
+    direction = element.value("direction", "standard")
+    lane = road_model.Lane(
+        number=int(number),
+        kind=element.value("type", "none"),
+        width=read_cubics(element.all("width"), "sOffset", start),
+        border=read_cubics(element.all("border"), "sOffset", start),
+        height=max((inner for _, inner, _ in heights), default=0.0),
+        marks=tuple(read_marks(element, start, name, faults)),
+        inner_height=step_function((s, inner) for s, inner, _ in heights),
+        outer_height=step_function((s, outer) for s, _, outer in heights),
+        is_level=element.value("level", "false").lower() in ("true", "1"),
+        is_reversed=direction == "reversed",
+    )
+    if direction not in ("standard", "reversed"):
+        faults.add(f"lane with traffic in direction {direction}", name)
+    for one in (*element.all("width"), *element.all("border")):
+        if abs(one.number("a", 0.0)) > _WIDEST_LANE:
+            raise ValueError(
+                f"line {one.line}: lane {lane.number}: {one.tag}: "
+                f"{one.number('a'):g} m is more than {_WIDEST_LANE:g} m"
+            )
+    return lane

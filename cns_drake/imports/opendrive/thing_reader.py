@@ -1,0 +1,190 @@
+"""Reads signals and objects beside roads from an OpenDRIVE file."""
+
+from collections.abc import Iterator, Sequence
+import math
+
+import numpy as np
+
+from cns_drake.base.xml_elements import Element
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.opendrive.road_model import Thing
+
+_MOST_REPEATS = 10_000
+# Distance of trees that are repeated without a distance [m].
+_TREE_SPACING = 4.0
+_LARGEST_SIZE = 1000.0  # [m]
+
+
+def read_things(
+    road: Element, name: str, faults: ImportFaults
+) -> Iterator[Thing]:
+    """Yields the signals and objects beside a road.
+
+    `road` is the road in the file, and `name` its name. What is not read is
+    counted in `faults`.
+
+    Raises:
+        ValueError: there is text in place of a number; the error names the
+            line.
+    """
+    for k, one in enumerate(road.all("signals", "signal")):
+        yield Thing(
+            name=f"signal_{name}_{k}",
+            is_signal=True,
+            kind=one.value("type", "").lower(),
+            s=one.number("s"),
+            t=one.number("t"),
+            z=one.number("zOffset", 0.0),
+            heading=one.number("hOffset", 0.0),
+            size=(0.0, one.number("width", 0.0), one.number("height", 0.0)),
+            is_dynamic=one.value("dynamic", "no") == "yes",
+            faces_back=one.value("orientation", "none") == "-",
+        )
+    for k, one in enumerate(road.all("objects", "object")):
+        thing = _read_object(one, f"object_{name}_{k}")
+        for _ in list(one.all("outlines", "outline"))[1:]:
+            faults.add("further outline of an object, not read", thing.name)
+        repeats = list(one.all("repeat"))
+        if not repeats:
+            yield thing
+        for m, repeat in enumerate(repeats):
+            yield from _repetitions(thing, repeat, m, faults)
+
+
+def _read_object(one: Element, name: str) -> Thing:
+    radius = one.number("radius", 0.0)
+    size = (
+        one.number("length", 2.0 * radius),
+        one.number("width", 2.0 * radius),
+        one.number("height", 0.0),
+    )
+    if not all(0.0 <= side <= _LARGEST_SIZE for side in size):
+        raise ValueError(
+            f"line {one.line}: object: a size of {size} m is not in 0 to "
+            f"{_LARGEST_SIZE:g} m"
+        )
+    outline = next(one.all("outlines", "outline"), one.first("outline"))
+    corners = _read_corners(outline, "cornerLocal", "uvz")
+    road_corners = _read_corners(outline, "cornerRoad", ("s", "t", "dz"))
+    return Thing(
+        name=name,
+        is_signal=False,
+        kind=one.value("type", one.value("name", "none")).lower(),
+        s=one.number("s"),
+        t=one.number("t"),
+        z=one.number("zOffset", 0.0),
+        heading=one.number("hdg", 0.0),
+        size=size,
+        outline=corners,
+        road_outline=road_corners,
+        is_open=outline is not None and outline.value("closed", "") == "false",
+    )
+
+
+def _read_corners(
+    outline: Element | None, tag: str, names: Sequence[str]
+) -> np.ndarray | None:
+    if outline is None:
+        return None
+    x, y, z = names
+    rows = [
+        (
+            one.number(x),
+            one.number(y),
+            one.number(z, 0.0),
+            one.number("height", 0.0),
+        )
+        for one in outline.all(tag)
+    ]
+    return np.array(rows) if len(rows) >= 2 else None
+
+
+def _repetitions(
+    thing: Thing, repeat: Element, number: int, faults: ImportFaults
+) -> Iterator[Thing]:
+    """Yields the repetitions of an object, or one object without gaps.
+
+    Args:
+        thing: the object.
+        repeat: how the object is repeated, in the file.
+        number: number of `repeat` among the object's own, part of the names.
+        faults: counts objects that are left out.
+
+    Raises:
+        ValueError: a size is too large.
+    """
+    length = repeat.number("length")
+    distance = repeat.number("distance", 0.0)
+    if distance <= 0.0 < length and not thing.kind.startswith("tree"):
+        yield _stretched(thing, repeat, number)
+        return
+    step = distance if distance > 0.0 else _TREE_SPACING
+    count = max(math.floor(length / step + 1e-9), 0) + 1
+    if count > _MOST_REPEATS:
+        faults.add(
+            f"object repeated more than {_MOST_REPEATS} times, left out",
+            thing.name,
+        )
+        return
+    for k in range(count):
+        yield _repeated(thing, repeat, k * step)._replace(
+            name=f"{thing.name}_{number}_{k}"
+        )
+
+
+def _stretched(thing: Thing, repeat: Element, number: int) -> Thing:
+    """Returns an object that is repeated without gaps, such as a wall.
+
+    Raises:
+        ValueError: a size is too large.
+    """
+    start, length = repeat.number("s"), repeat.number("length")
+    _, width, height = thing.size
+    if thing.outline is not None:
+        width = width or float(np.ptp(thing.outline[:, 1]))
+        height = height or float(thing.outline[:, 3].max())
+    columns = (
+        (start, start + length),
+        _values_at_ends(repeat, "t", thing.t),
+        _values_at_ends(repeat, "zOffset", thing.z),
+        _values_at_ends(repeat, "width", width),
+        _values_at_ends(repeat, "height", height),
+    )
+    swept = np.array(columns).T
+    if swept[:, 3:].max() > _LARGEST_SIZE:
+        raise ValueError(
+            f"line {repeat.line}: repeat: a size of over {_LARGEST_SIZE:g} m"
+        )
+    begin = max(start, 0.0) if start + length > 0.0 else start
+    return thing._replace(name=f"{thing.name}_{number}", s=begin, swept=swept)
+
+
+def _repeated(thing: Thing, repeat: Element, distance: float) -> Thing:
+    """Returns the repetition of an object, `distance` after the first [m]."""
+    length = repeat.number("length")
+    part = min(1.0, distance / length) if length > 0.0 else 0.0
+
+    def between_ends(name: str, default: float) -> float:
+        first, last = _values_at_ends(repeat, name, default)
+        return first + part * (last - first)
+
+    own_length, width, height = thing.size
+    return thing._replace(
+        s=repeat.number("s") + distance,
+        t=between_ends("t", thing.t),
+        z=between_ends("zOffset", thing.z),
+        size=(
+            own_length,
+            between_ends("width", width),
+            between_ends("height", height),
+        ),
+        road_outline=None,
+    )
+
+
+def _values_at_ends(
+    repeat: Element, name: str, default: float
+) -> tuple[float, float]:
+    """Returns the values of an attribute at both ends of a repetition."""
+    first = repeat.number(f"{name}Start", default)
+    return first, repeat.number(f"{name}End", first)

@@ -1,0 +1,126 @@
+"""Writes the files of a town that was built on an imported road network."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from cns_drake.city.generation.generate import render_stages
+from cns_drake.city.geometry import Structure, polygons_of
+from cns_drake.imports import map_files, overview
+from cns_drake.imports.opendrive.town import Town
+from cns_drake.imports.report import ImportReport
+from cns_drake.imports.structures import Imported
+from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
+
+# About the radius of a tree's crown, in pictures [m].
+_CROWN_RADIUS = 1.5
+# Least and greatest speed of a drive [m/s].
+_SPEEDS = (3.0, 12.0)
+# Classes that the picture from above shows; small things could not be seen.
+_SHOWN_CLASSES = (
+    "road",
+    "parking",
+    "sidewalk",
+    "other-ground",
+    "building",
+    "vegetation",
+)
+
+
+def write_town(
+    draft: Path, source: Path, town: Town
+) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
+    """Writes all files of a town to a map folder.
+
+    Args:
+        draft: the folder, which has the map's name.
+        source: imported file, named in messages and comments.
+        town: the town.
+
+    Returns:
+        What was imported, and name of a stage -> numbers of its structures and
+        of its triangles.
+
+    Raises:
+        InputError: the town has more structures than there are instance ids.
+    """
+    stages = town.stages.stages
+    files, sizes = render_stages(
+        draft.name,
+        town.city,
+        town.stages,
+        stages,
+        source,
+        origin=f"Imported by cns-drake from {source.name}.",
+    )
+    (draft / MESH_FOLDER).mkdir(exist_ok=True)
+    for name, text in files.items():
+        (draft / name).write_text(text, "utf-8")
+    if town.lanes is not None:
+        (draft / LANES_NAME).write_text(town.lanes, "utf-8")
+    map_files.write_facts(
+        draft,
+        source,
+        {
+            "reference_system": town.roads.reference_system or "unknown",
+            "origin": list(town.roads.origin),
+            "seed": town.seed,
+            "stages": {name: plan.story for name, plan in stages.items()},
+        },
+        town.faults,
+        "# Where the roads of this map come from; all else is random."
+        "\n# A place of the map plus the origin is one of the source [m].\n",
+    )
+    map_files.write_drives(
+        draft,
+        {
+            stage: "" if stage == list(stages)[-1] else ", not all of it built"
+            for stage in stages
+        },
+        [drive.waypoints for drive in town.drives],
+        [
+            float(np.clip(drive.limit or _SPEEDS[1], *_SPEEDS))
+            for drive in town.drives
+        ],
+    )
+    overview.draw_overview(
+        draft / "from_above.png",
+        list(_seen_from_above(town.city.structures)),
+        None,
+        town.drives,
+    )
+    report = ImportReport(
+        kinds=town.kinds,
+        triangles=sum(one.model.num_triangles for one in town.city.structures),
+        stages={stage: size[0] for stage, size in sizes.items()},
+        undated=0,
+        dated=0,
+        drives=tuple(drive.length for drive in town.drives),
+        faults=town.faults.rows(),
+    )
+    return report, sizes
+
+
+def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
+    """Yields the footprints of structures as flat triangles."""
+    for one in structures:
+        if one.semantic_class not in _SHOWN_CLASSES:
+            continue
+        area = one.footprint_W
+        if one.semantic_class == "vegetation":
+            # About the radius of the crown.
+            area = area.buffer(_CROWN_RADIUS)
+        pieces = polygons_of(area)
+        cut = shapely.constrained_delaunay_triangles(
+            shapely.multipolygons(pieces)
+        )
+        corners = [
+            shapely.get_coordinates(triangle)[:3]
+            for triangle in shapely.get_parts(cut)
+        ]
+        if corners:
+            xy = np.array(corners)
+            z = np.zeros((*xy.shape[:2], 1))
+            yield Imported(one, "", None, np.concatenate([xy, z], axis=2))

@@ -1,0 +1,111 @@
+"""What OpenStreetMap's tags say about a building: heights, kind, existence.
+
+https://wiki.openstreetmap.org/wiki/Key:building:levels
+"""
+
+from collections.abc import Mapping
+import re
+
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.openstreetmap.tags import (
+    TABLES,
+    count,
+    length,
+    tag_value,
+)
+
+STOREY_HEIGHT = 3.0  # [m]
+# Number of levels of a building of unknown kind.
+_USUAL_LEVELS = 3
+# Larger than any building or street: the tallest tower is 828 m high.
+_TALLEST = 850.0  # [m]
+_LOWEST = 0.1  # [m]
+_MOST_LEVELS = 170
+
+
+def heights(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> tuple[float, float, float]:
+    """Returns three heights of a building, from its tags [m].
+
+    The results are the heights of the building's lowest and highest points
+    above the ground, and the height of the roof only. Heights without a tag are
+    estimated, for example from the number of levels.
+    """
+
+    def metres(key: str, least: float = 0.0) -> float | None:
+        return tag_value(tags, key, length, _TALLEST, where, least)
+
+    def number(key: str, least: float = 0.0) -> float | None:
+        return tag_value(tags, key, count, _MOST_LEVELS, where, least)
+
+    roof_levels = number("roof:levels")
+    # A building may have no levels of its own if its roof has some.
+    levels = number("building:levels", 0.0 if roof_levels else 0.5)
+    roof = metres("roof:height")
+    if roof is None:
+        roof = STOREY_HEIGHT * (roof_levels or 1.0)
+        if tags.get("roof:shape", "flat") == "flat":
+            roof = 0.0
+    high = (
+        metres("height", _LOWEST)
+        or metres("building:height", _LOWEST)
+        or metres("est_height", _LOWEST)
+    )
+    if high is None:
+        if levels is None:
+            levels = TABLES["levels"].get(
+                tags.get("building", ""), _USUAL_LEVELS
+            )
+        high = STOREY_HEIGHT * levels + (
+            roof or STOREY_HEIGHT * (roof_levels or 0.0)
+        )
+    low = metres("min_height")
+    if low is None:
+        low = STOREY_HEIGHT * (number("building:min_level") or 0.0)
+    high = max(high, 1.0)
+    if low >= high and where is not None:
+        name, faults = where
+        faults.add("building that begins above its top, lowered", name)
+    low = min(low, high - 0.5)
+    return low, high, min(roof, high - low - 0.1)
+
+
+def why_absent(tags: Mapping[str, str]) -> str | None:
+    """Returns why a building is left out, such as `underground`, from its tags.
+
+    The result is None if the building is not left out.
+    """
+    if not ("building" in tags or "building:part" in tags):
+        return "demolished"
+    kinds = [tags.get("building", ""), tags.get("building:part", "")]
+    reasons: dict[str, str] = TABLES["absent"]
+    kinds += [key for key in reasons if tags.get(key) == "yes"]
+    for kind in kinds:
+        if kind in reasons:
+            return reasons[kind]
+    layer = tags.get("layer", "")
+    if (
+        tags.get("location") in ("underground", "underwater")
+        or tags.get("tunnel", "no") not in ("no", "building_passage")
+        or re.fullmatch(r"-\d+(\.\d+)?", layer)
+        or (
+            tags.get("building:levels") == "0"
+            and count(tags.get("building:levels:underground"))
+            and not count(tags.get("roof:levels"))
+        )
+    ):
+        return "underground"
+    return None
+
+
+def building_kind(tags: Mapping[str, str]) -> str:
+    """Returns the kind of a building, such as `church`.
+
+    It is `building` if the tags state no kind.
+    """
+    for kind, found in TABLES["buildings"].items():
+        if any(tags.get(key) in one.split() for key, one in found.items()):
+            return str(kind)
+    value = tags.get("building", "yes")
+    return "building" if value == "yes" else value

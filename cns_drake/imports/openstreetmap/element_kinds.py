@@ -1,0 +1,43 @@
+"""Kinds of OpenStreetMap's elements, from their tags."""
+
+from cns_drake.imports.openstreetmap.features import Tags
+from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
+
+_KIND_KEYS = tuple(TABLES["kinds"].split())
+_GONE = tuple(TABLES["gone"].split())
+_LIFECYCLE = tuple(TABLES["lifecycle"].split())
+
+
+def element_kind(tags: Tags) -> str:
+    """Returns the kind of an element in words, from the first known tag.
+
+    For example, it is `highway=residential`, or `other` without a known tag.
+    """
+    for key in _KIND_KEYS:
+        if has_tag(tags, key):
+            return f"{key}={tags[key]}"
+    if any(key.startswith("addr:") for key in tags):
+        return "address"
+    for key in tags:
+        stage, _, rest = key.partition(":")
+        if stage in _LIFECYCLE and rest:
+            return f"{stage}:{rest}"
+    return f"relation of type {tags['type']}" if "type" in tags else "other"
+
+
+def is_building(tags: Tags) -> bool:
+    """Returns whether tags describe a building or a part of a building.
+
+    A former building counts as well, if its tags state the date of its
+    demolition.
+    """
+    return (
+        has_tag(tags, "building")
+        or has_tag(tags, "building:part")
+        or ("end_date" in tags and was_building(tags))
+    )
+
+
+def was_building(tags: Tags) -> bool:
+    """Returns whether tags mark a building that no longer exists."""
+    return any(has_tag(tags, f"{stage}:building") for stage in _GONE)

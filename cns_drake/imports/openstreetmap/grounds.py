@@ -1,0 +1,99 @@
+"""Areas of ground of OpenStreetMap: lawns, water, squares, sports grounds.
+
+https://wiki.openstreetmap.org/wiki/Map_features
+"""
+
+from collections.abc import Iterator
+
+from cns_drake.imports.colours import LAWN, WATER, Rgb
+from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
+from cns_drake.imports.openstreetmap.ground_tags import area_kind, green_kind
+from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.looks import Look, flat_structure
+from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
+from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
+from cns_drake.imports.structures import Imported
+
+_SAND: Rgb = (0.76, 0.68, 0.51)
+_GRAVEL: Rgb = (0.50, 0.47, 0.43)
+_TARTAN: Rgb = (0.60, 0.34, 0.28)
+_GROUND_LEVEL = -0.05  # [m]
+_PITCH = Look("Pitch", "other-ground", _TARTAN, -0.035)
+_GRASS_SURFACES = ("grass", "artificial_turf", "natural_grass")
+_SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
+_SURFACE_COLOURS = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
+# Car parks of these kinds are below the ground or in a building.
+_NOT_ON_GROUND = ("underground", "multi-storey", "rooftop")
+
+
+def _look_of(entry: list) -> Look:
+    kind, semantic_class, (red, green, blue), z = entry
+    return Look(kind, semantic_class, (red, green, blue), z)
+
+
+LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
+
+
+def ground_areas(
+    features: OsmFeatures, local: Local, dressed: bool
+) -> Iterator[Imported]:
+    """Yields areas on the ground, such as lawns and water.
+
+    If `dressed`, there are additional kinds of areas, such as sports grounds,
+    and areas have the colours of their materials. A path that is a closed way
+    is a line, such as the path around a square, unless it has `area=yes`.
+    """
+    for name, tags, polygons in features.areas:
+        is_path = name.startswith("w") and path_width(tags) is not None
+        if is_path and tags.get("area") != "yes":
+            tags = {k: v for k, v in tags.items() if k != "highway"}
+        look = _detailed_look(tags) if dressed else _plain_look(tags)
+        if look is None or has_tag(tags, "building"):
+            continue
+        outlines = map(local.polygon, polygons)
+        yield from flat_structure(
+            f"land_{name}", look, outlines, features.faults
+        )
+
+
+def _plain_look(tags: Tags) -> Look | None:
+    found = area_kind(tags)
+    if found is None:
+        return None
+    kind, semantic_class = found
+    colours = {"WaterBody": WATER, "LandUse": LAWN}
+    narrower = green_kind(tags) if kind == "LandUse" else ""
+    return Look(
+        kind, semantic_class, colours.get(kind), _GROUND_LEVEL, narrower
+    )
+
+
+def _detailed_look(tags: Tags) -> Look | None:
+    if is_tunnel(tags) or tags.get("layer", "").startswith("-"):
+        return None
+    if tags.get("leisure") == "pitch":
+        return _pitch_look(tags)
+    if tags.get("amenity") == "parking":
+        if tags.get("parking") in _NOT_ON_GROUND:
+            return None
+        return Look("Parking", "parking", None, -0.03)
+    for look, entry in LOOKS:
+        if any(
+            tags.get(key) in values.split()
+            for key, values in entry.items()
+            if key != "look"
+        ):
+            return look
+    return _plain_look(tags)
+
+
+def _pitch_look(tags: Tags) -> Look:
+    surface = tags.get("surface")
+    sports = tags.get("sport", "").split(";")
+    is_grass = surface in _GRASS_SURFACES or (
+        surface is None and any(one in _SPORTS_ON_GRASS for one in sports)
+    )
+    rgb = LAWN if is_grass else _SURFACE_COLOURS.get(surface or "", _TARTAN)
+    return _PITCH._replace(
+        rgb=rgb, semantic_class="terrain" if is_grass else "other-ground"
+    )

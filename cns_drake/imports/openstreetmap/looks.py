@@ -1,0 +1,97 @@
+"""Structures that fill areas on the ground, and how they look."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry import Finish
+from cns_drake.imports import faces
+from cns_drake.imports.colours import Rgb
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.solids import extruded
+from cns_drake.imports.structures import Imported, make_imported
+
+
+class Look(NamedTuple):
+    """How an area on the ground is built and looks.
+
+    Attributes:
+        kind: kind of the area, such as Sidewalk.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        rgb: colour; None for the colour of the class.
+        z: height of the upper side [m].
+        narrower: what the area is, if its tags say more than `kind`, such as
+            `park`.
+    """
+
+    kind: str
+    semantic_class: str
+    rgb: Rgb | None
+    z: float
+    narrower: str = ""
+
+
+def flat_structure(
+    name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
+) -> Iterator[Imported]:
+    """Yields one level surface that fills areas; nothing for empty areas.
+
+    Args:
+        name: name of the surface: a word, an underscore, and the id of the
+            element in the file.
+        look: kind, class, colour and height of the surface.
+        areas: the areas in W [m].
+        faults: counts parts that were repaired or left out.
+    """
+    source = name.partition("_")[2]
+    surface = [
+        faces.flat_surface(polygon, look.z, source, faults)
+        for area in areas
+        for polygon in faces.valid_parts(area, source, faults)
+    ]
+    if surface:
+        yield _structure_with_look(name, look, "surface", surface)
+
+
+def raised_structure(
+    name: str,
+    look: Look,
+    areas: Iterable[BaseGeometry],
+    source: tuple[str, ImportFaults],
+) -> Iterator[Imported]:
+    """Yields one solid on the ground that fills areas, if there are any.
+
+    Args:
+        name: name of the solid.
+        look: kind, class, colour and height of the solid.
+        areas: the areas in W [m].
+        source: pair of the element's id in the file, for messages, and the
+            fault counter that counts invalid areas.
+    """
+    solids = [
+        np.concatenate(extruded(polygon, 0.0, look.z, *source))
+        for area in areas
+        for part in faces.parts_of(area)
+        for polygon in faces.valid_parts(part, *source)
+    ]
+    if solids:
+        yield _structure_with_look(name, look, "body", solids)
+
+
+def _structure_with_look(
+    name: str, look: Look, part: str, triangles: Sequence[np.ndarray]
+) -> Imported:
+    surfaces = {part: np.concatenate(triangles)}
+    material = "water" if look.kind == "WaterBody" else None
+    finish = look.rgb and Finish(look.rgb, material)
+    return make_imported(
+        name,
+        look.semantic_class,
+        look.kind,
+        surfaces,
+        {part: finish},
+        narrower=look.narrower,
+    )

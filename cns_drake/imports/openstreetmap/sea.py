@@ -1,0 +1,100 @@
+"""The sea beside the coastlines of OpenStreetMap.
+
+https://wiki.openstreetmap.org/wiki/Tag:natural%3Dcoastline
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, box
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.imports import faces
+from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.openstreetmap.features import OsmWay
+from cns_drake.imports.openstreetmap.grounds import LOOKS
+from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.looks import flat_structure
+from cns_drake.imports.structures import Imported
+
+_WATER_LOOK = LOOKS[0][0]
+# A coastline that ends within the city is extended by this length [m].
+_COAST_EXTENSION = 3000.0
+# Probes at this distance from a coastline find the side of the sea [m].
+_COAST_PROBE = 0.1
+
+
+def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
+    """Returns the coastlines among ways; land is on their left."""
+    return [way for way in ways if way.tags.get("natural") == "coastline"]
+
+
+def sea(
+    coasts: Sequence[OsmWay],
+    local: Local,
+    limits: np.ndarray,
+    faults: ImportFaults,
+) -> Iterator[Imported]:
+    """Yields the sea, to the right of the coastlines, if there are any.
+
+    Args:
+        coasts: the coastlines.
+        local: converts places of the file to metres.
+        limits: (2, 2) the least and the greatest x and y of the sea [m].
+        faults: counts parts that were repaired or left out.
+    """
+    if not coasts:
+        return
+    lines = [LineString(local(way.line)) for way in coasts]
+    lines = [line for line in lines if line.length > 0.0]
+    merged = shapely.get_parts(shapely.line_merge(shapely.union_all(lines)))
+    whole = box(*limits.ravel().tolist())
+    cuts = [
+        _extended_within(line, whole).intersection(whole) for line in merged
+    ]
+    edges = shapely.union_all([whole.boundary, *cuts])
+    areas = shapely.get_parts(shapely.polygonize([edges]))
+    water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
+    yield from flat_structure(
+        f"sea_{coasts[0].name}", _WATER_LOOK, faces.parts_of(water), faults
+    )
+
+
+def _extended_within(line: LineString, whole: BaseGeometry) -> LineString:
+    """Returns a line whose ends within an area are extended straight on."""
+    points = np.array(line.coords)
+    if line.is_closed:
+        return line
+    for end, before in ((0, 1), (-1, -2)):
+        if whole.contains(Point(points[end])):
+            way = points[end] - points[before]
+            if not way.any():
+                continue
+            far = points[end] + _COAST_EXTENSION * way / np.hypot(*way)
+            points = (
+                np.vstack([far, points])
+                if end == 0
+                else np.vstack([points, far])
+            )
+    return LineString(points)
+
+
+def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
+    """Returns whether an area is on the right of most of its coastline."""
+    shapely.prepare(area)
+    right = 0.0
+    for coast in coasts:
+        points = np.array(coast.coords)
+        steps = np.diff(points, axis=0)
+        length = np.hypot(*steps.T)
+        used = length > 0.0
+        middles = (points[:-1] + steps / 2.0)[used]
+        steps, length = steps[used], length[used]
+        aside = (
+            _COAST_PROBE * np.c_[steps[:, 1], -steps[:, 0]] / length[:, None]
+        )
+        for side in (1.0, -1.0):
+            places = shapely.points(middles + side * aside)
+            right += side * float(length[shapely.contains(area, places)].sum())
+    return right > 0.0

@@ -1,0 +1,221 @@
+"""Sorts the objects of an OpenStreetMap file.
+
+The reader needs first the nodes, then the ways, then the relations, each by
+ascending positive id and only in its newest version. Files in another order,
+such as files of Overpass and of editors, are sorted first.
+"""
+
+from collections.abc import Iterator, Mapping
+from collections.abc import Set as AbstractSet
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.parsers import expat
+
+from cns_drake.imports.faults import ImportFaults
+
+# A negative id of a file becomes this number minus the id.
+_FIRST_NEW = 10**12
+_KINDS = ("Node", "Way", "Relation")
+# Indices of kinds.
+_NODE, _WAY = 0, 1
+# An object: the index of its kind, and its id.
+_Key = tuple[int, int]
+# Number of bytes of a file that are searched at a time.
+_CHUNK_SIZE = 1 << 24
+
+
+def number_in_file(number: int) -> int:
+    """Returns the id that an object has in the user's file.
+
+    Editors give negative ids to new objects. The sorted copy of the file has
+    positive ids instead. `number` is the id in the sorted copy.
+    """
+    return _FIRST_NEW - number if number > _FIRST_NEW else number
+
+
+class _Version(NamedTuple):
+    """One version of an object.
+
+    Attributes:
+        version: number of the version.
+        is_there: whether the object exists in this version.
+        tags: tags of the object.
+        content: longitude and latitude of a node [deg], ids of the nodes of a
+            way, or type, id and role of the members of a relation.
+    """
+
+    version: int
+    is_there: bool
+    tags: Mapping[str, str]
+    content: Any
+
+
+def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
+    """Returns a file in the order that the reader needs.
+
+    The result is `path`, or a sorted copy in `folder` if `path` is in another
+    order. Objects that are left out of the copy are counted in `faults`.
+
+    Raises:
+        RuntimeError, ValueError: the file is not an OpenStreetMap file.
+    """
+    import osmium
+
+    deleted = _marked_as_deleted(path, faults)
+    if not deleted and _is_sorted(path):
+        return path
+    versions = _newest_versions(path, deleted, faults)
+    target = folder / "sorted.osm.pbf"
+    with osmium.SimpleWriter(str(target)) as writer:
+        for key in sorted(versions, key=lambda k: (k[0], _positive_id(k[1]))):
+            if versions[key].is_there:
+                _write_object(writer, key, versions[key])
+            else:
+                faults.add("deleted thing, left out", _name_of(key))
+    return target
+
+
+def _newest_versions(
+    path: Path, deleted: AbstractSet[_Key], faults: ImportFaults
+) -> dict[_Key, _Version]:
+    """Returns the newest version of each object of a file.
+
+    Nodes that the file has only as places of its ways are included. Objects in
+    `deleted` are marked as not there, and objects that the file has twice are
+    counted in `faults`.
+    """
+    versions: dict[_Key, _Version] = {}
+    places: dict[int, tuple[float, float]] = {}
+    for one in _objects_in(path):
+        key = _key_of(one)
+        is_there = one.visible and key not in deleted
+        made = _Version(one.version, is_there, dict(one.tags), _content(one))
+        if key[0] == _WAY:
+            places |= {
+                n.ref: (n.lon, n.lat) for n in one.nodes if n.location.valid()
+            }
+        known = versions.get(key)
+        if known is not None:
+            faults.add("thing that is there twice, taken once", _name_of(key))
+            if (known.version, len(known.tags)) >= (
+                one.version,
+                len(made.tags),
+            ):
+                continue
+        versions[key] = made
+    for number, place in places.items():
+        versions.setdefault((_NODE, number), _Version(0, True, {}, place))
+    return versions
+
+
+def _write_object(writer: Any, key: _Key, version: _Version) -> None:
+    """Writes an object with a positive id, and positive ids in its content."""
+    from osmium.osm import mutable
+
+    kind, number = key
+    common: dict[str, Any] = {
+        "id": _positive_id(number),
+        "tags": dict(version.tags),
+        "version": 1,
+    }
+    if kind == _NODE:
+        writer.add_node(mutable.Node(location=version.content, **common))
+    elif kind == _WAY:
+        refs = [_positive_id(ref) for ref in version.content]
+        writer.add_way(mutable.Way(nodes=refs, **common))
+    else:
+        members = [(t, _positive_id(ref), r) for t, ref, r in version.content]
+        writer.add_relation(mutable.Relation(members=members, **common))
+
+
+def _key_of(one: Any) -> _Key:
+    return _KINDS.index(type(one).__name__), one.id
+
+
+def _name_of(key: _Key) -> str:
+    """Returns the name of an object, such as `w123`."""
+    return f"{_KINDS[key[0]][0].lower()}{key[1]}"
+
+
+def _objects_in(path: Path) -> Iterator[Any]:
+    import osmium
+
+    yield from osmium.FileProcessor(str(path))
+
+
+def _positive_id(number: int) -> int:
+    return number if number > 0 else _FIRST_NEW - number
+
+
+def _content(one: Any) -> Any:
+    kind = type(one).__name__
+    if kind == "Node":
+        return (one.lon, one.lat) if one.location.valid() else None
+    if kind == "Way":
+        return [n.ref for n in one.nodes]
+    return [(m.type, m.ref, m.role) for m in one.members]
+
+
+def _is_sorted(path: Path) -> bool:
+    """Returns whether objects are in order, and ways have only node ids."""
+    last = 0, 0
+    for one in _objects_in(path):
+        key = _key_of(one)
+        if key <= last or one.id <= 0 or not one.visible:
+            return False
+        if key[0] == _WAY and any(n.location.valid() for n in one.nodes):
+            return False
+        last = key
+    return True
+
+
+def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
+    """Returns the objects that an editor has marked as deleted (XML only).
+
+    A remark by Overpass, such as that it ran out of time, is counted as a
+    fault.
+    """
+    found: set[_Key] = set()
+    remark: list[str] = []
+    is_open = False
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal is_open
+        is_open = tag == "remark"
+        kind = tag.capitalize()
+        if kind in _KINDS and attributes.get("action") == "delete":
+            found.add((_KINDS.index(kind), int(attributes.get("id", "0"))))
+
+    def end(tag: str) -> None:
+        nonlocal is_open
+        is_open = False
+
+    def text(data: str) -> None:
+        if is_open:
+            remark.append(data)
+
+    if path.suffix == ".osm" and _has_any_word(path, b"action=", b"<remark"):
+        parser = expat.ParserCreate()
+        parser.StartElementHandler, parser.EndElementHandler = start, end
+        parser.CharacterDataHandler = text
+        try:
+            with path.open("rb") as stream:
+                parser.ParseFile(stream)
+        except expat.ExpatError:
+            # Reading the file reports what is wrong.
+            return set()
+    if remark:
+        words = " ".join("".join(remark).split())
+        faults.add(f"the file may be cut off: {words}", "its remark")
+    return found
+
+
+def _has_any_word(path: Path, *words: bytes) -> bool:
+    """Returns whether a file contains any of some words of at most 8 bytes."""
+    rest = b""
+    with path.open("rb") as stream:
+        while chunk := stream.read(_CHUNK_SIZE):
+            if any(word in rest + chunk for word in words):
+                return True
+            rest = chunk[-8:]
+    return False

@@ -1,0 +1,391 @@
+"""Lanes for traffic on OpenStreetMap streets, and ways through junctions."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.base.angles import wrapped
+from cns_drake.imports.openstreetmap import lane_tags, speed_tags
+from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
+from cns_drake.roads.centreline import blend
+from cns_drake.traffic.lane_joining import DirectedLane
+from cns_drake.traffic.polylines import SPACING
+
+# A way through a junction is a turn if its heading changes by more than this.
+_STRAIGHT_DEG = 35.0
+# Length of the running mean that rounds the corners of a street [m].
+_ROUNDED_OVER = 7.0
+# Length of the running mean that rounds a lane on the inner side of a sharp
+# bend [m].
+_LANE_ROUNDED_OVER = 4.0
+# A bend is sharp if a lane's points would be less than this share of their
+# usual distance apart, or fold over.
+_SHARP_SHARE = 0.2
+# Lanes end at this distance from the corner of two streets [m].
+_BEFORE_CORNER = 1.0
+# Lanes end at least this far from a place where just one street continues [m].
+_BEFORE_JOINT = 3.0
+# Lanes end at most this far from the end of their stretch [m].
+_FARTHEST_STOP = 25.0
+# Least length of a lane between two junctions [m].
+_SHORTEST_LANE = 1.0
+# The direction of a street's end is that of its last piece of this length [m].
+_ARM_LENGTH = 6.0
+# An end of a stretch: the number of the stretch, and 0 for its start or -1 for
+# its end.
+_Arm = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A street between two junctions, with its lanes.
+
+    Attributes:
+        street: the street, which may extend beyond the junctions.
+        line: (N, 2) middle of the street, with rounded corners and evenly
+            spaced points [m].
+        nodes: nodes at the first and at the last point of `line`.
+        layout: numbers and width of the lanes.
+    """
+
+    street: Street
+    line: np.ndarray
+    nodes: tuple[int, int]
+    layout: lane_tags.LaneLayout
+
+    @cached_property
+    def length(self) -> float:
+        return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
+
+    def heading(self, end: int) -> float:
+        """Returns the direction of the stretch at an end of the stretch [rad].
+
+        The direction points away from this end, along the stretch. `end` is 0
+        for the first point and -1 for the last.
+        """
+        line = self.line if end == 0 else self.line[::-1]
+        reach = min(len(line) - 1, max(1, round(_ARM_LENGTH / SPACING)))
+        return float(np.arctan2(*(line[reach] - line[0])[::-1]))
+
+
+@dataclass(frozen=True)
+class _Lane:
+    """A lane of a stretch, with points (N, 2) in driving direction [m].
+
+    Number 0 is the innermost lane of its direction.
+    """
+
+    stretch: int
+    is_forward: bool
+    number: int
+    points: np.ndarray
+
+    @property
+    def exit_arm(self) -> _Arm:
+        return self.stretch, -1 if self.is_forward else 0
+
+    @property
+    def entry_arm(self) -> _Arm:
+        return self.stretch, 0 if self.is_forward else -1
+
+
+class StreetTraffic(NamedTuple):
+    """The lanes of streets, and which lane leads into which.
+
+    Attributes:
+        lanes: lanes of streets, followed by lanes through junctions.
+        links: pairs of lanes; the second lane of a pair follows the first lane.
+        beside: lane -> the neighbouring lane on the outer side, with the same
+            direction.
+        junctions: nodes at which three or more ends of streets meet.
+    """
+
+    lanes: Sequence[DirectedLane]
+    links: Sequence[tuple[int, int]]
+    beside: Mapping[int, int]
+    junctions: Sequence[int]
+
+
+def make_traffic_lanes(
+    streets: Sequence[Street],
+    crossed: AbstractSet[int],
+    surface: BaseGeometry,
+    side: float,
+) -> StreetTraffic:
+    """Returns the lanes of streets that meet at common nodes.
+
+    Args:
+        streets: the streets.
+        crossed: nodes at which people cross.
+        surface: surface of all streets in W [m]. Ways through junctions that
+            leave this surface are left out.
+        side: 1 if traffic keeps right, and -1 if it keeps left.
+    """
+    stretches = list(_stretches(streets, crossed))
+    arms: defaultdict[int, list[_Arm]] = defaultdict(list)
+    for k, stretch in enumerate(stretches):
+        for end, node in zip((0, -1), stretch.nodes, strict=True):
+            arms[node].append((k, end))
+    meeting = _MeetingStreets(stretches, arms, crossed, side)
+    drawn = list(meeting.lanes())
+    lanes = [
+        DirectedLane(
+            _at_ground_level(lane.points),
+            speed_tags.speed_limit(
+                stretches[lane.stretch].street.tags, lane.is_forward
+            ),
+            False,
+        )
+        for lane in drawn
+    ]
+    links: list[tuple[int, int]] = []
+    shapely.prepare(surface)
+    for first, last, is_junction, line in meeting.ways(drawn):
+        if not surface.covers(shapely.LineString(line)):
+            continue
+        links += [(first, len(lanes)), (len(lanes), last)]
+        limit = min(lanes[k].limit for k in (first, last))
+        lanes.append(DirectedLane(_at_ground_level(line), limit, is_junction))
+    junctions = [node for node, ends in arms.items() if len(ends) > 2]
+    return StreetTraffic(lanes, links, _outer_neighbours(drawn), junctions)
+
+
+@dataclass(frozen=True)
+class _MeetingStreets:
+    """Streets, cut where they meet.
+
+    Attributes:
+        stretches: the pieces of the streets.
+        arms: node -> the ends of stretches there.
+        crossed: nodes at which people cross.
+        side: 1 if traffic keeps right, and -1 if it keeps left.
+    """
+
+    stretches: Sequence[Stretch]
+    arms: Mapping[int, Sequence[_Arm]]
+    crossed: AbstractSet[int]
+    side: float
+
+    def setback(self, arm: _Arm) -> float:
+        """Returns how far before an end of a stretch its lanes stop [m].
+
+        `arm` is a pair: the number of the stretch; and 0 for the end where its
+        line starts, or -1 for the other end.
+        """
+        stretch = self.stretches[arm[0]]
+        wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
+        room = max(stretch.length - _SHORTEST_LANE, 0.0)
+        return wanted[arm[1]] * min(1.0, room / sum(wanted))
+
+    def _wanted_setback(self, arm: _Arm) -> float:
+        stretch = self.stretches[arm[0]]
+        arms = self.arms[stretch.nodes[arm[1]]]
+        is_joint = len(arms) < 3
+        reach = _BEFORE_JOINT if is_joint else _BEFORE_CORNER
+        half = stretch.street.width / 2.0
+        for other in arms:
+            if other == arm:
+                continue
+            crossed = self.stretches[other[0]]
+            wide = crossed.street.width / 2.0
+            angle = abs(
+                wrapped(crossed.heading(other[1]) - stretch.heading(arm[1]))
+            )
+            # The corner where the edges of both streets meet.
+            if is_joint:
+                corner = max(wide, half) / max(np.tan(angle / 2.0), 0.1)
+            else:
+                corner = (wide + half * np.cos(angle)) / max(np.sin(angle), 0.1)
+                corner += _BEFORE_CORNER
+            reach = max(reach, corner)
+        return float(min(reach, _FARTHEST_STOP))
+
+    def lanes(self) -> Iterator[_Lane]:
+        """Yields the lanes of all stretches."""
+        for k, stretch in enumerate(self.stretches):
+            along = np.linspace(0.0, stretch.length, len(stretch.line))
+            low = self.setback((k, 0))
+            high = stretch.length - self.setback((k, -1))
+            places = np.linspace(
+                low, high, max(2, int((high - low) / SPACING) + 1)
+            )
+            middle = np.column_stack(
+                [np.interp(places, along, x) for x in stretch.line.T]
+            )
+            tangent = np.gradient(stretch.line, axis=0)
+            tangent = np.column_stack(
+                [np.interp(places, along, x) for x in tangent.T]
+            )
+            tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+            for is_forward, count in (
+                (True, stretch.layout.forward),
+                (False, stretch.layout.backward),
+            ):
+                for number in range(count):
+                    offset = stretch.layout.offset(is_forward, number)
+                    offset *= self.side * (1.0 if is_forward else -1.0)
+                    points = _line_beside(middle, tangent, offset)
+                    if points is not None:
+                        if not is_forward:
+                            points = points[::-1]
+                        yield _Lane(k, is_forward, number, points)
+
+    def ways(
+        self, lanes: Sequence[_Lane]
+    ) -> Iterator[tuple[int, int, bool, np.ndarray]]:
+        """Yields the ways from lanes into next lanes.
+
+        Yields:
+            Number of the lane, number of the next lane, whether the way is in a
+            junction, and the points (N, 2) of the way [m].
+        """
+        leaving: defaultdict[_Arm, list[int]] = defaultdict(list)
+        entering: defaultdict[_Arm, list[int]] = defaultdict(list)
+        for k, lane in enumerate(lanes):
+            leaving[lane.entry_arm].append(k)
+            entering[lane.exit_arm].append(k)
+        for node, arms in self.arms.items():
+            # Vehicles enter a crossing as they would enter a junction.
+            is_entered = len(arms) > 2 or node in self.crossed
+            for a, b in product(arms, arms):
+                if a == b:
+                    continue
+                # Vehicles also enter a place where a street loses a lane as
+                # they would enter a junction.
+                is_junction = is_entered or len(entering[a]) > len(leaving[b])
+                for first, last in product(entering[a], leaving[b]):
+                    one, other = lanes[first], lanes[last]
+                    before, after = (
+                        _heading_at_end(one, -1),
+                        _heading_at_end(other, 0),
+                    )
+                    turn = float(np.degrees(wrapped(after - before)))
+                    if abs(turn) > SHARPEST_TURN_DEG:
+                        continue
+                    if not self._is_legal(one, other, turn, len(arms) > 2):
+                        continue
+                    line = blend(
+                        one.points[-1], before, other.points[0], after, SPACING
+                    )
+                    yield first, last, is_junction, line
+
+    def _is_legal(
+        self, first: _Lane, last: _Lane, turn_deg: float, is_junction: bool
+    ) -> bool:
+        """Returns whether traffic may go from one lane to another.
+
+        A turn across the opposite direction leads from the innermost lane to
+        the innermost lane, and a turn to the other side from the outermost lane
+        to the outermost lane. Straight on, lanes keep their number, counted
+        from the inside. Between one-way streets, lanes keep their number,
+        counted from the outside.
+        """
+        layouts = [self.stretches[one.stretch].layout for one in (first, last)]
+        here, there = (
+            layout.forward if one.is_forward else layout.backward
+            for layout, one in zip(layouts, (first, last), strict=True)
+        )
+        outer = (here - 1 - first.number, there - 1 - last.number)
+        if all(layout.forward * layout.backward == 0 for layout in layouts):
+            return outer[1] == min(outer[0], there - 1)
+        if not is_junction or abs(turn_deg) <= _STRAIGHT_DEG:
+            return last.number == min(first.number, there - 1)
+        if turn_deg * self.side > 0:
+            return first.number == last.number == 0
+        return outer == (0, 0)
+
+
+def _stretches(
+    streets: Sequence[Street], crossed: AbstractSet[int]
+) -> Iterator[Stretch]:
+    used = [
+        street
+        for street in streets
+        if street.tags.get("highway") != "track"
+        and lane_tags.lane_layout(street.tags, street.width).width
+    ]
+    for street, line, ends in cut_at_nodes(used, crossed):
+        if shapely.LineString(line).length > SPACING:
+            layout = lane_tags.lane_layout(street.tags, street.width)
+            yield Stretch(
+                street,
+                _rounded_line(shapely.LineString(line), _ROUNDED_OVER),
+                ends,
+                layout,
+            )
+
+
+def _line_beside(
+    middle: np.ndarray, tangent: np.ndarray, offset: float
+) -> np.ndarray | None:
+    """Returns points (M, 2) on a line beside another line [m].
+
+    Args:
+        middle: (N, 2) points of the other line [m].
+        tangent: (N, 2) unit vectors along this line.
+        offset: distance to the right of this line [m].
+
+    Returns:
+        The points; None if the other line bends too sharply.
+    """
+    right = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    points = middle + offset * right
+    ahead = (np.diff(points, axis=0) * tangent[1:]).sum(axis=1)
+    if not ahead.min() < _SHARP_SHARE * SPACING:
+        return np.asarray(points)
+    parts = shapely.get_parts(shapely.LineString(middle).offset_curve(-offset))
+    if not len(parts):
+        return None
+    longest = parts[shapely.length(parts).argmax()]
+    return _rounded_line(longest, _LANE_ROUNDED_OVER)
+
+
+def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
+    """Returns evenly spaced points (N, 2) along a line with smooth corners.
+
+    `window_length` is the length of the running mean that rounds them [m].
+    """
+    count = max(3, round(line.length / SPACING) + 1)
+    places = np.linspace(0.0, 1.0, count)
+    points = shapely.get_coordinates(
+        shapely.line_interpolate_point(line, places, normalized=True)
+    )
+    window = min(int(window_length / SPACING), count // 3) // 2 * 2 + 1
+    reach = window // 2
+    # Mirrored at both ends, so that these stay in place.
+    longer = np.concatenate(
+        [
+            2 * points[0] - points[reach:0:-1],
+            points,
+            2 * points[-1] - points[-2 : -reach - 2 : -1],
+        ]
+    )
+    smooth = uniform_filter1d(longer, window, axis=0)
+    return smooth[reach : reach + count]
+
+
+def _outer_neighbours(lanes: Sequence[_Lane]) -> Mapping[int, int]:
+    # Lanes of one direction, in order from the inside outwards.
+    return {
+        k: k + 1
+        for k, (one, other) in enumerate(pairwise(lanes))
+        if (one.stretch, one.is_forward) == (other.stretch, other.is_forward)
+    }
+
+
+def _heading_at_end(lane: _Lane, end: int) -> float:
+    a, b = lane.points[:2] if end == 0 else lane.points[-2:]
+    return float(np.arctan2(*(b - a)[::-1]))
+
+
+def _at_ground_level(line: np.ndarray) -> np.ndarray:
+    return np.column_stack([line, np.zeros(len(line))])

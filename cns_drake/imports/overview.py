@@ -1,0 +1,164 @@
+"""A picture of an imported map from above, with its drives."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+import numpy as np
+
+from cns_drake.imports.colours import WATER
+from cns_drake.imports.drives.free_space import CELL, FreeSpace
+from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.faces import joined_triangles
+from cns_drake.imports.structures import Imported
+from cns_drake.scene.semantics import CLASS_RGB
+
+_DPI = 130
+_LONGER_SIDE_INCHES = 9.0
+_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
+_ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
+_ROOM_COLOUR = "#ffd92f"
+_ROOM_ALPHA = 0.6
+
+
+def draw_overview(
+    path: Path,
+    structures: Sequence[Imported],
+    space: FreeSpace | None,
+    drives: Sequence[WaypointRoute],
+) -> None:
+    """Draws a map's structures, the free space for a car and the drives.
+
+    Where two drives share a street, the second drive is a thinner line on top
+    of the first, so that both can be seen.
+
+    Args:
+        path: image file to write.
+        structures: the structures.
+        space: the free space; None to draw none.
+        drives: the drives, at most two.
+    """
+    corners = joined_triangles(one.triangles for one in structures)
+    xy = corners.reshape(-1, 3)[:, :2]
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    if space is not None:
+        low = space.low
+        high = low + CELL * np.array(space.clearance.shape[::-1])
+    figure = Figure(layout="constrained")
+    axes = figure.subplots()
+    classes = _draw_structures(axes, structures)
+    if space is not None:
+        classes |= _draw_room(axes, space, low, high)
+    legend = _draw_drives(axes, drives) | classes
+    axes.set(
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+        xlabel="x [m]",
+        ylabel="y [m]",
+    )
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
+    size = _LONGER_SIDE_INCHES * (high - low) / (high - low).max()
+    wide = max(size[0] + 0.8, 4.0)
+    columns = int(wide / 2)
+    rows = -(-len(legend) // columns)
+    figure.set_size_inches(wide, size[1] + 0.8 + 0.2 * rows)
+    figure.legend(
+        legend.values(),
+        legend.keys(),
+        loc="outside lower center",
+        ncols=columns,
+    )
+    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def _draw_structures(
+    axes: Axes, structures: Sequence[Imported]
+) -> dict[str, Artist]:
+    """Draws structures, the ground first; returns the legend."""
+    legend: dict[str, Artist] = {}
+    for is_ground in (True, False):
+        alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
+        for one in structures:
+            if one.is_ground == is_ground and one.kind != "TINRelief":
+                colour = _colour_of(one)
+                alike.setdefault(colour, []).append(one.triangles)
+                name = one.structure.semantic_class
+                if name == "building":
+                    name = "building, any colour"
+                elif colour == WATER:
+                    name = "water"
+                legend.setdefault(name, Patch(facecolor=colour))
+        for colour, triangles in alike.items():
+            # The library takes an array faster than a list, but its type hints
+            # do not allow it.
+            corners_xy: Any = np.concatenate(triangles)[:, :, :2]
+            axes.add_collection(
+                PolyCollection(
+                    corners_xy,
+                    facecolors=[colour],
+                    # Otherwise fine lines show between triangles.
+                    edgecolors="face",
+                    linewidths=0.3,
+                )
+            )
+    return legend
+
+
+def _draw_room(
+    axes: Axes, space: FreeSpace, low: np.ndarray, high: np.ndarray
+) -> dict[str, Artist]:
+    """Draws the free space for a car; returns the legend.
+
+    `low` and `high` (2,) are the least and the greatest x and y of the free
+    space [m].
+    """
+    room = np.where(space.clearance >= space.least, 1.0, np.nan)
+    axes.imshow(
+        room,
+        origin="lower",
+        extent=(low[0], high[0], low[1], high[1]),
+        cmap=ListedColormap([_ROOM_COLOUR]),
+        alpha=_ROOM_ALPHA,
+        # Above the structures and below the lines.
+        zorder=1.5,
+    )
+    return {"room for a car": Patch(facecolor=_ROOM_COLOUR, alpha=_ROOM_ALPHA)}
+
+
+def _draw_drives(
+    axes: Axes, drives: Sequence[WaypointRoute]
+) -> dict[str, Artist]:
+    """Draws drives with their starts and ends; returns the legend."""
+    legend: dict[str, Artist] = {}
+    for letter, drive, rgb, width in zip(
+        "ab", drives, _ROUTE_COLOURS, _ROUTE_WIDTHS, strict=False
+    ):
+        (line,) = axes.plot(*drive.path.T, color=rgb, linewidth=width)
+        legend[f"drive {letter}, {drive.length:.0f} m"] = line
+        for end, marker, name in ((0, "o", "start"), (-1, "s", "end")):
+            axes.plot(
+                *drive.path[end],
+                marker,
+                color=rgb,
+                markersize=2 * width + 3,
+                markeredgecolor="white",
+            )
+            legend[name] = Line2D(
+                [], [], linestyle="", marker=marker, color="black"
+            )
+    return legend
+
+
+def _colour_of(one: Imported) -> tuple[float, float, float]:
+    part = one.structure.model.parts[0]
+    if one.structure.semantic_class == "vegetation":
+        return CLASS_RGB["vegetation"]
+    return part.rgb or CLASS_RGB[one.structure.semantic_class]

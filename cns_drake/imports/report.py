@@ -1,0 +1,29 @@
+"""The report of an import: what was imported, and its faults."""
+
+from dataclasses import dataclass
+
+# File in the map's folder that lists all counts of an import.
+REPORT_NAME = "import.txt"
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The result of an import.
+
+    Attributes:
+        kinds: type of object -> number of structures.
+        triangles: number of triangles.
+        stages: name of a stage -> number of its structures.
+        undated: number of buildings without a year.
+        dated: number of buildings with a year.
+        drives: lengths of the proposed drives [m].
+        faults: kind, count and example of each fault.
+    """
+
+    kinds: dict[str, int]
+    triangles: int
+    stages: dict[str, int]
+    undated: int
+    dated: int
+    drives: tuple[float, ...]
+    faults: list[tuple[str, int, str]]

@@ -1,0 +1,102 @@
+"""Solids on footprints, with the roof shapes that OpenStreetMap describes."""
+
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+
+from cns_drake.city.geometry import long_normals
+from cns_drake.imports.faces import LEAST_AREA, flat_surface, level_rings
+from cns_drake.imports.faults import ImportFaults
+
+
+def extruded(
+    polygon: Polygon,
+    low: float,
+    high: float,
+    name: str,
+    faults: ImportFaults,
+    roof: str = "flat",
+    roof_height: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the walls and the roof of a solid, as triangles (M, 3, 3) [m].
+
+    A roof that is impossible on the footprint is replaced by a flat roof, and
+    counts as a fault.
+
+    Args:
+        polygon: the footprint.
+        low: height of the lowest point [m]; above 0, the walls include an
+            underside.
+        high: height of the highest point [m].
+        name: name of the object, as an example in `faults`.
+        faults: counts roofs and areas that were replaced or left out.
+        roof: `flat`; `pyramidal`, on a footprint without holes whose centroid
+            sees all of its walls; `gabled` or `hipped`, on a footprint with
+            four corners.
+        roof_height: height of the roof above the eaves [m].
+    """
+    polygon = orient(polygon)
+    eaves = high - roof_height
+    # A solid that begins above the ground can be seen from below.
+    floor = np.zeros((0, 3, 3))
+    if low > 0.0:
+        floor = flat_surface(polygon, low, name, faults)[:, ::-1]
+    corners = level_rings(polygon, eaves)[0]
+    ridge = None
+    if roof != "flat" and roof_height > 0.0:
+        ridge = _slopes_and_gables(roof, polygon, corners, high)
+        # A slope that looks downwards reaches beyond the footprint.
+        if ridge is None or (
+            long_normals(np.concatenate(ridge[0]))[:, 2].min() < -LEAST_AREA
+        ):
+            ridge = None
+            faults.add(f"roof of shape {roof}, made flat", name)
+    if ridge is None:
+        roofs = flat_surface(polygon, high, name, faults)
+        return np.concatenate([floor, _walls(polygon, low, high)]), roofs
+    slopes, gables = ridge
+    walls = np.concatenate([floor, _walls(polygon, low, eaves), *gables])
+    return walls, np.concatenate(slopes)
+
+
+def _walls(polygon: Polygon, low: float, high: float) -> np.ndarray:
+    found = []
+    for ring in level_rings(polygon, low):
+        following = np.roll(ring, -1, axis=0)
+        up = np.array([0.0, 0.0, high - low])
+        found.append(np.stack([ring, following, following + up], axis=1))
+        found.append(np.stack([ring, following + up, ring + up], axis=1))
+    return np.concatenate(found)
+
+
+def _slopes_and_gables(
+    roof: str, polygon: Polygon, corners: np.ndarray, high: float
+) -> tuple[list[np.ndarray], list[np.ndarray]] | None:
+    """Returns the slopes and gables of a roof; None if it cannot be made."""
+    if roof == "pyramidal" and not polygon.interiors:
+        top = np.array([polygon.centroid.x, polygon.centroid.y, high])
+        following = np.roll(corners, -1, axis=0)
+        tops = np.broadcast_to(top, corners.shape)
+        return [np.stack([corners, following, tops], axis=1)], []
+    if roof not in ("gabled", "hipped") or len(corners) != 4:
+        return None
+    if polygon.interiors:
+        return None
+    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    # The ridge runs along the two longer sides: from corners 0 and 2.
+    if sides[1] + sides[3] > sides[0] + sides[2]:
+        corners = np.roll(corners, -1, axis=0)
+    a, b, c, d = corners
+    start, end = (a + d) / 2.0, (b + c) / 2.0
+    start[2] = end[2] = high
+    if roof == "hipped":
+        across = float(np.linalg.norm(d - a))
+        along = max(float(np.linalg.norm(end - start)), 1e-6)
+        inset = (end - start) * min(0.45, 0.5 * across / along)
+        start, end = start + inset, end - inset
+    slopes = [
+        np.array([[a, b, end], [a, end, start]]),
+        np.array([[c, d, start], [c, start, end]]),
+    ]
+    ends = [np.array([[b, c, end]]), np.array([[d, a, start]])]
+    return (slopes + ends, []) if roof == "hipped" else (slopes, ends)

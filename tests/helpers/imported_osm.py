@@ -1,0 +1,20 @@
+"""Cities imported from OpenStreetMap files, and sizes of their structures."""
+
+import numpy as np
+
+from cns_drake.imports.openstreetmap.city import import_openstreetmap
+
+
+def import_osm(path, year_attribute=None):
+    city = import_openstreetmap(path, year_attribute)
+    return city, {one.structure.name: one for one in city.structures}
+
+
+def bounds(one):
+    corners = one.triangles.reshape(-1, 3)
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def volume(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
