@@ -145,9 +145,9 @@ def simulate(
         driver: Model of the driver. With real, the car wanders in its lane and
             changes lanes, as in published data sets. With none, the car stays
             in the middle of its lane. By default the driver of the scenario.
-        ride: Class of the road surface after ISO 8608, from A (new) to E (very
-            poor), which shakes the car on its springs. With none, the car does
-            not shake. By default the class that the scenario sets.
+        ride: Roughness of the road that shakes the car on its springs, as a
+            class of ISO 8608 from A (new) to E (very poor). With none, the car
+            does not shake. By default the class that the scenario sets.
         imu_rate: Sampling rate of the IMU [Hz]; by default the rate that the
             scenario sets.
         camera: Add a camera that looks ahead, such as 640x480@2: width and

@@ -18,8 +18,8 @@ class RideConfig(Section):
     """How the vehicle's body moves on its springs along its path.
 
     Attributes:
-        roughness: class of the road surface after ISO 8608, from `A` (new) to
-            `E` (very poor), which shakes the vehicle; `none` keeps the vehicle
+        roughness: roughness of the road that shakes the vehicle, as a class of
+            ISO 8608 from `A` (new) to `E` (very poor); `none` keeps the vehicle
             steady.
         seed: seed of the random bumps of the road. Drives with the same seed
             have the same bumps.

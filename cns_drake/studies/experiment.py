@@ -179,11 +179,10 @@ class Experiment(Section):
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.
-        tasks: tasks to measure: a list of names, or settings by the name of the
-            task.
-        methods: methods to run: a list of names or Python files, or settings by
-            the name of the method. A list of values makes a setting a factor.
-            By default all shipped methods.
+        tasks: tasks to measure: a list of names, or for each name its settings.
+        methods: methods to run: a list of names or Python files, or for each
+            name its settings. A setting with a list of values is a factor. By
+            default all shipped methods.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;

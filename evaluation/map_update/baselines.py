@@ -5,7 +5,8 @@
 - `m3c2` (the extra `map-update`; Lague et al., ISPRS J. 82, 2013, in py4dgeo):
   the distance between the two maps along the normal of the surface. A point is
   gone or new if this distance exceeds both the level of detection and 0.1 m,
-  otherwise kept. It is unobserved if a map lacks the points to measure.
+  otherwise kept. A point is unobserved if one of the maps has too few points
+  around it to compute the distance.
 - `free-space`: the scans of the other drive decide, see
   `evaluation.map_update.free_space`.
 """

@@ -1,8 +1,7 @@
 """Reads and writes the maps of two drives, with a label for each point.
 
-A folder contains a session, which is a drive with its map, in each of its
-subfolders: the older drive in `A`, the newer drive in `B`. A session consists
-of
+A session is a drive with its map. A folder contains two sessions: the older
+one in the subfolder `A`, the newer one in `B`. A session consists of
 
 - `map.ply`: the merged map in the world, one point for each 0.1 m, with `x`,
   `y`, `z` [m], and, where known, `label` (class, SemanticKITTI's ids) and
@@ -10,7 +9,8 @@ of
 - `truth.npy`: a label for each point of the map, see `Label`,
 - `Scans/000000.pcd` onwards: the scans in the frame of the LiDAR,
 - `poses.txt`: a row for each scan, the upper 3 x 4 of the LiDAR's pose in the
-  world, and `singlesession_posegraph.g2o`, the same as a pose graph.
+  world,
+- `singlesession_posegraph.g2o`: the same poses, as a pose graph.
 
 Scans and poses have the layout that ELite and LT-mapper read.
 """

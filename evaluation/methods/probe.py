@@ -52,7 +52,7 @@ class ProbeConfig(MethodConfig):
     Attributes:
         voxel_size: side of the voxels to which each cloud is first downsampled
             [m]. The first point of each voxel stays.
-        rings: number of equal cells of range, up to `max_range`.
+        rings: number of bins of equal length in range, from 0 to `max_range`.
         sectors: number of equal cells of azimuth, over 360 deg.
         max_range: largest range of a point that is used [m].
         sigma_t: standard deviation of the displacement that is expected between

@@ -40,7 +40,8 @@ class SolidConfig(MethodConfig):
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
             LiDAR with a field of view like that of `cns`.
-        ranges: number of equal cells of range, up to `max_range`; [P], [C] 40.
+        ranges: number of bins of equal length in range, from 0 to `max_range`;
+            [P], [C] 40.
         azimuths: number of equal cells of azimuth, over 360 deg; [P], [C] 60.
         elevations: number of equal cells of elevation over the field of view;
             [P], [C] the number of beams of the LiDAR. By default the number of

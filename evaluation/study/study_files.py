@@ -52,7 +52,7 @@ class FeatureFiles:
         return Part(self.folder / f"described_{file_name(key)}.data")
 
     def remove_descriptors(self) -> None:
-        """Removes all descriptors, once results were made from them.
+        """Removes all descriptors; call it when the results exist.
 
         Descriptors take three quarters of the space; see `Part.remove_value`.
 

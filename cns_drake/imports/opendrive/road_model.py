@@ -183,7 +183,7 @@ class Lane:
         width: width [m].
         border: distance from the middle of the road to the lane's outer edge
             [m].
-        height: greatest `inner_height` [m].
+        height: greatest height of the inner edge along the lane [m].
         marks: marks on the lane's outer border, one after the other.
         inner_height: height of the inner edge above the road [m], if the file
             states it.

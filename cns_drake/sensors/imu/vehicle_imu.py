@@ -119,9 +119,10 @@ class VehicleImu(LeafSystem):
             X_BI: pose of the IMU.
             gravity_W: acceleration of free fall [m/s^2].
             rate: samples per second.
-            measure: adds errors: takes the number of the first sample and (N,
-                6) exact specific forces and angular velocities, and returns the
-                measured ones. By default there are no errors.
+            measure: function that adds errors. Its arguments are the number of
+                the first sample, and the exact specific forces and angular
+                velocities, (N, 6). It returns the measured ones, (N, 6). By
+                default there are no errors.
         """
         super().__init__()
         self._trajectory = trajectory
