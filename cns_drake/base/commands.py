@@ -1,4 +1,4 @@
-"""Commands made from functions, and options of both command-line programs."""
+"""Commands made from functions, with help from their docstrings."""
 
 from collections.abc import Callable, Collection, Mapping
 import functools
@@ -6,90 +6,12 @@ import inspect
 import math
 import re
 import textwrap
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperCommand
 
 from cns_drake.base.errors import InputError
-
-Jobs = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        help="Number of jobs that run at once on this machine; by default one "
-        "per core. Give a smaller number if memory runs out.",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Address of a Dask scheduler, such as tcp://10.0.0.1:8786, which "
-        "runs the jobs on several machines. All machines need access to the "
-        "output folder under the same path. By default the value of the "
-        "environment variable DASK_SCHEDULER_ADDRESS, if this variable is set.",
-    ),
-]
-Methods = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--method",
-        metavar="NAME|FILE.py",
-        help="Method to run: the name of a shipped method, a Python file with "
-        "your own method, or the word standard, which means all standard "
-        "methods. By default all standard methods run. May be repeated.",
-    ),
-]
-MethodSettings = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="METHOD.NAME=VALUE",
-        help="New value for a setting of a method, such as btc.candidates=20. "
-        "Separate the numbers of a list by commas. If only one method runs, "
-        "you may leave out the method's name: candidates=20. May be repeated.",
-    ),
-]
-Costs = Annotated[
-    bool,
-    typer.Option(
-        "--costs/--no-costs",
-        help="Whether to also measure the time and memory that each method "
-        "needs. The measured costs differ from run to run.",
-    ),
-]
-Tables = Annotated[
-    bool,
-    typer.Option(
-        "--tables",
-        help="Also write the results as wide tables (.csv, .md and .tex): "
-        "survival, tcr, place_recognition, poses and others.",
-    ),
-]
-
-Json = Annotated[
-    bool, typer.Option("--json", help="Print the results as one JSON object.")
-]
-LidarName = Annotated[
-    str | None,
-    typer.Option(
-        "--lidar",
-        metavar="NAME",
-        help="LiDAR whose scans are read, if a recording has several LiDARs. "
-        "Give NAME from the topic /NAME/points, or the whole topic.",
-    ),
-]
-Columns = Annotated[
-    int | None,
-    typer.Option(
-        "--columns",
-        metavar="N",
-        min=3,  # x, y, z
-        help="Number of float32 values per point in .bin files, including x, y "
-        "and z. By default the program guesses this number from the values.",
-    ),
-]
 
 # Parameter name -> its type, annotated with the option, and its default.
 Options = Mapping[str, tuple[Any, Any]]

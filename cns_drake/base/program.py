@@ -15,13 +15,12 @@ from cns_drake.base import interrupts
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
-    has_utf8,
-    missing_library,
     one_line,
     shows_traceback,
 )
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.base.progress import doing
+from cns_drake.base.system_libraries import has_utf8, missing_library
 from cns_drake.base.terminal import note
 from cns_drake.base.version import __version__
 

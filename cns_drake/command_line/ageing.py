@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.number_text import whole_number
@@ -86,7 +86,7 @@ def age(
     rate: RateFactor = 1.0,
     rates: RatesFile = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures")] = True,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Simulate years of change in a city.
 

@@ -13,6 +13,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line import options
 
 if TYPE_CHECKING:
+    from cns_drake.scenarios.scenario import Scenario
     from cns_drake.sensors.lidar.config import WeatherConfig
     from cns_drake.simulation.simulation import FinishedSimulation
 
@@ -80,30 +81,18 @@ def run_drive(
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.simulation import simulate
 
-    scenario = load_scenario(name_or_file)
-    if lidar is not None:
-        scenario = scenario.with_lidar_preset(lidar)
-    if returns is not None:
-        scenario = scenario.with_returns(returns, weather)
-    if traffic is not None:
-        scenario = scenario.with_traffic(traffic)
-    if transient:
-        scenario = scenario.with_transient(**transient)
-    if driver is not None:
-        scenario = scenario.with_driver(driver)
-        if driver == "real" and scenario.waypoints is not None:
-            terminal.note("--driver real: waypoints have no lanes to change to")
-    if ride is not None:
-        change: dict = {"ride": {"roughness": ride}}
-        scenario = scenario.with_fields(change, "--ride")
-    if imu_rate is not None:
-        change = {"imu": {"rate": imu_rate}}
-        scenario = scenario.with_fields(change, "--imu-rate")
-    if camera is not None:
-        fields = {"depth": True, "label": True, **camera}
-        scenario = scenario.with_fields(
-            {"cameras": {"camera": fields}}, "--camera"
-        )
+    scenario = _changed_scenario(
+        load_scenario(name_or_file),
+        lidar=lidar,
+        returns=returns,
+        weather=weather,
+        traffic=traffic,
+        transient=transient,
+        driver=driver,
+        ride=ride,
+        imu_rate=imu_rate,
+        camera=camera,
+    )
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
     goes_on = contextlib.nullcontext if overwrite else terminal.resumable
@@ -140,6 +129,46 @@ def run_drive(
         "kitti",
     )
     return run
+
+
+def _changed_scenario(
+    scenario: Scenario,
+    *,
+    lidar: str | None,
+    returns: Literal["ideal", "calibrated"] | None,
+    weather: WeatherConfig | None,
+    traffic: int | None,
+    transient: Mapping[str, float | str] | None,
+    driver: Literal["real", "none"] | None,
+    ride: str | None,
+    imu_rate: int | None,
+    camera: Mapping[str, int] | None,
+) -> Scenario:
+    """Returns a scenario with the changes that `run_drive` takes."""
+    if lidar is not None:
+        scenario = scenario.with_lidar_preset(lidar)
+    if returns is not None:
+        scenario = scenario.with_returns(returns, weather)
+    if traffic is not None:
+        scenario = scenario.with_traffic(traffic)
+    if transient:
+        scenario = scenario.with_transient(**transient)
+    if driver is not None:
+        scenario = scenario.with_driver(driver)
+        if driver == "real" and scenario.waypoints is not None:
+            terminal.note("--driver real: waypoints have no lanes to change to")
+    if ride is not None:
+        change: dict = {"ride": {"roughness": ride}}
+        scenario = scenario.with_fields(change, "--ride")
+    if imu_rate is not None:
+        change = {"imu": {"rate": imu_rate}}
+        scenario = scenario.with_fields(change, "--imu-rate")
+    if camera is not None:
+        fields = {"depth": True, "label": True, **camera}
+        scenario = scenario.with_fields(
+            {"cameras": {"camera": fields}}, "--camera"
+        )
+    return scenario
 
 
 def run_script(name: str, description: str) -> None:

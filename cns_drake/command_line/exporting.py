@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import commands, shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import next_command, note, show
@@ -79,8 +79,8 @@ def export(
     *,
     layout: Annotated[Format, typer.Option("--format", metavar="FORMAT")],
     output: Annotated[Path, typer.Option()],
-    lidar: commands.LidarName = None,
-    columns: commands.Columns = None,
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
     absent_in: Annotated[str | None, typer.Option(metavar="STAGE")] = None,
     sequence: Annotated[
         int | None, typer.Option(metavar="NN", min=0, max=999)
@@ -103,9 +103,9 @@ def export(
         float | None, typer.Option(min=0.0, metavar="S")
     ] = None,
     traffic: options.Traffic = None,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
-    json: commands.Json = False,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
+    json: shared_options.Json = False,
 ) -> None:
     """Export drives to the formats of other programs.
 
@@ -506,7 +506,7 @@ def _write_sessions(
     """Writes maps of two drives without labels."""
     with uninterrupted():
         from cns_drake.base.complete_files import draft_folder
-        from cns_drake.base.drives.drive import check_same_world
+        from cns_drake.base.drives.same_world import check_same_world
         from evaluation.map_update.labels import SIDES
         from evaluation.map_update.sessions import write_session
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.listing import natural_key
@@ -42,7 +42,7 @@ def import_city(
         float | None, typer.Option(min=0.01, max=0.9, metavar="PART")
     ] = None,
     plain: Annotated[bool, typer.Option("--plain")] = False,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Make a map from data of a real city.
 

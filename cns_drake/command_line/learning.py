@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from cns_drake.base.commands import Jobs, Scheduler
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.shared_options import Jobs, Scheduler
 
 
 class Part(str, Enum):

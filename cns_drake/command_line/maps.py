@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import commands, shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, show
@@ -47,7 +47,7 @@ def list_drives(
     folders: Annotated[
         list[Path] | None, typer.Argument(metavar="FOLDER")
     ] = None,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """List drives with their lengths, times and sizes.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
@@ -124,7 +124,7 @@ def simulate(
     recording: options.Recording = None,
     graphviz: options.Graphviz = None,
     overwrite: options.Overwrite = False,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Simulate a drive and record it.
 
@@ -220,7 +220,7 @@ def scan(
     model_path: Annotated[
         list[Path] | None, typer.Option(metavar="DIR")
     ] = None,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Take one LiDAR scan of an SDF world.
 
@@ -281,8 +281,8 @@ def generate(
     *,
     output: options.Output,
     frames: options.Frames = None,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
     overwrite: options.Overwrite = False,
     vary: options.Vary = None,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cns_drake.base import commands
+from cns_drake.base import commands, shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, resumable
@@ -26,16 +26,16 @@ def reproduce(
     maps: options.Maps = None,
     *,
     output: options.Results,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
     pages: Annotated[bool | None, typer.Option("--pages/--no-pages")] = None,
     recordings: Annotated[
         bool, typer.Option("--recordings/--no-recordings")
     ] = True,
-    method: commands.Methods = None,
-    parameter: commands.MethodSettings = None,
-    costs: commands.Costs = True,
-    tables: commands.Tables = False,
+    method: shared_options.Methods = None,
+    parameter: shared_options.MethodSettings = None,
+    costs: shared_options.Costs = True,
+    tables: shared_options.Tables = False,
     protocol: RetrievalProtocol,
 ) -> None:
     """Simulate the drives of maps and report on them.
@@ -86,14 +86,14 @@ def study(
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     quick: Annotated[bool, typer.Option("--quick")] = False,
     task: list[str] | None = None,
-    method: commands.Methods = None,
+    method: shared_options.Methods = None,
     override: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="METHOD.NAME=VALUE|FIELD=VALUE"),
     ] = None,
     allow_code: Annotated[bool, typer.Option("--allow-code")] = False,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
     list_all: Annotated[bool, typer.Option("--list")] = False,
     show: Annotated[bool, typer.Option("--show")] = False,
 ) -> None:

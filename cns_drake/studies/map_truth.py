@@ -33,8 +33,9 @@ import jinja2
 import numpy as np
 
 from cns_drake.base.complete_files import draft_folder, write_text
-from cns_drake.base.drives.drive import Drive, check_same_world
+from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
+from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError, validated
 from cns_drake.base.files import user_errors
 from cns_drake.base.process import num_cores

@@ -24,7 +24,8 @@ from typing import Literal
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive, check_same_map
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.same_world import check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import yaw_pose
 from evaluation.alignment.anchor_search import find_candidates, find_guesses

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from cns_drake.base import commands, program, terminal
+from cns_drake.base import commands, program, shared_options, terminal
 from cns_drake.base.commands import Command
 from cns_drake.base.program import example
 from cns_drake.base.progress_display import show_progress
@@ -82,11 +82,11 @@ def tcr(
     target: Annotated[Path, typer.Argument(metavar="B")],
     control: Annotated[Path | None, typer.Option(metavar="C")] = None,
     align: options.Align = "auto",
-    lidar: commands.LidarName = None,
-    columns: commands.Columns = None,
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
     paths: Annotated[bool, typer.Option("--paths")] = False,
     output: options.Tables = None,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Measure how much changed between two drives or maps.
 
@@ -180,11 +180,11 @@ def pr(
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
     method: options.MethodName,
     mode: Literal["all", "filtered"] = "all",
-    parameter: commands.MethodSettings = None,
+    parameter: shared_options.MethodSettings = None,
     sensor_height: options.SensorHeight = 1.6,
     align: options.Align = "auto",
-    lidar: commands.LidarName = None,
-    columns: commands.Columns = None,
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
     across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
     truth: Annotated[
         str, typer.Option(metavar="radius|overlap:PART")
@@ -201,7 +201,7 @@ def pr(
     seed: int = 0,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     scores: Annotated[Path | None, typer.Option(metavar="FILE.csv")] = None,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -375,14 +375,14 @@ app.command(
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],
-    method: commands.Methods = None,
-    parameter: commands.MethodSettings = None,
-    lidar: commands.LidarName = None,
-    columns: commands.Columns = None,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
-    costs: commands.Costs = True,
-    tables: commands.Tables = False,
+    method: shared_options.Methods = None,
+    parameter: shared_options.MethodSettings = None,
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
+    costs: shared_options.Costs = True,
+    tables: shared_options.Tables = False,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -432,7 +432,7 @@ def compare(
     ] = None,
     verified: Annotated[bool, typer.Option("--verified")] = False,
     rankings: Annotated[bool, typer.Option("--rankings")] = False,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Rank the methods in tables of results.
 

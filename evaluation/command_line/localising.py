@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import commands, terminal
+from cns_drake.base import commands, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.trajectories import measure_estimate
 
@@ -35,7 +35,7 @@ def localise(
     start: float = 0.5,
     start_turn: float = 2.0,
     seed: int = 0,
-    parameter: commands.MethodSettings = None,
+    parameter: shared_options.MethodSettings = None,
     query_spacing: float | None = None,
     track: Annotated[bool, typer.Option("--track")] = False,
     odometry_drift: Annotated[
@@ -45,11 +45,11 @@ def localise(
     frame: options.Frame = "lidar",
     time_offset: Annotated[float, typer.Option(metavar="S")] = 0.0,
     align: options.Align = "auto",
-    lidar: commands.LidarName = None,
-    columns: commands.Columns = None,
-    jobs: commands.Jobs = None,
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
+    jobs: shared_options.Jobs = None,
     output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
-    json: commands.Json = False,
+    json: shared_options.Json = False,
 ) -> None:
     """Localise scans in a map.
 

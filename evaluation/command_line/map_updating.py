@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import terminal
-from cns_drake.base.commands import Json
+from cns_drake.base.shared_options import Json
 from evaluation.command_line import options
 
 

@@ -5,16 +5,16 @@ from typing import Annotated
 
 import typer
 
-from cns_drake.base import commands, terminal
+from cns_drake.base import shared_options, terminal
 
 
 def real(
     folder: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(metavar="DIR")],
-    method: commands.Methods = None,
-    parameter: commands.MethodSettings = None,
-    jobs: commands.Jobs = None,
-    scheduler: commands.Scheduler = None,
+    method: shared_options.Methods = None,
+    parameter: shared_options.MethodSettings = None,
+    jobs: shared_options.Jobs = None,
+    scheduler: shared_options.Scheduler = None,
     simulated: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
     queries: Annotated[int | None, typer.Option(min=1, metavar="N")] = None,
 ) -> None:

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.drives.drive import (
-    Drive,
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.same_world import (
     DriveNames,
     Placed,
     check_same_world,

@@ -10,7 +10,8 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.drives.drive import Drive, check_same_world
+from cns_drake.base.drives.drive import Drive
+from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
 from evaluation.drives.sampling import corners, travelled

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
-from cns_drake.base.drives.drive import check_same_world
+from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.jobs.running import Job
 from evaluation.recognition.describing import Role
 from evaluation.recognition.place_outcome import PlaceOutcome

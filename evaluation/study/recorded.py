@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from cns_drake.base.drives.drive import check_same_world
+from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job

@@ -25,7 +25,7 @@ import time
 import traceback
 from types import ModuleType
 
-from cns_drake.base import errors, interrupts
+from cns_drake.base import errors, interrupts, system_libraries
 from cns_drake.base.errors import InputError
 from cns_drake.base.file_locks import exclusive, remove_lock
 from cns_drake.base.jobs.fingerprint import code_digest
@@ -242,7 +242,7 @@ def _run_job(job: bytes, reporter: Reporter) -> tuple[str, str]:
         return "fault", str(error)
     except Exception as error:
         if isinstance(error, ImportError):
-            lacking = errors.missing_library(error)
+            lacking = system_libraries.missing_library(error)
             if lacking:
                 return "fault", lacking
         reporter.note(traceback.format_exc())
