@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from cns_drake.city.generation.generate import structure_table
+from cns_drake.city.generation.rendering import structure_table
 from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.structures import Structure

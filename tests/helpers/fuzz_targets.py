@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.city_structures import make_city
-from cns_drake.city.generation.generate import meshes_of
+from cns_drake.city.generation.rendering import meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_drive

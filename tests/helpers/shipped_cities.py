@@ -16,7 +16,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
-from cns_drake.city.generation import generate
+from cns_drake.city.generation import rendering
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.structures import Structure
@@ -104,8 +104,8 @@ _grown: list[_Kept] = []
 def _draw(name: str) -> Drawn:
     whole = make_city(world_of(name))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generate, "GrowingCity", _Kept)
-        texts = generate.render_city(world_of(name), whole)
+        patch.setattr(rendering, "GrowingCity", _Kept)
+        texts = rendering.render_city(world_of(name), whole)
     growing = _grown.pop()
     return Drawn(whole, growing.structures, growing.standing, texts)
 
@@ -125,7 +125,7 @@ def drawn(name: str) -> Drawn:
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(world_of(name).glob("*.yaml"))
     }
-    inputs["code"] = code_digest(generate.__name__)
+    inputs["code"] = code_digest(rendering.__name__)
     folder = Path(os.environ["CNS_DRAKE_TEST_CITIES"])
     file = folder / f"{name}_{fingerprint(inputs)}.pickle"
     for other in folder.glob(f"{name}_*.pickle"):

@@ -12,9 +12,9 @@ from cns_drake.city.facades import (
     free_stretches,
     outlines,
     solids,
-    walls,
     wing_roofs,
 )
+from cns_drake.city.facades.reliefs import Band, Patch
 
 # Free strip around the walls, for eaves [m].
 _MARGIN_M = 0.5
@@ -91,7 +91,7 @@ def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
             _add_doors(p, wing, openings, edge)
     low = wing.wall_top + 0.5
     attic = wing_roofs.attic_window(1.0, low, low + 1.3, _RECESS_M)
-    openings.enclose((_RECESS_M,), (walls.Band(0.0, 0.3, -0.06),), attic=attic)
+    openings.enclose((_RECESS_M,), (Band(0.0, 0.3, -0.06),), attic=attic)
     for edge in range(4):
         _add_battens(p, wing, boxes, openings, edge)
 
@@ -124,7 +124,7 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     x = wall.length / 2
     openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
     if p.deck > 0 and edge == 0:
-        gap = walls.Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
+        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
         openings.replace_by_bay(edge, x, width + 0.4, lambda a, b: [gap])
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05

@@ -19,7 +19,7 @@ from cns_drake.city.facades import (
     solids,
     tiers,
 )
-from cns_drake.city.facades.assembly import FRONT_LEFT, FRONT_RIGHT
+from cns_drake.city.facades.site import FRONT_LEFT, FRONT_RIGHT
 from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")

@@ -13,7 +13,7 @@ from cns_drake.city.facades import (
     outlines,
     tiers,
 )
-from cns_drake.city.facades.assembly import FRONT_LEFT, FRONT_RIGHT
+from cns_drake.city.facades.site import FRONT_LEFT, FRONT_RIGHT
 from cns_drake.city.geometry.mesh import Mesh
 
 

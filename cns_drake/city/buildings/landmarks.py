@@ -27,7 +27,7 @@ from pydantic import BaseModel
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.dice import Rgb
-from cns_drake.city.facades.assembly import Building
+from cns_drake.city.facades.building import Building
 from cns_drake.city.geometry import (
     Finish,
     Mesh,

@@ -11,8 +11,8 @@ from cns_drake.city.facades import (
     outlines,
     roofs,
     solids,
-    walls,
 )
+from cns_drake.city.facades.reliefs import Band
 
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.2
@@ -103,7 +103,7 @@ def _add_hall(p: SportsHall, hall: Wing, halls: list[Wing]) -> None:
         ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9
     )
     openings.replace_by_bay(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    openings.enclose((_RECESS_M,), (walls.Band(0.0, 0.5, -0.08),))
+    openings.enclose((_RECESS_M,), (Band(0.0, 0.5, -0.08),))
     _add_frames(p, hall, halls)
 
 
@@ -142,7 +142,7 @@ def _add_annex(p: SportsHall, halls: list[Wing], y0: float) -> None:
     wide = min(7.0, 0.35 * annex.width)
     glazing = bays.window(wide - 0.6, 0.05, h - 0.8, _RECESS_M, mullions=3)
     openings.replace_by_bay(0, middle, wide, glazing)
-    openings.enclose((_RECESS_M,), (walls.Band(0.0, 0.3, -0.05),))
+    openings.enclose((_RECESS_M,), (Band(0.0, 0.3, -0.05),))
     z = h - 0.65
     half = wide / 2 + 1.0
     lid = (middle - half, middle + half, -0.02, 1.5, z, z + 0.25)

@@ -12,8 +12,9 @@ from cns_drake.city.facades import (
     piers,
     porches,
     solids,
-    walls,
 )
+from cns_drake.city.facades.reliefs import Band
+from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 
@@ -50,7 +51,7 @@ class WaterfrontHall(Building):
         facade = _walls(self)
         pieces = [
             solids.foundation(plan),
-            walls.facade_mesh(plan, facade),
+            facade_mesh(plan, facade),
             piers.wall_piers(
                 plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
                 self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
@@ -58,11 +59,11 @@ class WaterfrontHall(Building):
             *_dock(self, x0, x1, y0, front),
         ]  # fmt: skip
         self.add("walls", *pieces)
-        self.add_glass("glass", walls.glass_mesh(plan, facade))
+        self.add_glass("glass", glass_mesh(plan, facade))
         self.add("roof", _roof(self, plan), finish=self.colours["roof"])
 
 
-def _walls(p: WaterfrontHall) -> walls.Facade:
+def _walls(p: WaterfrontHall) -> Facade:
     """Returns walls with tall windows between piers, and doors among them."""
     head = p.eaves - 1.0
     window = bays.window(
@@ -76,10 +77,10 @@ def _walls(p: WaterfrontHall) -> walls.Facade:
     layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
     layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
     bands = (
-        walls.Band(0.0, 0.6, -0.1),
-        walls.Band(p.eaves - 0.5, p.eaves, -0.3),
+        Band(0.0, 0.6, -0.1),
+        Band(p.eaves - 0.5, p.eaves, -0.3),
     )
-    return walls.Facade(p.eaves, bands, layout, (p.window_depth,))
+    return Facade(p.eaves, bands, layout, (p.window_depth,))
 
 
 def _dock(
@@ -100,7 +101,7 @@ def _dock(
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
     faces += [(0, 1, 2, 3), (7, 6, 5, 4)]
-    pieces.append(Mesh(vertices, tuple(faces)).turned())
+    pieces.append(Mesh(vertices, tuple(faces)).inside_out())
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
         pieces.append(solids.box(*post, high - 0.1, eaves - 0.2))

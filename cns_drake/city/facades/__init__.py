@@ -1,18 +1,17 @@
 """Parts of facades: walls, windows, doors, balconies and roofs."""
 
-from cns_drake.city.facades.assembly import Assembly, Building, Site
+from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.balconies import add_railing
+from cns_drake.city.facades.building import Building
+from cns_drake.city.facades.reliefs import Band, Patch, Relief, lifted
 from cns_drake.city.facades.roof_equipment import add_chimney, equip_roof
+from cns_drake.city.facades.site import Site
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.facades.walls import (
-    Band,
     Facade,
     Layout,
-    Patch,
-    Relief,
     facade_mesh,
     glass_mesh,
-    lifted,
     single_wall,
 )
 from cns_drake.city.facades.wing_walls import Openings

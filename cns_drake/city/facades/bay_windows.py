@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from cns_drake.city.facades import bays, outlines, solids, walls
+from cns_drake.city.facades import bays, outlines, solids
 from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.reliefs import Band, Relief
 from cns_drake.city.facades.wall_frames import WallFrame
+from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 
 # Depth of the windows in bay windows [m].
 _RECESS = 0.1
@@ -53,8 +55,8 @@ def add_bay_window(
     height = round(z1 - z0, 3)
     step = height / storeys
 
-    def layout(edge: int, length: float) -> list[walls.Relief]:
-        relief: list[walls.Relief] = []
+    def layout(edge: int, length: float) -> list[Relief]:
+        relief: list[Relief] = []
         for k in range(storeys if edge not in flush and length >= 0.7 else 0):
             z = k * step
             pane = bays.window(
@@ -64,14 +66,14 @@ def add_bay_window(
             relief += pane(0.0, length)
         return relief
 
-    bands = (walls.Band(height - 0.2, height, -0.08),)
-    facade = walls.Facade(height, bands, layout, (_RECESS,), flush)
+    bands = (Band(height - 0.2, height, -0.08),)
+    facade = Facade(height, bands, layout, (_RECESS,), flush)
     if z0 == 0.0:
         under = solids.foundation(points)
     else:
         under = solids.flat(points, z0, up=False)
-    out.add_to("walls", walls.facade_mesh(points, facade, z0), under)
-    out.add_to("glass", walls.glass_mesh(points, facade, z0))
+    out.add_to("walls", facade_mesh(points, facade, z0), under)
+    out.add_to("glass", glass_mesh(points, facade, z0))
     reaches = [-0.12 * (k not in flush) for k in range(len(points))]
     outer = outlines.inset(points, reaches)
     tip = (outer[0] + outer[-1]) / 2

@@ -7,7 +7,8 @@ walls of a storey. All heights are above the storey's floor [m].
 
 from collections.abc import Callable, Sequence
 
-from cns_drake.city.facades.walls import Arch, Layout, Patch, Relief
+from cns_drake.city.facades.reliefs import Arch, Patch, Relief
+from cns_drake.city.facades.walls import Layout
 
 Bay = Callable[[float, float], list[Relief]]
 # Start and end of a stretch of a wall [m].

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cns_drake.city.facades import walls
+from cns_drake.city.facades.reliefs import Relief
 from cns_drake.city.geometry.mesh import Mesh
 
 
 def casings(
-    reliefs: Sequence[walls.Relief],
+    reliefs: Sequence[Relief],
     glass: Sequence[float],
     style: str,
     reach: float = 0.05,
@@ -42,7 +42,7 @@ def casings(
     return pieces
 
 
-def _ring(r: walls.Relief, width: float, reach: float) -> Mesh:
+def _ring(r: Relief, width: float, reach: float) -> Mesh:
     """Returns boards around an opening, mitred at its corners."""
     w = width
     outer = [(r.x0 - w, r.z0 - w), (r.x0 - w, r.z1 + w),

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.facades import bays, solids
-from cns_drake.city.facades.assembly import Building
+from cns_drake.city.facades.building import Building
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
@@ -59,7 +59,7 @@ def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     faces: list[tuple[int, ...]]
     faces = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
     faces += [(3, 2, 0), (2, 1, 0), (4, 5, 6), (4, 6, 7)]
-    return Mesh(np.array(vertices), tuple(faces)).turned()
+    return Mesh(np.array(vertices), tuple(faces)).inside_out()
 
 
 def awnings(

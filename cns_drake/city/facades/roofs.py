@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.facades import bays, outlines, solids
-from cns_drake.city.facades.walls import Patch
+from cns_drake.city.facades.reliefs import Patch
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]

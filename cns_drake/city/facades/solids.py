@@ -207,7 +207,7 @@ class Faces:
 
 def swapped(mesh: Mesh) -> Mesh:
     """Returns a mirrored mesh: x and y are exchanged, and it faces outwards."""
-    return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).turned()
+    return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).inside_out()
 
 
 def roof_pan(

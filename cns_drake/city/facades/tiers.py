@@ -15,8 +15,9 @@ from cns_drake.city.facades import (
 )
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.bays import Bay
+from cns_drake.city.facades.reliefs import Band
 from cns_drake.city.facades.roof_equipment import equip_roof
-from cns_drake.city.facades.walls import Band, Facade, facade_mesh, glass_mesh
+from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # A pane reaches this far into the reveals in front of it, so that no ray passes

@@ -36,7 +36,7 @@ class WallFrame:
         x, y, height = mesh.vertices.T
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
         vertices = np.column_stack([xy, height + z])
-        return Mesh(vertices, mesh.faces).turned()
+        return Mesh(vertices, mesh.faces).inside_out()
 
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
         """Returns a box in the building's frame, given in wall coordinates.

@@ -7,14 +7,15 @@ import math
 
 import numpy as np
 
-from cns_drake.city.facades import bays, roofs, solids, walls
+from cns_drake.city.facades import bays, roofs, solids
 from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.reliefs import Patch
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.facades.wings import SEAT, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
 # Returns the windows of a gable between two places along its wall.
-Attic = Callable[[float, float], list[walls.Patch]]
+Attic = Callable[[float, float], list[Patch]]
 # Thickness of a dormer's roof [m].
 _DORMER_THICKNESS = 0.14
 # Depth of a dormer's window behind its front [m].
@@ -73,7 +74,7 @@ def add_roof(
     for edge in wing.gables:
         wall = wing.wall(edge)
         under = _seen_from(wing, edge, line)
-        holes: list[walls.Patch] = []
+        holes: list[Patch] = []
         if attic is not None and is_free[edge]:
             holes = [
                 hole
@@ -105,7 +106,7 @@ def _seen_from(
     return [(end - u, z - thickness) for u, z in reversed(line)]
 
 
-def _fits_under(hole: walls.Patch, under: list[bays.Span]) -> bool:
+def _fits_under(hole: Patch, under: list[bays.Span]) -> bool:
     return all(
         hole.z1 < roofs.line_height(under, x) - 0.15 for x in (hole.x0, hole.x1)
     )
@@ -126,11 +127,11 @@ def attic_window(
         count: number of windows.
     """
 
-    def holes(a: float, b: float) -> list[walls.Patch]:
+    def holes(a: float, b: float) -> list[Patch]:
         step = 1.5 * width
         first = (a + b) / 2 - step * (count - 1) / 2
         return [
-            walls.Patch(
+            Patch(
                 round(x - width / 2, 2), round(x + width / 2, 2), z0, z1, depth
             )
             for x in (first + k * step for k in range(count))
@@ -195,7 +196,7 @@ def add_dormer(
         lid = roofs.shell(fall, a - 0.15, b + 0.15, _DORMER_THICKNESS)
     under = [(u, z - _DORMER_THICKNESS) for u, z in line]
     low = foot - _SUNK
-    hole = walls.Patch(
+    hole = Patch(
         round(a + 0.15, 2), round(b - 0.15, 2),
         round(foot + 0.25, 2), round(eaves - 0.15, 2), _DORMER_RECESS,
     )  # fmt: skip

@@ -12,9 +12,10 @@ from cns_drake.city.facades import (
     boards,
     canopies,
     solids,
-    walls,
 )
 from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.reliefs import Arch, Band, Patch, Relief
+from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 from cns_drake.city.facades.wing_roofs import Attic, add_roof
 from cns_drake.city.facades.wings import Wing, free_stretches
 from cns_drake.city.geometry.mesh import Mesh
@@ -41,7 +42,7 @@ class Openings:
         self._out = out
         self._wing = wing
         self._others = others
-        self._reliefs: dict[int, list[walls.Relief]] = {k: [] for k in range(4)}
+        self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
 
     def add_bays(
         self,
@@ -94,7 +95,7 @@ class Openings:
             if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
         ] + new
 
-    def add_reliefs(self, edge: int, reliefs: Iterable[walls.Relief]) -> None:
+    def add_reliefs(self, edge: int, reliefs: Iterable[Relief]) -> None:
         """Adds reliefs, given in wall coordinates, to the wall `edge`."""
         self._reliefs[edge] += reliefs
 
@@ -116,23 +117,23 @@ class Openings:
             if r.x1 < x0 or r.x0 > x1 or r.z1 < z0 or r.z0 > z1
         ]
 
-    def layout(self, edge: int, length: float) -> list[walls.Relief]:
+    def layout(self, edge: int, length: float) -> list[Relief]:
         """Returns all reliefs of a wall, as the layout of a `Facade`.
 
         Bands of the facade are interrupted at arches. `edge` is the number of
         the wall. `length`, the length of the wall [m], is not used.
         """
-        found: list[walls.Relief] = []
+        found: list[Relief] = []
         for relief in self._reliefs[edge]:
-            if isinstance(relief, walls.Arch):
-                found.append(walls.Patch(*relief[:3], relief.z1, 0.0))
+            if isinstance(relief, Arch):
+                found.append(Patch(*relief[:3], relief.z1, 0.0))
             found.append(relief)
         return found
 
     def add_walls(
         self,
         glass: Sequence[float],
-        bands: Sequence[walls.Band] = (),
+        bands: Sequence[Band] = (),
         material: str = "walls",
     ) -> None:
         """Adds the walls, their foundation and their panes to the building.
@@ -145,21 +146,19 @@ class Openings:
         """
         wing = self._wing
         bands, glass = tuple(bands), tuple(glass)
-        facade = walls.Facade(
-            wing.wall_top, bands, self.layout, glass, wing.blind
-        )
+        facade = Facade(wing.wall_top, bands, self.layout, glass, wing.blind)
         outline = wing.outline
         self._out.add_to(
             material,
             solids.foundation(outline),
-            walls.facade_mesh(outline, facade),
+            facade_mesh(outline, facade),
         )
-        self._out.add_to("glass", walls.glass_mesh(outline, facade))
+        self._out.add_to("glass", glass_mesh(outline, facade))
 
     def enclose(
         self,
         glass: Sequence[float],
-        bands: Sequence[walls.Band] = (),
+        bands: Sequence[Band] = (),
         material: str = "walls",
         attic: Attic | None = None,
     ) -> None:
@@ -232,13 +231,13 @@ class Openings:
         half = width / 2
         top = round(floor + height, 2)
 
-        def bay(x0: float, x1: float) -> list[walls.Relief]:
+        def bay(x0: float, x1: float) -> list[Relief]:
             a, b = round(x - half, 2), round(x + half, 2)
-            relief: list[walls.Relief] = [walls.Patch(a, b, floor, top, DOOR_M)]
+            relief: list[Relief] = [Patch(a, b, floor, top, DOOR_M)]
             if lights > 0:
                 for u0, u1 in ((a - lights, a - 0.08), (b + 0.08, b + lights)):
                     relief.append(
-                        walls.Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
+                        Patch(u0, u1, round(floor + 0.3, 2), top, GLASS_M)
                     )
             return relief
 
@@ -260,7 +259,7 @@ class Openings:
             height: height of the door [m].
         """
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-        hole: list[walls.Relief] = [walls.Patch(a, b, 0.0, height, DOOR_M)]
+        hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
         self.replace_by_bay(edge, x, width + 0.3, lambda x0, x1: hole)
         count = 4
         step = height / count
@@ -369,7 +368,7 @@ def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
 def _mirrored_bay(bay: bays.Bay) -> bays.Bay:
     """Returns a bay mirrored left to right."""
 
-    def mirrored(x0: float, x1: float) -> list[walls.Relief]:
+    def mirrored(x0: float, x1: float) -> list[Relief]:
         return [
             r._replace(x0=round(x0 + x1 - r.x1, 2), x1=round(x0 + x1 - r.x0, 2))
             for r in bay(x0, x1)

@@ -18,11 +18,12 @@ from cns_drake.city.geometry import (
 )
 from cns_drake.city.geometry.object_models import ROOT_DEPTH
 
-_LONGEST = 8
+# Greatest number of panels in one mesh; there are meshes of 1, 2, 4 and 8.
+_MOST_PANELS = 8
 
 
 @dataclass(frozen=True)
-class RunKind:
+class FenceKind:
     """A kind of fence, wall or hedge: one entry of `furniture/fences.yaml`.
 
     Attributes:
@@ -45,15 +46,15 @@ class RunKind:
 
 
 # Name of a kind, with which the names of its meshes begin -> the kind.
-RUN_KINDS = {
-    name: RunKind(**values)
+FENCE_KINDS = {
+    name: FenceKind(**values)
     for name, values in parse_yaml(
         Path(__file__).with_name("fences.yaml").read_bytes()
     ).items()
 }
 
 
-def run(
+def fence(
     name: str,
     rng: np.random.Generator,
     *,
@@ -63,7 +64,7 @@ def run(
     """Returns a fence, wall or hedge of equal panels, in a random colour.
 
     Args:
-        name: kind of fence, a key of `RUN_KINDS`.
+        name: kind of fence, a key of `FENCE_KINDS`.
         rng: random generator for the colour.
         length: length along x [m]; the panels are stretched to fit.
         height: height [m]; by default the usual height of this kind.
@@ -71,7 +72,7 @@ def run(
     Raises:
         ValueError: the length or the height is not positive.
     """
-    kind = RUN_KINDS[name]
+    kind = FENCE_KINDS[name]
     height = kind.height if height is None else height
     if not (length > 0 and height > 0):
         raise ValueError(
@@ -85,7 +86,7 @@ def run(
     parts: list[Part] = []
     done = 0
     while done < total:
-        count = _LONGEST
+        count = _MOST_PANELS
         while count > total - done:
             count //= 2
         shape = MeshShape(f"{name}_x{count}", (stretch, 1.0, tall))
@@ -109,6 +110,6 @@ def run(
 
 
 FENCES = {
-    name: Builder(kind.semantic_class, partial(run, name))
-    for name, kind in RUN_KINDS.items()
+    name: Builder(kind.semantic_class, partial(fence, name))
+    for name, kind in FENCE_KINDS.items()
 }

@@ -27,8 +27,10 @@ from cns_drake.city.ground.terrain import GroundShape, ground_structures
 from cns_drake.city.placement import sidewalks
 from cns_drake.city.placement.building_rows import place_buildings
 from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.junctions import furnish_junctions
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.placement.open_ground import furnish
+from cns_drake.city.placement.open_ground import furnish_district
+from cns_drake.city.placement.parking import park_along_streets
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads import surface_heights
 from cns_drake.roads.carriageway import Areas
@@ -117,8 +119,8 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         margins=Polygon(),
         reserved=Polygon(),
         structures=(*street_structures(network), marking_structure(network)),
-        furnish=lambda draft: sidewalks.furnish_junctions(draft, network),
-        park=lambda draft: sidewalks.park_along_streets(draft, network),
+        furnish=lambda draft: furnish_junctions(draft, network),
+        park=lambda draft: park_along_streets(draft, network),
     )
     return build_along(streets, plan, source)
 
@@ -174,7 +176,7 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     draft.ground = UpperSides(ground_triangles(surfaces))
     streets.furnish(draft)
     for district in districts:
-        furnish(draft, district)
+        furnish_district(draft, district)
     sidewalks.furnish_sidewalks(draft, districts, streets.junctions)
     streets.park(draft)
     sidewalks.plant_medians(draft)

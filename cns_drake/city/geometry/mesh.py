@@ -72,7 +72,7 @@ class Mesh:
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return self.with_vertices(self.vertices @ R.T + np.asarray(translation))
 
-    def turned(self) -> Mesh:
+    def inside_out(self) -> Mesh:
         """Returns the mesh with its faces reversed: inside and outside swap."""
         return Mesh(self.vertices, tuple(face[::-1] for face in self.faces))
 

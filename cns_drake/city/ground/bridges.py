@@ -75,9 +75,9 @@ def bridge_structures(
             piers = snap(deck.intersection(ring))
             pieces = {
                 "sides": wall_mesh(open_water, bottom, shape, along=beside),
-                "underside": surface_mesh(deck, bottom).turned(),
+                "underside": surface_mesh(deck, bottom).inside_out(),
                 "abutments": wall_mesh(deck, low, bottom, along=banks),
-                "piers": wall_mesh(piers, low, bottom).turned(),
+                "piers": wall_mesh(piers, low, bottom).inside_out(),
             }
             area = MultiPolygon([deck])
             bridge = Covering(name, "other-structure", area, _BRIDGE_RGB)

@@ -227,7 +227,7 @@ def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
     assembly.add(
         "new_roof",
         # The wall is seen from outside, not from within.
-        wall_mesh(outer, height - _BAND, top).turned(),
+        wall_mesh(outer, height - _BAND, top).inside_out(),
         surface_mesh(outer.difference(inner), top),
         wall_mesh(inner, height, top),
         surface_mesh(inner, height),

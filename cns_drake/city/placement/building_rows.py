@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.city.buildings import ARCHETYPES, sample
-from cns_drake.city.facades.assembly import Site
+from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
@@ -62,7 +62,7 @@ def place_buildings(draft: Draft, district: District) -> None:
             cannot be built in the planned size.
     """
     name = district.plan.name
-    draft.open_range()
+    draft.names.open_range()
     for index, plan in enumerate(district.plan.buildings):
         rng = draft.rng(name, "building", index)
         fault_at = f"{draft.source}: districts.{name}.buildings.{index}"
@@ -84,7 +84,7 @@ def _build(
     rng: Generator,
     fault_at: str,
 ) -> None:
-    name = draft.next_name(kind or house.archetype)
+    name = draft.names.next_name(kind or house.archetype)
     what = house.archetype, house.footprint, house.height
     with value_errors(fault_at):
         model = sample(*what, rng, name, house.blind_edges)

@@ -1,6 +1,5 @@
 """A city being built: the structures placed so far."""
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 import zlib
@@ -20,32 +19,14 @@ from cns_drake.city.geometry import (
     snap,
 )
 from cns_drake.city.ground.elevation import Ground, LevelGround
+from cns_drake.city.placement.naming import NameCounter, name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import CityPlan
-from cns_drake.city.plants.trees import SPECIES
 from cns_drake.roads.carriageway import Areas
-
-# Semantic class -> the everyday word for its objects, as the stem of their
-# names.
-_WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
-
-
-def name_stem(object_name: str) -> str:
-    """Returns the everyday word for an object, with which its name begins.
-
-    For example, the word for `lime_tree` is `tree`. `object_name` is a key of
-    `cns_drake.city.placement.objects.OBJECTS`.
-    """
-    if object_name in SPECIES:
-        return "tree"
-    return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
-
 
 # An object stands upright if the ground below it falls by at most this much;
 # half of the fall is how deep it stands in the ground on the upper side [m].
 _STEEPEST = 0.5
-# Ranges of numbers in names begin at multiples of this.
-_RANGE = 50
 
 
 class Draft:
@@ -54,7 +35,10 @@ class Draft:
     All areas and heights are in W [m].
 
     Attributes:
+        areas: carriageways, sidewalks and medians.
+        plan: plan of the city.
         structures: the structures placed so far.
+        names: names of the structures, with their numbers.
         streets: area of the streets, including sidewalks.
         frontage: area along whose outline buildings stand: the streets, and any
             margins beside them.
@@ -80,8 +64,8 @@ class Draft:
         self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
+        self.names = NameCounter()
         self.ground: UpperSides | None = None
-        self._counts: Counter[str] = Counter()
         self._walls = Occupancy()
         self._occupancy = Occupancy()
         self._lanes = Occupancy()
@@ -102,25 +86,10 @@ class Draft:
 
         `words` are the name of the task, on which the generator depends. The
         numbers in the names of the structures that the task places begin in a
-        new range, see `open_range`.
+        new range, see `NameCounter.open_range`.
         """
-        self.open_range()
+        self.names.open_range()
         return self.rng(*words)
-
-    def open_range(self) -> None:
-        """Makes the numbers in new names begin after the next multiple of 50.
-
-        Call this function before each task, such as placing a row of trees. If
-        a task places a few structures more or fewer, the names of structures in
-        later tasks, to which `stages.yaml` refers, stay the same.
-        """
-        for kind, count in self._counts.items():
-            self._counts[kind] = -(-count // _RANGE) * _RANGE
-
-    def next_name(self, kind: str) -> str:
-        """Returns a new name, e.g. `tower_017` for the kind `tower`."""
-        self._counts[kind] += 1
-        return f"{kind}_{self._counts[kind]:03d}"
 
     def is_free(
         self,
@@ -184,7 +153,7 @@ class Draft:
         """
         x, y = (round(float(value), 3) for value in xy)
         structure = Structure(
-            self.next_name(kind or name_stem(name)),
+            self.names.next_name(kind or name_stem(name)),
             OBJECTS[name].semantic_class,
             model,
             (x, y, 0.0),

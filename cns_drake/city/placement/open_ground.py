@@ -1,6 +1,5 @@
 """Places objects on a district's own ground: trees, hedges, cars, benches."""
 
-from collections.abc import Mapping
 import itertools
 import math
 
@@ -15,10 +14,10 @@ from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS, pick_key
+from cns_drake.city.placement.parking import park_in_bays
 from cns_drake.city.plan.city_plan import (
     LinePlan,
     ObjectPlan,
-    ParkingPlan,
     ScatterPlan,
 )
 
@@ -34,7 +33,7 @@ _LONGEST_RUN = 24.0
 _HIGHEST_STEP = 0.3
 
 
-def furnish(draft: Draft, district: District) -> None:
+def furnish_district(draft: Draft, district: District) -> None:
     """Places the objects, fences, parked cars and plants of a district.
 
     The plan describes them in the entries `objects`, `lines`, `parking` and
@@ -46,7 +45,7 @@ def furnish(draft: Draft, district: District) -> None:
             parameters are wrong.
     """
     plan = district.plan
-    draft.open_range()
+    draft.names.open_range()
     for index, one in enumerate(plan.objects):
         rng = draft.rng(plan.name, "object", index)
         _place_object(draft, plan.name, index, one, rng)
@@ -55,7 +54,7 @@ def furnish(draft: Draft, district: District) -> None:
         _place_line(draft, district, line, rng)
     for index, parking in enumerate(plan.parking):
         rng = draft.task(plan.name, "parking", index)
-        _place_cars(draft, plan.name, parking, rng)
+        park_in_bays(draft, plan.name, parking, rng)
     for index, scatter in enumerate(plan.scatter):
         rng = draft.task(plan.name, "scatter", index)
         _scatter(draft, district, scatter, rng)
@@ -120,47 +119,6 @@ def _place_run(
         draft.place(
             name, model, tuple(middle), yaw, (district,), kind=plan.kind
         )
-
-
-def _place_cars(
-    draft: Draft, district: str, plan: ParkingPlan, rng: Generator
-) -> None:
-    start, end = np.array(plan.start), np.array(plan.end)
-    length = float(np.hypot(*(end - start)))
-    along = (end - start) / length
-    inwards = np.array([-along[1], along[0]])
-    width, depth = plan.bay
-    for k in range(int(length / width)):
-        if rng.uniform() > plan.fill:
-            continue
-        at = start + along * (k + 0.5) * width + inwards * depth / 2
-        at = at + rng.uniform(-0.15, 0.15, 2)
-        # Most drivers park nose in.
-        nose = inwards if rng.uniform() < 0.7 else -inwards
-        yaw = math.atan2(nose[1], nose[0]) + float(rng.uniform(-0.04, 0.04))
-        place_car(draft, draft.plan.cars, tuple(at), yaw, rng, (district,))
-
-
-def place_car(
-    draft: Draft,
-    cars: Mapping[str, float],
-    xy: tuple[float, float],
-    yaw: float,
-    rng: Generator,
-    tags: tuple[str, ...],
-) -> None:
-    """Places a parked car of a random kind, if there is room.
-
-    Args:
-        draft: the city so far, to which the car is added.
-        cars: kind of car -> its weight in the random choice.
-        xy: position of the car's centre in W [m].
-        yaw: heading of the car [rad].
-        rng: random generator for the choice of the car.
-        tags: tags of the structure.
-    """
-    name = pick_key(cars, rng)
-    draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
 
 
 def _scatter(

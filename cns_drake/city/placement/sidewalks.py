@@ -1,4 +1,4 @@
-"""Places objects along the streets: lights, signs, lamps, trees, cars."""
+"""Places lamps, trees and furniture on sidewalks, and trees on medians."""
 
 from collections.abc import Sequence
 import math
@@ -13,77 +13,7 @@ from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
 from cns_drake.city.placement.objects import OBJECTS, pick_key
-from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import StreetPlan
-from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import Arm, Direction, Junction, Road
-
-# Distance of posts from the kerb [m].
-_FROM_KERB = 0.7
-# At a road with at most this many lanes, a stop sign replaces the traffic
-# lights.
-_SMALL_ROAD_LANES = 2
-# Traffic lights stand this far from the junction, beside the stop line [m].
-_LIGHT_DISTANCE = 4.8
-# Signs stand this far from the junction [m].
-_SIGN_DISTANCE = 9.0
-_SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
-
-
-def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
-    """Places traffic lights and signs where three or more roads meet."""
-    for junction in network.junctions.values():
-        # Other junctions, too, begin a new range of numbers for names.
-        rng = draft.task("junction", junction.name)
-        if len(junction.arms) < 3:
-            continue
-        for arm in junction.arms:
-            _furnish_arm(draft, network.roads[arm.road], junction, arm, rng)
-
-
-def _furnish_arm(
-    draft: Draft, road: Road, junction: Junction, arm: Arm, rng: Generator
-) -> None:
-    carriageway = draft.areas.carriageway
-    starts = arm.end == "start"
-    incoming: Direction = "backward" if starts else "forward"
-    outgoing: Direction = "forward" if starts else "backward"
-
-    def place(name: str, distance: float, side: int, turn: float) -> None:
-        """Places an object beside the arm, `distance` from the junction [m].
-
-        `side` is 1 for the left side of the arm, looking away from the
-        junction, and -1 for the right side. `turn` is the heading of the object
-        relative to the direction away from the junction [rad].
-        """
-        outwards = 1 if starts else -1
-        edge = road.first_station if starts else road.last_station
-        # Behind the parking bays, if there are any.
-        for width in (road.half_width, road.half_width + road.parking):
-            x, y, _, heading = road.evaluate(
-                [edge + outwards * distance],
-                side * outwards * (width + _FROM_KERB),
-            )[0]
-            if not shapely.contains_xy(carriageway, x, y):
-                break
-        yaw = (heading if starts else heading + math.pi) + turn
-        tags = ("junction", junction.name)
-        model = OBJECTS[name].build(rng)
-        draft.place(name, model, (x, y), yaw, tags, clearance=0.1)
-
-    if road.lanes[incoming]:
-        if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:
-            # It faces the traffic that comes along the arm.
-            place("sign_stop", 1.0, 1, 0.0)
-        else:
-            place("traffic_light", _LIGHT_DISTANCE, 1, -math.pi / 2)
-            place("traffic_light_post", 1.5, -1, -math.pi / 2)
-        place("sign_street_name", 0.2, 1, 0.0)
-    if road.lanes[outgoing] and road.length > 2 * _SIGN_DISTANCE:
-        sign = _SIGNS[int(rng.integers(len(_SIGNS)))]
-        # It faces the traffic that comes out of the junction.
-        place(sign, _SIGN_DISTANCE, -1, math.pi)
-
 
 # Distance from the kerb to an object's nearest point [m].
 _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
@@ -93,11 +23,6 @@ _JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
 # Least distance between two objects, and from objects to lanes [m].
 _CLEARANCE = 0.4
 _CROWN_PART = 0.85
-# Length of a parking bay along the street, least and greatest [m].
-_BAY_LENGTH = (5.6, 7.0)
-_BAY_FILL = 0.72
-# Cars are parked a little closer to the kerb than to the lane [m].
-_TO_KERB = 0.08
 
 
 def furnish_sidewalks(
@@ -115,26 +40,6 @@ def furnish_sidewalks(
         for index, line in enumerate(lines):
             rng = draft.task("sidewalk", task, index)
             _furnish_sidewalk(draft, districts, task, line, keep_off, rng)
-
-
-def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
-    """Parks cars in the parking bays along the roads, where there is room."""
-    for (name, side), bay in network.areas.parking_bays.items():
-        road = network.roads[name]
-        rng = draft.task("bays", name, side)
-        sign = 1 if side == "left" else -1
-        offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
-        s = road.first_station + float(rng.uniform(2.0, 5.0))
-        while s < road.last_station:
-            x, y, _, heading = road.evaluate([s], offset)[0]
-            if shapely.contains_xy(bay, x, y) and rng.uniform() < _BAY_FILL:
-                # On the left of the direction `forward`, traffic runs the other
-                # way.
-                yaw = heading + (math.pi if side == "left" else 0.0)
-                yaw += float(rng.uniform(-0.03, 0.03))
-                tags = ("bay", name)
-                place_car(draft, draft.plan.cars, (x, y), yaw, rng, tags)
-            s += float(rng.uniform(*_BAY_LENGTH))
 
 
 def plant_medians(draft: Draft) -> None:

@@ -9,7 +9,8 @@ import shapely
 from shapely.geometry import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Model, UpperSides, turned_up
 from cns_drake.imports.dressing import facade_pieces, facade_plan, roof_pieces
 from cns_drake.imports.dressing.bare_buildings import (

@@ -18,7 +18,7 @@ from cns_drake.city.geometry import (
     placed,
     turned_up,
 )
-from cns_drake.city.placement.draft import name_stem
+from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.drives.steerable_drives import WaypointRoute

@@ -12,7 +12,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Structure, placed
-from cns_drake.city.placement.draft import name_stem
+from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import tree
 from cns_drake.imports.faults import ImportFaults

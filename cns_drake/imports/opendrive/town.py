@@ -19,7 +19,7 @@ from cns_drake.city.generation.starter import starter_plan, starter_stages
 from cns_drake.city.geometry import Structure
 from cns_drake.city.ground.streets import street_surfaces
 from cns_drake.city.placement.draft import Draft
-from cns_drake.city.placement.open_ground import place_car
+from cns_drake.city.placement.parking import place_car
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.drives import search, steerable_drives

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from cns_drake.city.generation.generate import render_stages
+from cns_drake.city.generation.rendering import render_stages
 from cns_drake.city.geometry import Structure, polygons_of
 from cns_drake.imports import map_files, overview
 from cns_drake.imports.opendrive.town import Town

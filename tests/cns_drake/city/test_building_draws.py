@@ -6,7 +6,7 @@ from shapely.geometry import box
 
 from cns_drake.city.buildings import ARCHETYPES, BUILDERS
 from cns_drake.city.dice import Dice
-from cns_drake.city.facades.assembly import Site
+from cns_drake.city.facades.site import Site
 
 SEEDS = range(40)
 

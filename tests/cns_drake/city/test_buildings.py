@@ -18,9 +18,14 @@ from shapely.geometry import MultiPoint, Polygon, box
 
 from cns_drake.city.buildings import ARCHETYPES, BUILDERS, sample
 from cns_drake.city.buildings.landmarks import LANDMARKS, Landmark
-from cns_drake.city.facades.assembly import GROUND_OVERHANG_M, HEAD_ROOM_M, Site
+from cns_drake.city.facades.site import Site
 from cns_drake.city.facades.solids import FOUNDATION_M
 from cns_drake.city.geometry.models import MeshShape
+
+# Plinths and pilasters may stand this far outside the footprint [m].
+GROUND_OVERHANG_M = 0.35
+# Above this height, the archetype's own overhang applies [m].
+HEAD_ROOM_M = 2.3
 
 # By day, generated cities are compared with the committed ones byte by byte.
 pytestmark = [pytest.mark.slow, pytest.mark.night]

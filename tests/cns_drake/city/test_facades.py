@@ -8,14 +8,8 @@ import pytest
 from shapely.geometry import Polygon
 
 from cns_drake.city.facades import outlines, solids
-from cns_drake.city.facades.walls import (
-    Arch,
-    Band,
-    Facade,
-    Patch,
-    facade_mesh,
-    glass_mesh,
-)
+from cns_drake.city.facades.reliefs import Arch, Band, Patch
+from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import merge_meshes
 
 # A rectangle turned by 30 degrees and moved off the origin.

@@ -2,7 +2,7 @@ from helpers.mesh_checks import first_hit, is_closed, solids, surface_points
 import numpy as np
 import pytest
 
-from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.furniture.fences import FENCE_KINDS
 from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.placement.objects import OBJECTS
@@ -18,7 +18,7 @@ def points(model):
 
 
 @pytest.mark.parametrize("length", LENGTHS)
-@pytest.mark.parametrize("name", RUN_KINDS)
+@pytest.mark.parametrize("name", FENCE_KINDS)
 def test_length_is_as_asked(name, length):
     model = OBJECTS[name].build(np.random.default_rng(0), length=length)
     x = points(model)[:, 0]
@@ -27,7 +27,7 @@ def test_length_is_as_asked(name, length):
 
 
 @pytest.mark.parametrize("length", LENGTHS)
-@pytest.mark.parametrize("name", RUN_KINDS)
+@pytest.mark.parametrize("name", FENCE_KINDS)
 def test_leaves_the_next_run_its_room(name, length):
     # Runs in a row are 6 cm apart; outlines are 2 cm too large.
     model = OBJECTS[name].build(np.random.default_rng(0), length=length)
@@ -36,9 +36,9 @@ def test_leaves_the_next_run_its_room(name, length):
     assert x1 < length / 2 + 0.03
 
 
-@pytest.mark.parametrize("name", RUN_KINDS)
+@pytest.mark.parametrize("name", FENCE_KINDS)
 def test_height_is_as_asked(name):
-    kind = RUN_KINDS[name]
+    kind = FENCE_KINDS[name]
     for height in (0.8 * kind.height, 1.4 * kind.height):
         model = OBJECTS[name].build(
             np.random.default_rng(0), length=9.0, height=height
@@ -50,9 +50,9 @@ def test_height_is_as_asked(name):
 
 
 @pytest.mark.parametrize("length", LENGTHS)
-@pytest.mark.parametrize("name", RUN_KINDS)
+@pytest.mark.parametrize("name", FENCE_KINDS)
 def test_panels_join_without_a_gap(name, length):
-    kind = RUN_KINDS[name]
+    kind = FENCE_KINDS[name]
     model = OBJECTS[name].build(np.random.default_rng(0), length=length)
     runs = [p for p in model.parts if isinstance(p.shape, MeshShape)]
     end = -length / 2
@@ -64,7 +64,7 @@ def test_panels_join_without_a_gap(name, length):
     assert len(model.parts) <= 5 + length / (8 * kind.panel)
 
 
-@pytest.mark.parametrize("name", RUN_KINDS)
+@pytest.mark.parametrize("name", FENCE_KINDS)
 def test_panels_are_made_of_closed_solids(name):
     for count in (1, 2, 4, 8):
         mesh = object_mesh(f"{name}_x{count}")
@@ -82,7 +82,7 @@ def share_hit(name):
     """The share of level rays across a fence that hit it."""
     mesh = object_mesh(f"{name}_x4")
     rng = np.random.default_rng(2)
-    x = rng.uniform(0.3, 4 * RUN_KINDS[name].panel - 0.3, 600)
+    x = rng.uniform(0.3, 4 * FENCE_KINDS[name].panel - 0.3, 600)
     z = rng.uniform(0.3, 0.7, 600)
     origins = np.column_stack([x, np.full(600, 5.0), z])
     d = np.tile((0.0, -1.0, 0.0), (600, 1))

@@ -4,8 +4,9 @@ from shapely.geometry import box
 
 from cns_drake.city.buildings import house_heights
 from cns_drake.city.facades import bays, outlines, wing_roofs
-from cns_drake.city.facades.assembly import Assembly, Site
-from cns_drake.city.facades.walls import Arch, Patch
+from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.reliefs import Arch, Patch
+from cns_drake.city.facades.site import Site
 from cns_drake.city.facades.wing_roofs import add_roof
 from cns_drake.city.facades.wing_walls import Openings
 from cns_drake.city.facades.wings import Roof, Wing, free_stretches

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint
 
-from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.furniture.fences import FENCE_KINDS
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.models import MeshShape, part_mesh
 from cns_drake.city.geometry.object_meshes import OBJECT_MESHES, object_mesh
@@ -47,7 +47,9 @@ def test_same_generator_same_bytes(name):
 
 @pytest.mark.slow
 def test_every_mesh_is_used():
-    used = {f"{name}_x{count}" for name in RUN_KINDS for count in (1, 2, 4, 8)}
+    used = {
+        f"{name}_x{count}" for name in FENCE_KINDS for count in (1, 2, 4, 8)
+    }
     for name in OBJECTS:
         for seed in range(24):
             used |= set(build(name, seed).meshes)

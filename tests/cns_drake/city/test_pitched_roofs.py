@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cns_drake.city.facades import outlines, roofs
-from cns_drake.city.facades.walls import Patch
+from cns_drake.city.facades.reliefs import Patch
 
 LINES = {
     "gable": roofs.gable_line(2.0, 10.0, 5.0, 8.0, ridge=0.3),

@@ -13,7 +13,8 @@ from shapely.geometry import LineString, Polygon
 from typer.testing import CliRunner
 import yaml
 
-from cns_drake.city.facades.assembly import Assembly, Site
+from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides

@@ -1,0 +1,60 @@
+"""The base class of the buildings of all archetypes."""
+
+from __future__ import annotations
+
+import abc
+
+import numpy as np
+
+from cns_drake.city.facades.archetype import Archetype
+from cns_drake.city.facades.assembly import Assembly
+from cns_drake.city.facades.site import Site
+from cns_drake.city.geometry import Finish
+
+
+class Building(Assembly, abc.ABC):
+    """The base class of buildings; each archetype has a subclass.
+
+    The constructor calls `draw`, which samples the sizes and the style of the
+    building, and then samples its colours. From these attributes, `build` makes
+    the parts of the building. Only roof equipment and chimneys may rise above
+    the building's `height` [m].
+    """
+
+    def __init__(
+        self,
+        kind: Archetype,
+        site: Site,
+        height: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """Samples sizes and style, and then the colours of the building."""
+        super().__init__(site, rng)
+        self.kind = kind
+        self.height = height
+        self.draw()
+        self.colours: dict[str, Finish] = {}
+        for part, finishes in kind.colours.items():
+            if isinstance(finishes, str):
+                self.colours[part] = self.colours[finishes]
+            else:
+                several = len(finishes) > 1
+                drawn = self.pick(finishes) if several else finishes[0]
+                self.colours[part] = drawn
+        if self.walls is None and self.colours:
+            self.walls = next(iter(self.colours.values()))
+        self.glass = self.colours.setdefault("glass", self.glass)
+        self.paint(**{part: self.colours[part] for part in kind.materials})
+
+    @abc.abstractmethod
+    def draw(self) -> None:
+        """Sets the attributes that differ between buildings of one archetype.
+
+        Lengths are in metres. Do not change the order in which random numbers
+        are sampled, because this order determines the numbers that a building
+        gets.
+        """
+
+    @abc.abstractmethod
+    def build(self) -> None:
+        """Adds all parts of the building; to be called once."""

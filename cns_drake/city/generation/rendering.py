@@ -1,0 +1,188 @@
+"""Renders the stages, meshes and table of structures of a city as texts."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from cns_drake.base.csv_files import csv_text
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import doing
+from cns_drake.city.generation.city_structures import City
+from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
+from cns_drake.city.generation.world_sdf import world_sdf
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.models import MeshShape
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.growth.stage_structures import GrowingCity
+from cns_drake.city.plan.stages import Stages, load_stages
+from cns_drake.scene.labels import MAX_INSTANCE
+from cns_drake.scene.map_folder import (
+    MESH_FOLDER,
+    STAGES_NAME,
+    STRUCTURES_NAME,
+    stage_name,
+)
+from cns_drake.scene.material_cells import write_materials
+from cns_drake.scene.semantics import CLASS_IDS
+
+
+def structure_table(
+    structures: Iterable[Structure], versions: Iterable[Structure] = ()
+) -> str:
+    """Returns the text of `structures.csv`, with a row for each structure.
+
+    The columns are instance id (from 1), name, class, label (number of the
+    class), position in W [m], yaw [rad], tags, and the materials of the parts
+    (see `cns_drake.scene.material_cells`). If the name of a structure does not
+    state its kind, the table has a last column `kind`.
+
+    Args:
+        structures: the structures.
+        versions: the structures as they are in all stages. A structure can have
+            parts in one stage that it lacks in another.
+    """
+    structures = list(structures)
+    names = [
+        "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags",
+        "material",
+    ]  # fmt: skip
+    with_kinds = any(one.kind_cell for one in structures)
+    if with_kinds:
+        names.append("kind")
+    materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
+    for one in versions:
+        materials[one.name] |= one.materials
+    rows = (
+        [
+            instance,
+            one.name,
+            one.semantic_class,
+            CLASS_IDS[one.semantic_class],
+            *(f"{value:.3f}" for value in one.xyz),
+            f"{one.yaw:.5f}",
+            " ".join(one.tags),
+            write_materials(
+                one.semantic_class, materials[one.name] | one.materials
+            ),
+            *([one.kind_cell] if with_kinds else []),
+        ]
+        for instance, one in enumerate(structures, start=1)
+    )
+    return csv_text(names, rows)
+
+
+def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
+    """Returns all meshes of structures, as a mapping from name to mesh.
+
+    Raises:
+        ValueError: if two different meshes have the same name, or a mesh has no
+            faces.
+    """
+    meshes: dict[str, Mesh] = {}
+    for structure in structures:
+        for name, mesh in structure.model.meshes.items():
+            if not mesh.faces:
+                raise ValueError(f"mesh {name} has no faces")
+            known = meshes.setdefault(name, mesh)
+            if known is not mesh and known.to_obj() != mesh.to_obj():
+                raise ValueError(f"two different meshes are called {name}")
+    return meshes
+
+
+def render_city(
+    world: Path,
+    city: City,
+    progress: Callable[[str], None] = lambda line: None,
+    stages_text: str | None = None,
+) -> dict[str, str]:
+    """Returns the text of every generated file of a city, by relative path.
+
+    Args:
+        world: folder of the map, at which relative paths start.
+        city: the city.
+        progress: is called with a line of text after each step.
+        stages_text: new content of `stages.yaml`; by default the file is read.
+
+    Raises:
+        InputError: if the stages cannot be used or the city has too many
+            structures.
+    """
+    doing(f"drawing {len(city.structures)} structures")
+    names = [structure.name for structure in city.structures]
+    source = world / STAGES_NAME
+    stages = load_stages(source, names, stages_text)
+    files, _ = render_stages(
+        world.resolve().name, city, stages, stages.stages, source, progress
+    )
+    progress(f"{sum(map(len, files.values())) / 1e6:.1f} MB")
+    return files
+
+
+def render_stages(
+    world: str,
+    city: City,
+    stages: Stages,
+    wanted: Iterable[str],
+    source: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    origin: str | None = None,
+) -> tuple[dict[str, str], dict[str, tuple[int, int]]]:
+    """Returns the files of some stages, and the sizes of these stages.
+
+    Args:
+        world: name of the map.
+        city: the whole city.
+        stages: the content of `stages.yaml`.
+        wanted: names of the stages to write.
+        source: file of the stages, named in error messages.
+        progress: called with a message of one line after each file.
+        origin: comment for readers of the files about the origin of the city.
+
+    Returns:
+        Relative path -> text of the file; and name of a stage -> numbers of
+        structures and of triangles in the stage.
+
+    Raises:
+        InputError: if a structure cannot be lower, or cannot be under
+            construction, as the stages demand, or the city has too many
+            structures.
+    """
+    growing = GrowingCity(city.structures, stages, city.cars)
+    if len(growing.structures) > MAX_INSTANCE:
+        raise InputError(
+            f"{source.parent / 'city.yaml'}: {len(growing.structures)} "
+            "structures are more than instance ids can count "
+            f"({MAX_INSTANCE})"
+        )
+    comment = origin or (
+        f"Generated by cns-drake city {world}; change roads.yaml, city.yaml "
+        "and stages.yaml instead."
+    )
+    files: dict[str, str] = {}
+    used: list[Structure] = []
+    stood = {}
+    for stage in wanted:
+        try:
+            standing = growing.at(stage)
+        except ValueError as error:
+            raise InputError(f"{source}: stages.{stage}.{error}") from error
+        used += standing
+        stood[stage] = standing
+        files[stage_name(stage)] = world_sdf(
+            f"{world}_{stage}", standing, comment=comment
+        )
+        progress(
+            f"stage {stage} lacks {len(stages.absent(stage))} structures, "
+            f"{len(stages.heights(stage))} are lower"
+        )
+    files[STRUCTURES_NAME] = structure_table(growing.structures, used)
+    meshes = meshes_of(used)
+    shapes = [part.shape for one in used for part in one.model.parts]
+    names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
+    triangles = {}
+    for name in sorted(names):
+        text = meshes[name].to_obj()
+        files[f"{MESH_FOLDER}/{name}.obj"] = text
+        triangles[name] = triangles_in(text)
+    sizes = {name: stage_size(one, triangles) for name, one in stood.items()}
+    return files, sizes

@@ -1,0 +1,45 @@
+"""Names of structures: a word for the kind, and a number."""
+
+from collections import Counter
+
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plants.trees import SPECIES
+
+# Semantic class -> the everyday word for its objects, as the stem of their
+# names.
+_WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
+# Ranges of numbers in names begin at multiples of this.
+_RANGE = 50
+
+
+def name_stem(object_name: str) -> str:
+    """Returns the everyday word for an object, with which its name begins.
+
+    For example, the word for `lime_tree` is `tree`. `object_name` is a key of
+    `cns_drake.city.placement.objects.OBJECTS`.
+    """
+    if object_name in SPECIES:
+        return "tree"
+    return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
+
+
+class NameCounter:
+    """Numbers the names of structures, separately for each kind."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+
+    def next_name(self, kind: str) -> str:
+        """Returns a new name, e.g. `tower_017` for the kind `tower`."""
+        self._counts[kind] += 1
+        return f"{kind}_{self._counts[kind]:03d}"
+
+    def open_range(self) -> None:
+        """Makes the numbers in new names begin after the next multiple of 50.
+
+        Call this function before each task, such as placing a row of trees. If
+        a task places a few structures more or fewer, the names of structures in
+        later tasks, to which `stages.yaml` refers, stay the same.
+        """
+        for kind, count in self._counts.items():
+            self._counts[kind] = -(-count // _RANGE) * _RANGE
