@@ -24,8 +24,8 @@ from cns_drake.city.facades import (
     outlines,
     porches,
     solids,
+    wing_openings,
     wing_roofs,
-    wing_walls,
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -56,19 +56,19 @@ def _window_rows(p: _FamilyHouse, wing: Wing, storeys: int) -> Openings:
     openings = Openings(p, wing, p.boxes)
     width = p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
-        openings.add_window_storeys(
-            edges, p.floor, STOREY_M, storeys, step, width
+        wing_openings.add_window_storeys(
+            openings, edges, p.floor, STOREY_M, storeys, step, width
         )
     return openings
 
 
 def _close_box(p: _FamilyHouse, wing: Wing, openings: Openings) -> None:
     """Adds the walls of a wing around its openings, and its roof."""
-    openings.add_casings((0,), p.casing)
+    wing_openings.add_casings(openings, (0,), p.casing)
     bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
     low = wing.wall_top + 0.4
-    attic = wing_roofs.attic_window(0.9, low, low + 1.0, wing_walls.GLASS_M)
-    openings.enclose((wing_walls.GLASS_M,), bands, attic=attic)
+    attic = wing_roofs.attic_window(0.9, low, low + 1.0, wing_openings.GLASS_M)
+    openings.enclose((wing_openings.GLASS_M,), bands, attic=attic)
 
 
 def _garage_wing(
@@ -91,9 +91,13 @@ def _add_garage(p: _FamilyHouse, garage: Wing) -> None:
     """Adds a garage whose door is in front."""
     openings = Openings(p, garage, p.boxes)
     length = garage.x1 - garage.x0
-    openings.add_garage_door(0, length / 2, min(length - 0.7, 4.9))
-    openings.add_bays((1, 3), 1.0, 3.4, [wing_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    openings.enclose((wing_walls.GLASS_M,))
+    wing_openings.add_garage_door(
+        openings, 0, length / 2, min(length - 0.7, 4.9)
+    )
+    openings.add_bays(
+        (1, 3), 1.0, 3.4, [wing_openings.sash(0.9, 0.0, 1.1, 2.0)]
+    )
+    openings.enclose((wing_openings.GLASS_M,))
 
 
 # Kept free around the walls, for eaves and chimneys [m].
@@ -211,7 +215,7 @@ def _add_main(p: DetachedHouse) -> None:
     openings = _window_rows(p, p.main, p.storeys)
     a, b = (x - p.main.x0 for x in p.free)
     door = a + 0.5 * (b - a)
-    openings.add_door(0, door, p.floor, lights=0.3)
+    wing_openings.add_door(openings, 0, door, p.floor, lights=0.3)
     _add_porch(p, (a, b))
     _close_box(p, p.main, openings)
     if p.roof in ("gable", "gambrel"):
@@ -340,7 +344,9 @@ class Bungalow(_FamilyHouse):
             openings = _window_rows(self, wing, 1)
             if self.parking == "garage" and k == 0:
                 width = min(wing.width - 0.8, 4.8)
-                openings.add_garage_door(0, wing.width / 2, width)
+                wing_openings.add_garage_door(
+                    openings, 0, wing.width / 2, width
+                )
             _close_box(self, wing, openings)
         if self.carport is not None:
             _add_carport(self, self.carport)
@@ -404,9 +410,9 @@ def _add_bungalow_main(p: Bungalow, main: Wing, openings: Openings) -> None:
     door = a + 0.3 * (b - a)
     if b - door > p.picture + 1.6:
         x = (door + 0.6 + b) / 2
-        pane = wing_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
+        pane = wing_openings.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.replace_by_bay(0, x, p.picture + 0.7, pane)
-    openings.add_door(0, door, p.floor, lights=0.3)
+    wing_openings.add_door(openings, 0, door, p.floor, lights=0.3)
     _close_box(p, main, openings)
     reach = min(1.6, main.y0 - p.site.bounds[1] - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
@@ -484,8 +490,8 @@ class SemiDetached(_FamilyHouse):
         _close_box(self, main, openings)
         for wing in bays:
             rows = Openings(self, wing, self.boxes)
-            rows.add_window_storeys(
-                (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+            wing_openings.add_window_storeys(
+                rows, (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
             )
             _close_box(self, wing, rows)
         for garage in garages:
@@ -533,7 +539,7 @@ def _add_entrances(
     eaves = p.floor + 2.35
     size = (reach, p.floor, eaves, eaves + 0.4)
     for x in (half - offset, half + offset):
-        openings.add_door(0, x, p.floor)
+        wing_openings.add_door(openings, 0, x, p.floor)
         if not p.doors_inside:
             porches.add_porch(p, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:

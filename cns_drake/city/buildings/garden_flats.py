@@ -16,8 +16,8 @@ from cns_drake.city.facades import (
     add_chimney,
     balconies,
     bays,
+    wing_openings,
     wing_roofs,
-    wing_walls,
 )
 from cns_drake.city.geometry import MeshShape, merge_meshes
 
@@ -88,7 +88,8 @@ def _add_house(
     storey = (wing.wall_top - 0.15 - _FLOOR_M) / storeys
     head = min(2.2, storey - 0.4)
     for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
-        openings.add_window_storeys(
+        wing_openings.add_window_storeys(
+            openings,
             edges,
             _FLOOR_M,
             storey,
@@ -99,17 +100,17 @@ def _add_house(
         )
     wall = wing.wall(0)
     middle = wall.length / 2
-    glass = wing_walls.GLASS_M
+    glass = wing_openings.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
         stair = bays.window(1.8, _FLOOR_M + 2.6, wing.wall_top - 0.7, glass)
         openings.replace_by_bay(0, middle, 2.6, stair)
-    openings.add_door(0, middle, _FLOOR_M, width=1.2, lights=0.4)
+    wing_openings.add_door(openings, 0, middle, _FLOOR_M, width=1.2, lights=0.4)
     area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
     p.add_to("trim", wall.box(*area, _FLOOR_M + 2.3, _FLOOR_M + 2.5))
     p.add_to("base", wall.standing(*area, _FLOOR_M, bottom=True))
     _add_verandas(p, wing, storeys, storey, number)
-    openings.add_casings((0,), p.casing)
+    wing_openings.add_casings(openings, (0,), p.casing)
     z = round(_FLOOR_M + storey, 2)
     bands = (Band(0.0, _FLOOR_M, -0.05), Band(z - 0.2, z, -0.05))
     low = wing.wall_top + 0.4

@@ -24,8 +24,8 @@ from cns_drake.city.facades import (
     outlines,
     porches,
     roofs,
+    wing_openings,
     wing_roofs,
-    wing_walls,
 )
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -103,7 +103,8 @@ def _add_unit(
     step = (wing.wall_top - 0.25 - p.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
     for edges, pitch in (((0, 2), p.window_pitch), (sides, 4.2)):
-        openings.add_window_storeys(
+        wing_openings.add_window_storeys(
+            openings,
             edges,
             p.floor,
             step,
@@ -114,7 +115,7 @@ def _add_unit(
         )
     door = _add_entrance(p, wing, openings, door_material)
     _add_bay(p, wing, openings, storeys, step, door)
-    openings.add_casings((0,), p.casing)
+    wing_openings.add_casings(openings, (0,), p.casing)
     bands = [Band(0.0, round(p.floor, 2), -0.05)]
     if storeys > 1:
         z = round(p.floor + step, 2)
@@ -122,7 +123,7 @@ def _add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    openings.add_walls((wing_walls.GLASS_M,), bands)
+    openings.add_walls((wing_openings.GLASS_M,), bands)
     _add_roof(p, wing)
     if p.chimney:
         _add_stack(p, wing, f"{part}chimney")
@@ -165,7 +166,9 @@ def _add_entrance(
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
-    openings.add_door(0, x, p.floor, height=2.25, material=material)
+    wing_openings.add_door(
+        openings, 0, x, p.floor, height=2.25, material=material
+    )
     count = max(1, round(p.floor / 0.17))
     run = min(0.29 * count, max(p.stoop - 0.5, 0.3 * p.stoop))
     landing = p.stoop - run
@@ -214,7 +217,7 @@ def _add_bay(
 def _add_roof(p: _HouseInARow, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or stepped gables."""
     low = wing.wall_top + 0.45
-    attic = wing_roofs.attic_window(0.8, low, low + 1.1, wing_walls.GLASS_M)
+    attic = wing_roofs.attic_window(0.8, low, low + 1.1, wing_openings.GLASS_M)
     wing_roofs.add_roof(p, wing, None if p.roof == "stepped" else attic)
     if p.roof == "stepped":
         for edge in (0, 2):
@@ -251,7 +254,7 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     for edge in (0, 2):
         wall = wing.wall(edge)
         for u in spots:
-            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wing_walls.GLASS_M)
+            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wing_openings.GLASS_M)
             frame = boards.casings([pane], (pane.depth,), "frame", 0.12)
             glass = boards.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
             out.add_to("trim", *(wall.place(piece) for piece in frame))
@@ -331,9 +334,9 @@ def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     roof = Roof("shed", True, 0.0, 0.2, 0.18)
     openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
     openings.add_bays(
-        (1, 2, 3), 0.9, 2.6, [wing_walls.sash(1.1, 0.1, 0.9, 2.1)]
+        (1, 2, 3), 0.9, 2.6, [wing_openings.sash(1.1, 0.1, 0.9, 2.1)]
     )
-    openings.enclose((wing_walls.GLASS_M,))
+    openings.enclose((wing_openings.GLASS_M,))
 
 
 # Materials of the doors in a terrace.
@@ -454,17 +457,17 @@ class ShopHouse(_HouseInARow):
         head = min(2.25, step - 0.4)
         width = self.window_width
         for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
-            openings.add_window_storeys(
-                edges, ground, step, upper, pitch, width, head=head
+            wing_openings.add_window_storeys(
+                openings, edges, ground, step, upper, pitch, width, head=head
             )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
-        openings.add_casings((0,), self.casing)
+        wing_openings.add_casings(openings, (0,), self.casing)
         bands = [Band(round(ground - 0.3, 2), ground, -self.course)]
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
             bands.append(Band(z, wing.wall_top, -0.25))
-        glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
+        glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
         openings.add_walls(glass, bands)
         _add_roof(self, wing)
         if self.roof == "flat":
@@ -480,13 +483,13 @@ def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
     length = wall.length
     left = p.door_left
     start, end = (door, length) if left else (0.0, length - door)
-    openings.add_shops(0, start, end, p.floor,
+    wing_openings.add_shops(openings, 0, start, end, p.floor,
         width=p.shop_width, awnings=p.awnings,
     )  # fmt: skip
     if door:
         x = 0.9 if left else length - 0.9
-        openings.add_door(0, x, 0.0, height=2.3)
-    back = [wing_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+        wing_openings.add_door(openings, 0, x, 0.0, height=2.3)
+    back = [wing_openings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.add_bays((2,), 0.5, 4.5, back, 0.8)
 
 

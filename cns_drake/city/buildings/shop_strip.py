@@ -10,7 +10,7 @@ from cns_drake.city.facades import (
     Wing,
     bays,
     equip_roof,
-    wing_walls,
+    wing_openings,
 )
 
 # Kept free in front for canopies [m].
@@ -82,16 +82,16 @@ def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
     storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
     width = p.uniform(1.1, 2.2, 2)
-    openings.add_window_storeys(
-        (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
+    wing_openings.add_window_storeys(
+        openings, (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
-    openings.add_shops(0, 0.2, wall.length - 0.2, p.ground,
+    wing_openings.add_shops(openings, 0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
-    back = [bays.gate(2.0, 2.2, 0.2), wing_walls.sash(1.0, 0.0, 1.6, 2.3)]
+    back = [bays.gate(2.0, 2.2, 0.2), wing_openings.sash(1.0, 0.0, 1.6, 2.3)]
     openings.add_bays((2,), 0.5, 3.6, back, 0.7)
-    glass = (wing_walls.GLASS_M, *wing_walls.SHOP_GLASS_M)
+    glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
     openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
         z = p.ground - 0.95

@@ -7,12 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.facades import (
-    bays,
-    outlines,
-    piers,
-    solids,
-)
+from cns_drake.city.facades import bays, outlines, piers, solids
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.bays import Bay
 from cns_drake.city.facades.reliefs import Band
