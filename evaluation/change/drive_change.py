@@ -27,9 +27,7 @@ from evaluation.change.tcr import (
     temporal_change,
 )
 from evaluation.drives import check_same_world
-from evaluation.maps.voxel_maps import (
-    VOXEL_SIZE,
-)
+from evaluation.maps.voxel_maps import VOXEL_SIZE
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport

@@ -30,9 +30,10 @@ from evaluation.localisation.localisation_map import (
     LocalisationMap,
     voxel_shift,
 )
-from evaluation.localisation.robust_icp import MAX_RANGE, align_robustly
+from evaluation.localisation.robust_icp import align_robustly
 from evaluation.localisation.settings import (
     KISS_MATCHER,
+    MAX_RANGE,
     METHODS,
     ROBUST_KINDS,
     SMALL_GICP_KINDS,

@@ -18,8 +18,8 @@ from evaluation.clouds.cloud_files import read_blocks
 from evaluation.clouds.notes import OnNote, no_note
 from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.drives.sampling import sample_frames, within_range
-from evaluation.localisation.robust_icp import MAX_RANGE
 from evaluation.localisation.settings import (
+    MAX_RANGE,
     Settings,
 )
 from evaluation.maps.voxel_maps import VoxelAccumulator

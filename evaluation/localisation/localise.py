@@ -29,12 +29,9 @@ from evaluation.localisation.localisation_map import (
     LocalisationMap,
 )
 from evaluation.localisation.results import COLUMNS, QUERY
-from evaluation.localisation.robust_icp import MAX_RANGE
-from evaluation.localisation.settings import Settings
+from evaluation.localisation.settings import MAX_RANGE, Settings
 from evaluation.maps.voxel_maps import downsample
-from evaluation.recognition.pose_errors import (
-    pose_error,
-)
+from evaluation.recognition.pose_errors import pose_error
 
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].

@@ -9,9 +9,7 @@ import numpy as np
 from cns_drake.base.csv_files import write_csv
 from cns_drake.base.json_text import json_values
 from evaluation.clouds.notes import OnNote
-from evaluation.localisation.localisation_map import (
-    FEWEST_POINTS,
-)
+from evaluation.localisation.localisation_map import FEWEST_POINTS
 from evaluation.recognition.auroc import auroc
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,

@@ -21,9 +21,8 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from evaluation.alignment.registration import Surface
+from evaluation.localisation.settings import MAX_RANGE
 
-# Greatest coordinate of a point that is used, along each axis of the LiDAR [m].
-MAX_RANGE = 100.0
 # Sum of two points' variances across the plane in small_gicp's covariances;
 # along the plane the variance is a thousand times as large.
 _ACROSS = 2e-3

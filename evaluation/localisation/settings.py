@@ -7,6 +7,9 @@ from typing import Any
 
 from cns_drake.base.errors import InputError
 
+# Greatest coordinate of a point that is used, along each axis of the LiDAR [m].
+MAX_RANGE = 100.0
+
 
 @dataclass(frozen=True)
 class Settings:

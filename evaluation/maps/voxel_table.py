@@ -1,7 +1,5 @@
 """A hash table of voxels, to which points are added by compiled loops."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cns_drake.base.compiled import compiled
@@ -21,8 +19,8 @@ SLOT = np.dtype(
     ],
     align=True,
 )
-# Greatest number of a voxel along an axis, positive or negative.
-FARTHEST = 2.0**31
+# Voxels have numbers below this along each axis, positive or negative.
+_NUMBER_LIMIT = 2.0**31
 
 
 @compiled
@@ -132,7 +130,9 @@ def add_points(
         z, fz, sz = _locate(p, X[2], voxel_size)
         # A comparison with NaN is false.
         if not (
-            abs(fx) < FARTHEST and abs(fy) < FARTHEST and abs(fz) < FARTHEST
+            abs(fx) < _NUMBER_LIMIT
+            and abs(fy) < _NUMBER_LIMIT
+            and abs(fz) < _NUMBER_LIMIT
         ):
             skipped += 1
             continue

@@ -18,9 +18,7 @@ from evaluation.paper.best_methods import (
 )
 from evaluation.paper.paper_values import paper
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.reference import (
-    Finding,
-)
+from evaluation.report.reference import Finding
 from evaluation.results.table_forms import title
 
 MET = "is met"

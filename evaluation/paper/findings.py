@@ -14,9 +14,7 @@ from evaluation.paper.best_methods import (
 )
 from evaluation.paper.paper_values import KAIST, paper
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.reference import (
-    Finding,
-)
+from evaluation.report.reference import Finding
 from evaluation.results.summaries import LEAST_POINTS
 from evaluation.results.table_forms import in_table_order, title
 

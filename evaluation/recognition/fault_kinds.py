@@ -8,6 +8,7 @@ import numpy as np
 from evaluation.recognition.faults import ELSEWHERE, FAULTS
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.visible_change import (
+    ENOUGH_OVERLAP,
     mean_visible_change,
     visible_change_added,
 )
@@ -22,8 +23,6 @@ FAULT_KINDS = (
 )
 # Names of reasons in words, where these differ from the values in tables.
 _WORDS = {"too_far": "near miss", "twin": "perceptual aliasing"}
-# Overlap below which two scans show different surroundings.
-_ENOUGH = 0.5
 # Share of the missing surroundings that must be hidden for the reason
 # `occluded`.
 _MOSTLY_HIDDEN = 0.5
@@ -121,7 +120,7 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
         - `unexplained`: no other kind applies.
     """
     reasons = result.columns["why"]
-    little = evidence.overlaps < _ENOUGH
+    little = evidence.overlaps < ENOUGH_OVERLAP
     unseen = 1.0 - evidence.overlaps
     conditions = [
         little & (evidence.hidden_shares >= _MOSTLY_HIDDEN * unseen),

@@ -14,16 +14,13 @@ from evaluation.recognition.bootstrap import (
 )
 from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.recognition.pose_errors import (
-    is_accepted,
-)
+from evaluation.recognition.pose_errors import is_accepted
 from evaluation.recognition.result_number import Number
 from evaluation.recognition.visible_change import (
+    ENOUGH_OVERLAP,
     mean_visible_change,
     visible_change_added,
 )
-
-_HALF = 0.5
 
 
 def place_numbers(
@@ -85,8 +82,7 @@ def place_numbers(
     overlaps = now.columns["overlap"]
     for name in FAULTS:
         yield now.number(name, float(np.sum(now.columns["why"] == name)))
-    # Their best match shows less than half of their scan.
-    is_little_shown = (overlaps < _HALF) & ~outcomes.is_right
+    is_little_shown = (overlaps < ENOUGH_OVERLAP) & ~outcomes.is_right
     yield now.number("hidden", float(is_little_shown.sum()))
     if not math.isnan(shown := mean_visible_change(overlaps)[0]):
         yield now.number("visible_change", shown)

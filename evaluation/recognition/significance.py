@@ -15,9 +15,7 @@ from evaluation.recognition.bootstrap import (
     resampled_metrics,
     weights_by_drive,
 )
-from evaluation.recognition.precision_recall import (
-    pr_curve,
-)
+from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
 

@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+# Overlap below which two scans show different surroundings.
+ENOUGH_OVERLAP = 0.5
+
 
 def visible_change_added(now: np.ndarray, before: np.ndarray | None) -> float:
     """Returns the mean visible change minus the mean in a baseline.
