@@ -1,6 +1,6 @@
 """Aligns two drives of one place, so that both are in one world frame.
 
-The method is that of LT-SLAM (Kim and Kim, "LT-mapper", ICRA 2022), made more
+The method follows LT-SLAM (Kim and Kim, "LT-mapper", ICRA 2022), but is more
 robust:
 
 1. Each drive is checked against itself where it passes a place again, and
@@ -94,8 +94,8 @@ class AlignmentReport:
             z [m].
         turn_deg: angle by which the middle frame was rotated about the vertical
             [deg].
-        bend: greatest difference between the move of a frame and that of the
-            middle frame [m].
+        bend: greatest distance of a moved frame from where it would be if it
+            had moved rigidly with the middle frame [m].
         straightened: for the fixed and the moved drive, the upper quartile of
             the errors where the drive passes a place again, before the
             correction [m]; 0 for a drive that was not corrected.

@@ -20,7 +20,7 @@ from evaluation.methods.scan_context import ScanContext
 
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
 # Here no score is required: in a changed city, right candidates score 0.3 to
-# 0.5, and wrong ones are outvoted.
+# 0.5, and wrong candidates are outvoted.
 _CANDIDATES = 5
 # Greatest distance error of a pair under a guess [m]. It allows for half a
 # lane, the spacing of keyframes and drift.

@@ -97,10 +97,7 @@ class Registration:
 
 
 def covariances(cloud: small_gicp.PointCloud) -> np.ndarray:
-    """Returns the covariance of each point of a cloud, (N, 3, 3).
-
-    The covariances are those that small_gicp has estimated for the cloud.
-    """
+    """Returns small_gicp's estimated covariances of points, (N, 3, 3)."""
     return np.reshape(cloud.covs(), (-1, 4, 4))[:, :3, :3]
 
 
@@ -155,7 +152,7 @@ def register(
 def _nearest_pairs(
     source: Surface, target: Surface, X_TS: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs a sample of the points with the nearest ones of the target.
+    """Pairs a sample of the points with the nearest points of the target.
 
     Returns:
         (M,) indices of the sampled points; (M,) bool, which of them have a

@@ -29,7 +29,7 @@ _FEWEST_POINTS = 500
 _GROUND_RANGE = 8.0
 _GROUND_KEYFRAMES = 20
 _LEVEL = 0.95
-# Number of surfaces kept in memory; neighbouring ones are used in sequence.
+# Number of surfaces kept in memory; neighbouring surfaces are used in sequence.
 _NUM_KEPT = 48
 
 

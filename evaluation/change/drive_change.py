@@ -64,7 +64,7 @@ class ChangeReport:
     alignment: AlignmentReport | None = None
 
     def beside(self, control: ChangeReport) -> ChangeReport:
-        """Returns the same change beside that of its control."""
+        """Returns the same report, together with the change of its control."""
         return replace(
             self,
             control=control.change,

@@ -153,7 +153,7 @@ class TemporalChange:
     ) -> TemporalChange:
         """Returns the change with only some of the points counted.
 
-        Hulls and nearest neighbours remain those of the whole maps.
+        Hulls and nearest neighbours still come from the whole maps.
 
         Args:
             source_kept: (N,) bool, points of the source to count.

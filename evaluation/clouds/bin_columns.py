@@ -32,8 +32,8 @@ _MOST_BINS = 16
 _FILLED = 16
 # Least information that the column must have about the value [nat].
 _LEAST_INFORMATION = 0.05
-# Least excess of the information over that of random columns, in standard
-# deviations.
+# Least excess of the information over the information of random columns, in
+# standard deviations.
 _SIGNIFICANCE = 5.0
 # If fewer columns have at least this share of the information, they are right.
 _ALMOST = 0.9

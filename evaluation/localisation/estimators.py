@@ -1,6 +1,6 @@
 """Estimators: functions that register a scan to a map from an initial pose.
 
-The shipped estimators are those of small_gicp (K. Koide, "small_gicp: Efficient
+The shipped estimators are from small_gicp (K. Koide, "small_gicp: Efficient
 and parallel algorithms for point cloud registration", JOSS 2024), two
 estimators with a robust kernel, and, as an optional extra, KISS-Matcher (H. Lim
 et al., ICRA 2025). An estimator of your own is a Python function.

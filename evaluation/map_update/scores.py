@@ -248,9 +248,9 @@ def _scores_of_updated_map(both: _Labelled) -> dict[str, float]:
 
 
 def _scores_by_distance(both: _Labelled) -> dict:
-    """Returns the scores by points for ranges of distance.
+    """Returns scores by points, for ranges of the distance of points.
 
-    The distance is that of a point from the path of the other drive.
+    The distance is measured from the path of the other drive.
     """
     pair = both.pair
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):

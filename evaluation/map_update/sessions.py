@@ -67,7 +67,7 @@ class Session:
 
     @property
     def moves(self) -> np.ndarray:
-        """(N,) bool, points on vehicles and people, also on parked ones."""
+        """(N,) bool, points on vehicles (also parked vehicles) and people."""
         return np.isin(self.classes, MOVING_CLASSES)
 
     def scan(self, index: int) -> np.ndarray:

@@ -44,7 +44,7 @@ class Updates:
         corner: (3,) numbers along x, y and z of the cube at the map's corner.
         gone: (G,) int64 numbers of the cubes whose points are gone, ascending.
         added: for each drive, the points (N, 3) in W that the drive added to
-            the map, without those that were removed later [m].
+            the map, without points that were removed later [m].
     """
 
     corner: np.ndarray

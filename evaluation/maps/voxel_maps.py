@@ -80,7 +80,7 @@ class VoxelMap:
         Args:
             voxel_size: length of a larger voxel's side [m].
             shift: distances along x, y and z from the origin of this map's grid
-                to that of the grid of larger voxels [m].
+                to the origin of the grid of larger voxels [m].
         """
         x, y, z = np.add(self.origin_W, shift).tolist()
         origin = x, y, z
@@ -269,8 +269,8 @@ def map_drive(
 ) -> VoxelMap:
     """Returns the voxel map of scans of a drive, in the world frame.
 
-    Each scan is read once. The default voxel size is that of the measure of
-    structural change (TCR). By default all frames are mapped.
+    Each scan is read once. The measure of structural change (TCR) has the
+    default voxel size. By default all frames are mapped.
 
     Raises:
         InputError: if a scan or a pose cannot be read.

@@ -112,7 +112,7 @@ def _turned_images(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yields 25 images (H, W, 3), about from -1 to 1, and their points.
 
-    The points (N, 2), column and row, are those of the grid in the image.
+    The points (N, 2) are the columns and rows of the grid in the turned image.
     """
     size = len(image)
     scaled = image[..., None] / np.float32(255.0) - np.array(_MEAN, np.float32)
@@ -321,7 +321,7 @@ def _convolved_over_turns(
 
 
 def _netvlad(weights: Weights, x: np.ndarray) -> np.ndarray:
-    """Returns the NetVLAD descriptor (8192,) of local ones (N, 128)."""
+    """Returns the NetVLAD descriptor (8192,) of local descriptors (N, 128)."""
     kernel = weights["netvlad.conv.weight"].reshape(_CLUSTERS, _CHANNELS)
     shares = softmax(x @ kernel.T, axis=1)
     sums = shares.sum(axis=0)[:, None] * weights["netvlad.centroids"]

@@ -178,7 +178,7 @@ def match(
     side_tolerance: float,
     min_similarity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the triangles of a table that are similar to those of a query.
+    """Returns the pairs of similar triangles of a query and of a table.
 
     Similar triangles have about the same side lengths, and about the same
     binary descriptors at their vertices.

@@ -106,8 +106,8 @@ def dpa_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
     """Returns indices of points that are far apart from each other.
 
-    This is farthest point sampling. The first index is 0. Each further index is
-    that of the point that is farthest from all points chosen so far.
+    This is farthest point sampling. The first point has index 0. Each further
+    point is the one that is farthest from all points chosen so far.
 
     Args:
         points: (N, 3) points [m].

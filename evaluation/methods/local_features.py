@@ -17,8 +17,8 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
         k: number of neighbours, from 1 to N.
 
     Returns:
-        (N, k) indices in no particular order. Which of several equally far
-        points are chosen is not defined, but is always the same for a cloud.
+        (N, k) indices in no particular order. Of several equally far points,
+        any may be chosen, but for equal clouds always the same points.
     """
     found, _ = small_gicp.KdTree(points).batch_knn_search(points, k)
     return found.astype(np.int64)

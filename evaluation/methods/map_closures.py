@@ -35,7 +35,7 @@ _ABOVE_ALL_PLACES = 1 << 17
 
 
 class MapClosuresConfig(MethodConfig):
-    """Settings of MapClosures; the defaults are those of the package.
+    """Settings of MapClosures; the defaults are from the package.
 
     The height of the sensor is not used: the package finds the ground.
 

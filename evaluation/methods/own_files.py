@@ -50,7 +50,7 @@ def load_method(path: Path) -> type[Method]:
     method = _registered_method(run_module(path), path)
     method._file = path
     for name in _WRITTEN_BY_USERS:
-        # Also those that another class of the file defines.
+        # Also functions that another class of the file defines.
         function = inspect.getattr_static(method, name)
         if function is inspect.getattr_static(Method, name):
             continue

@@ -45,7 +45,7 @@ _LEAST_DENSITY = 0.01
 
 
 class ProbeConfig(MethodConfig):
-    """Settings of PROBE. The defaults are those of Table I of its paper.
+    """Settings of PROBE. The defaults are from Table I of its paper.
 
     `sensor_height` has no effect: heights are measured in the LiDAR's frame.
 
@@ -74,8 +74,7 @@ class Probe:
         heights: (rings, sectors) greatest height in each cell, scaled to unit
             length over all cells; all NaN without a point within range.
         mu: (rings, sectors) float32 probability that a cell has a point. Scores
-            depend on the precision of `mu`, which is that of the authors'
-            program.
+            depend on this precision, which the authors' program has, too.
     """
 
     heights: np.ndarray

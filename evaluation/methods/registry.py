@@ -110,10 +110,10 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     method = _METHODS[name]
     for key in parameters:
         if key not in method.Config.model_fields:
-            known = list(method.Config.model_fields)
+            fields = list(method.Config.model_fields)
             raise InputError(
-                f"{name}: no parameter {key!r} (known: {', '.join(known)})"
-                f"{did_you_mean(key, known)}"
+                f"{name}: no parameter {key!r} (known: {', '.join(fields)})"
+                f"{did_you_mean(key, fields)}"
             )
     naming = (
         named_faults(method._file) if method._file else contextlib.nullcontext()

@@ -295,7 +295,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """Returns a query's spectrum (6 F, F), weighted for the correlation.
 
         The weights account for the frequencies that are not stored (about half
-        of all). The scale is that of the program, whose transforms are unitary.
+        of all). The program's scale is used; its transforms are unitary.
         """
         n = self.config.cells
         scale = _CORRELATION_SCALE * _NUM_FEATURES * n * n * math.sqrt(n)

@@ -10,8 +10,8 @@ The polar context of a place changes if the place is seen from the next lane.
 The augmented variant therefore stores each place of the database three times:
 as seen, and as if seen from 2 m to the left and to the right.
 
-The defaults are those of the authors' T-RO program. On the same downsampled
-scans, scores agree with those of this program to 1e-15 for all variants except
+The defaults are from the authors' T-RO program. On the same downsampled scans,
+scores agree with this program to 1e-15 for all variants except
 `augmented-cart`, which the program lacks. With `variant: polar`,
 `min_points: 1` and `far_points: dropped`, scores agree with the authors' C++
 program to 3e-4, the precision of its heights. Deliberate differences:

@@ -256,6 +256,6 @@ def _elevation_weights(counts: np.ndarray) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Returns vectors (..., n) of unit length; NaN for those of length 0."""
+    """Returns vectors (..., n) of unit length; NaN for vectors of length 0."""
     norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(norms > 0.0, norms, np.nan)

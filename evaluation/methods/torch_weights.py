@@ -23,7 +23,7 @@ MOST_BYTES = 200_000_000
 # How far dictionaries are searched for tensors.
 _DEEPEST = 6
 _BFLOAT16 = "bfloat16"
-# PyTorch's name of the type of a storage -> that of NumPy.
+# PyTorch's name of the type of a storage -> NumPy's name.
 _TYPES = {
     **{"FloatStorage": "f4", "DoubleStorage": "f8", "HalfStorage": "f2"},
     **{"LongStorage": "i8", "IntStorage": "i4", "ShortStorage": "i2"},

@@ -39,7 +39,7 @@ def aims(
 ) -> list[Finding]:
     """Returns, for each target of the shipped cities, whether it is met.
 
-    The targets compare results in the shipped cities with those of the paper.
+    The targets compare results in the shipped cities with the paper's results.
     The list is empty unless `results` contains all of the paper's pairs of
     drives.
 

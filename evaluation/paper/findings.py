@@ -118,7 +118,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 def paper_trend(method: str) -> Trend:
     """Returns the trend of a method's AUC over TCR_sym, as published.
 
-    The AUC values are those of the paper's Table II.
+    The AUC values are from the paper's Table II.
     """
     return trend(*zip(*paper().auc_over_change(method), strict=True))
 

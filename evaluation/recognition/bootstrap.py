@@ -116,7 +116,7 @@ def weights_by_drive(
 
     Yields:
         For each set, the number of different blocks in all sets of its drive,
-        and the counts (B, Q), like those of `resampled_weights`.
+        and the counts (B, Q), as `resampled_weights` returns them.
     """
     known: dict[int, np.ndarray] = {}
     for drive, some in zip(drives, blocks, strict=True):

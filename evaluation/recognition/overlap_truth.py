@@ -220,13 +220,13 @@ def read_overlaps(
 
     Args:
         path: path of the table.
-        query_frames: (Q,) frames of the queries. For each query in turn, the
-            table must have a row for each place.
+        query_frames: (Q,) frames of the queries. The table must have D rows for
+            the first query, then D rows for the second query, and so on.
         database_frames: (D,) frames of the places.
 
     Raises:
         InputError: the file cannot be read, a number is impossible, or the
-            rows are not those of all queries and places, in order.
+            table has other rows than one for each query and place, in order.
     """
     expected = [
         (int(frame), int(place))

@@ -49,8 +49,8 @@ class PoseMetrics:
         translation_median, translation_90: median and 90 % quantile of the
             translation error [m]; NaN without an accepted match that has a
             pose.
-        rotation_median_deg, rotation_90_deg: the same for the rotation error
-            [deg].
+        rotation_median_deg, rotation_90_deg: median and 90 % quantile of the
+            rotation error [deg]; NaN without an accepted match that has a pose.
         success: share of the queries with a match whose estimated pose is
             within 2 m and 5 deg of the ground truth. Queries of every score
             count. NaN if the method estimates no poses or no query has a match.

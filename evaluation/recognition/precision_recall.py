@@ -52,8 +52,8 @@ class PrCurve:
         """Area under the precision-recall curve, by the trapezoidal rule.
 
         The area is from recall 0 to the greatest recall of the curve. Left of
-        the first point, the precision is that of the first point. The area is 0
-        if no answer is ever accepted.
+        the first point of the curve, the precision is as at the first point.
+        The area is 0 if no answer is ever accepted.
         """
         return float(areas_under(self.precision[None], self.recall[None])[0])
 

@@ -35,8 +35,8 @@ _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 class RetrievalProtocol:
     """The protocol of place recognition: how two drives are compared.
 
-    The defaults are those of the paper, with queries as recorded, except for
-    `place`: which of the merged scans determines the pose of a place.
+    The defaults follow the paper, with queries as recorded. Only the default of
+    `place` differs: which of the merged scans determines the pose of a place.
 
     Attributes:
         radius: greatest distance between a query and its match, in three

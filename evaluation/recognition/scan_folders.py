@@ -34,8 +34,8 @@ def write_scores(
     Columns are `query`, `database` (file stems) and `score`, which is empty if
     the place is no candidate. Rows are sorted by the names of query and place.
     The file appears under its name only when it is complete. A method with its
-    own `score_in_drive` gets the queries as those of one drive, in the order of
-    their names.
+    own `score_in_drive` gets the queries as if one drive contained them, in the
+    order of their names.
 
     Args:
         method: method that describes and compares the scans.

@@ -139,7 +139,7 @@ class Search:
         shares = np.zeros((len(rows), len(self._groups)), np.int64)
         for k, some in enumerate(lists):
             of = np.repeat(np.arange(len(some)), [len(one) for one in some])
-            # Of equal entries, those of the first group come first.
+            # Of equal entries, the entry of the first group comes first.
             best = np.argsort(-np.concatenate(some), kind="stable")[:most]
             shares[k] = np.bincount(of[best], minlength=len(some))
         return shares

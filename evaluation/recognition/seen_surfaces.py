@@ -133,7 +133,7 @@ class SeenSurfaces:
         """Returns how far points lie in front of the seen surface, (N,) [m].
 
         Distances are negative for points behind the surface. Up to four returns
-        in directions near that of the point show where the surface is:
+        in directions near the point's direction show where the surface is:
 
         - Three or more returns with similar ranges: the distance is
           perpendicular to a plane through three of these returns.

@@ -8,8 +8,8 @@ import numpy as np
 
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
 
-# Greatest size of the descriptors that are in memory at a time, unless those of
-# a single drive are larger [bytes].
+# Greatest size of the descriptors that are in memory at a time, unless a single
+# drive has more [bytes].
 MOST_BYTES = 400_000_000
 
 

@@ -274,4 +274,6 @@ class ExtractionJobs(Jobs):
     def _is_extracted(self, protocol: RetrievalProtocol) -> bool:
         """Returns whether these jobs describe drives by a protocol."""
         assert self._protocol is not None
-        return protocol.described() == self._protocol.described()
+        return (
+            protocol.descriptor_options() == self._protocol.descriptor_options()
+        )

@@ -160,7 +160,9 @@ class TestScore:
         expected = np.array(sums) / (0.15 * 6 * n * n)
         query, place = (method.describe(scan) for scan in scans)
         database = method.build_database([place])
-        found = method._correlate(method._weigh(query), place.spectrum)
+        found = method._correlate(
+            method._weighted_spectrum(query), place.spectrum
+        )
         np.testing.assert_allclose(found, expected, rtol=1e-5)
         assert method.score(query, database) == pytest.approx(max(expected))
 
