@@ -16,15 +16,14 @@ from cns_drake.base.errors import printable
 from cns_drake.base.pace import Pace, TimeLeft
 from cns_drake.base.progress import JobsListener, Listener, heard_by, listener
 
-# What takes less time than this is not mentioned [s].
+# Work that takes less time than this is not shown [s].
 PATIENCE = 1.0
-# In a log, another activity gets a line at once, but not many lines a second
-# [s].
+# Least time between two lines of a log when the activity changes [s].
 _CHANGE_INTERVAL = 1.0
-# The same activity gets another line after at least this time [s].
+# Least time between two lines about the same activity, at the start [s].
 _INTERVAL = 1.8
-# This time grows to this share of the time since the start: a long run should
-# not fill its log.
+# This least time grows with the time since the start, of which it is this
+# share, so that a long run does not fill its log.
 _GROWTH = 1 / 30
 # How often it is checked whether something must be shown [s].
 _TICK = 0.25

@@ -41,13 +41,13 @@ class View(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _names_its_unit(cls, values: Any) -> Any:
+    def _refuse_former_name(cls, values: Any) -> Any:
         if isinstance(values, dict) and "fov_y" in values:
             raise ValueError("fov_y: this field is now fov_y_deg")
         return values
 
     @model_validator(mode="after")
-    def _looks_somewhere(self) -> View:
+    def _check_direction(self) -> View:
         if np.linalg.norm(np.subtract(self.target, self.position)) < 1e-3:
             raise ValueError("position and target are the same")
         return self

@@ -86,7 +86,7 @@ class MeshcatRecorder(LeafSystem):
         self._shown = shown or ShownStages()
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
-        self._way_to_scan = 0.0
+        self._distance_to_scan = 0.0
         self._num_frames = num_frames
         self.drive = DriveRecord(
             period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
@@ -167,9 +167,9 @@ class MeshcatRecorder(LeafSystem):
         X_WBs = self.drive.X_WBs
         if X_WBs:
             step = X_WB.translation() - X_WBs[-1].translation()
-            self._way_to_scan -= float(np.linalg.norm(step))
+            self._distance_to_scan -= float(np.linalg.norm(step))
         X_WBs.append(X_WB)
-        if self._way_to_scan <= 0.0:
+        if self._distance_to_scan <= 0.0:
             self._take_scan(context, X_WB)
         self._take_images(context, len(X_WBs) - 1)
         return EventStatus.Succeeded()
@@ -201,7 +201,7 @@ class MeshcatRecorder(LeafSystem):
         if len(self.drive.scans) > _MAX_SCANS:
             del self.drive.scans[1::2]
             self._scan_spacing *= 2.0
-        self._way_to_scan = self._scan_spacing
+        self._distance_to_scan = self._scan_spacing
 
 
 def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.world import load_world
 
+# Direction towards the sun.
 _SUN_W = np.array([0.45, -0.55, 0.70]) / np.linalg.norm([0.45, -0.55, 0.70])
 _SUN_RGB = np.array([1.00, 0.95, 0.86])
 _AMBIENT_RGB = np.array([0.52, 0.57, 0.66])
@@ -23,7 +24,9 @@ _HORIZON_RGB = np.array([0.83, 0.88, 0.93])
 _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 # Distance at which haze has removed two thirds of the contrast [m].
 HAZE_LENGTH = 1200.0
+# Range of rays [m].
 _FAR = 5000.0
+# Colour of geometry without one.
 _DEFAULT_RGB = (0.7, 0.7, 0.7)
 
 
@@ -131,6 +134,10 @@ def _shade(
     d_W: np.ndarray,
     haze_length: float,
 ) -> np.ndarray:
+    """Returns linear colours (N, 3) of rays from C in directions d_W (N, 3).
+
+    `rgb` contains the sRGB colour of each geometry of the scene.
+    """
     hits = scene.cast_rays(p_WC, d_W, _FAR, with_normals=True)
     height = np.clip(d_W[:, 2:], 0.0, 1.0) ** 0.6
     color = (1.0 - height) * _HORIZON_RGB + height * _ZENITH_RGB

@@ -1,4 +1,4 @@
-"""Handles Drake's messages about files that it cannot read."""
+"""Collects Drake's messages about files that it cannot read."""
 
 from collections.abc import Iterator
 import contextlib

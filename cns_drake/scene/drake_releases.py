@@ -1,4 +1,4 @@
-"""Handles all differences between the supported releases of Drake."""
+"""Code that depends on the release of Drake."""
 
 import re
 from typing import Any

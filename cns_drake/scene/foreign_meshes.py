@@ -82,7 +82,7 @@ class ForeignMeshes:
 
 
 def _serve() -> None:
-    """Reads requested meshes until there are no more requests."""
+    """Reads the requested meshes: the main function of the process."""
     # Messages of a parser must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
     messages = tempfile.TemporaryFile()  # noqa: SIM115  # For the whole process.

@@ -16,7 +16,8 @@ from cns_drake.scene.ply_check import check_ply
 
 # File name extensions of glTF.
 GLTF = (".gltf", ".glb")
-# Elements of COLLADA that would move or add shapes, and are not read.
+# Pattern of elements of COLLADA that would move or add shapes, and are not
+# read -> what a note calls them.
 _COLLADA = {
     re.compile(rb"<instance_controller\b"): "skins or morphs of COLLADA",
     re.compile(rb"<animation\b"): "animations of COLLADA",
@@ -60,12 +61,16 @@ def _check_collada(content: bytes) -> tuple[str, ...]:
 
 
 def _check_stl(content: bytes) -> tuple[()]:
-    """Checks that a text in STL is whole, and that all facets are triangles.
+    """Checks that a text file of STL is whole, and has only triangles.
 
-    A binary file has its length in its header, which its reader checks.
+    Open3D itself checks the length of a binary file, which the header states.
+
+    Returns:
+        No notes: all contents of STL are read.
 
     Raises:
-        ValueError: it ends within a solid, or a facet has more corners.
+        ValueError: the text ends within a solid, or a facet has more than three
+            corners.
     """
     if len(content) >= _STL_HEADER_BYTES:
         (number,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)

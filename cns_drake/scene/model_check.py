@@ -16,10 +16,12 @@ from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
 
+# File name extensions of models.
 _MODELS = (".sdf", ".world", ".urdf")
+# Longest name [characters].
 _LONGEST_NAME = 1000
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-# Shape -> elements that give its size, and how many numbers each has.
+# Shape -> element of its size -> how many numbers the element has.
 SIZES = {
     "box": {"size": 3},
     "sphere": {"radius": 1},
@@ -31,7 +33,9 @@ SIZES = {
     # A plane without a size is infinite.
     "plane": {"size": 2},
 }
+# Shapes of a geometry without a size to check.
 _OTHER_SHAPES = ("mesh", "heightmap", "polyline", "cone", "empty")
+# Parent and tag of other elements that consist of numbers.
 _OTHER_NUMBERS = {
     ("mesh", "scale"),
     ("axis", "initial_position"),
@@ -86,7 +90,12 @@ def read_model(path: Path) -> ElementTree.Element:
 
 
 class _ModelCheck:
-    """One pass over the elements of a file."""
+    """One pass over the elements of a file.
+
+    Attributes:
+        root: root element of the file.
+        included: files that the file includes.
+    """
 
     def __init__(self, path: Path):
         self.included: list[Path] = []

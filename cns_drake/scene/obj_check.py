@@ -34,12 +34,12 @@ def check_obj(path: Path) -> None:
     """Checks that the faces of an OBJ file only use vertices that exist.
 
     Raises:
-        ValueError: a vertex does not exist, or is not made of numbers; or there
-            are surfaces other than faces. The message names the line or the
-            statement.
+        ValueError: a face has a vertex that does not exist, a vertex is not
+            made of numbers, or there are surfaces other than faces. The message
+            names the line or the statement.
         InputError: the file cannot be read.
     """
-    # Drake accepts both as line ends.
+    # Drake accepts carriage returns as line ends, too.
     content = read_bytes(path, LARGEST_FILE).replace(b"\r", b"\n")
     if found := _OBJ_SURFACES.search(content):
         raise ValueError(
@@ -53,7 +53,7 @@ def check_obj(path: Path) -> None:
     faces = b" \n".join(_FACE.findall(content))
     if b"/" in faces:
         faces = _OTHER_INDICES.sub(b"", faces)
-    if _are_indices(faces, num_vertices):
+    if _are_valid_indices(faces, num_vertices):
         return
     for number, line in enumerate(content.split(b"\n"), start=1):
         face = _FACE.match(line)
@@ -63,15 +63,18 @@ def check_obj(path: Path) -> None:
                 f"line {number}: a face that goes on in the next line, which is"
                 " not read; write it in one line"
             )
-        if not _are_indices(indices, num_vertices):
+        if not _are_valid_indices(indices, num_vertices):
             raise ValueError(
                 f"line {number}: a face has a vertex that is not there (of"
                 f" {num_vertices})"
             )
 
 
-def _are_indices(text: bytes, num_vertices: int) -> bool:
-    """Returns whether a text has valid vertex indices, from 1 or from -1."""
+def _are_valid_indices(text: bytes, num_vertices: int) -> bool:
+    """Returns whether all numbers in a text are indices of vertices.
+
+    Indices count from 1, or from -1 backwards.
+    """
     if not text.strip():
         return True
     if _NO_INDICES.search(text):

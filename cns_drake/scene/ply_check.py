@@ -64,7 +64,7 @@ def check_ply(content: bytes) -> tuple[str, ...]:
     for name in repeated(one.name for one in elements):
         raise ValueError(f"has the element {name} of PLY twice; export it once")
     notes = _ignored_elements(elements)
-    # A row ends the header, by either line end.
+    # The line of the word end_header ends by \n or by \r\n.
     _, _, body = body.partition(b"\n")
     least = _CORNERS
     # Open3D refuses damaged files itself.
@@ -125,8 +125,8 @@ def _least_corners(
     """Returns the least number of corners of a face in a PLY file.
 
     Raises:
-        LookupError, OverflowError, ValueError, struct.error: the faces are
-            behind other lists, or the file is damaged.
+        LookupError, OverflowError, ValueError, struct.error: another list
+            precedes the faces in the file, or the file is damaged.
     """
     index = [one.name for one in elements].index("face")
     face, before = elements[index], elements[:index]

@@ -42,7 +42,7 @@ def thin_leaves(around: Surroundings, share: float) -> None:
             )
         if leafy:
             changed = True
-            around.editing.blame(plant.name, _CAUSE)
+            around.editing.record_cause(plant.name, _CAUSE)
     if not changed:
         around.editing.note(
             "leaves: no structure of class vegetation has leaves that are "

@@ -71,7 +71,7 @@ class SceneEditing:
         """Stores a note for the user about the changes."""
         self._notes.append(f"transient: {text}")
 
-    def blame(self, name: str, cause: str) -> None:
+    def record_cause(self, name: str, cause: str) -> None:
         """Records why a structure was changed.
 
         Args:
@@ -91,7 +91,7 @@ class SceneEditing:
         """
         for part in structure.parts:
             self._remove_part(part)
-        self.blame(structure.name, cause)
+        self.record_cause(structure.name, cause)
 
     def move(
         self,
@@ -123,7 +123,7 @@ class SceneEditing:
         self._table.add_structure(
             name, entry.semantic_class, entry.reflectivity, entry.materials
         )
-        self.blame(name, cause)
+        self.record_cause(name, cause)
 
     def cover_part(self, part: LoadedPart, p_W: np.ndarray, look: Look) -> None:
         """Moves a part by p_W (3,) [m] in W and gives it a new look."""
@@ -159,7 +159,7 @@ class SceneEditing:
             X_WG = X_WS @ _pose_in_model(part)
             self._add_part(name, part.name, X_WG, shape, _look_of(part))
         self._table.add_structure(name, semantic_class)
-        self.blame(name, cause)
+        self.record_cause(name, cause)
 
     def shape(self, part: LoadedPart) -> geometry.Shape:
         """Returns the Drake shape of a part."""
@@ -189,7 +189,7 @@ class SceneEditing:
             self._replace_part(
                 part, X_WG, scaled_shape(self.shape(part), share)
             )
-        self.blame(structure.name, cause)
+        self.record_cause(structure.name, cause)
 
     def rebuild(
         self,
@@ -234,7 +234,7 @@ class SceneEditing:
         for name, one in old.items():
             if name not in left:
                 self._remove_part(one)
-        self.blame(structure.name, cause)
+        self.record_cause(structure.name, cause)
 
     def keep_triangles(self, part: LoadedPart, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
@@ -303,7 +303,7 @@ class SceneEditing:
         mesh = memory_mesh(p_WVs - middle, triangles)
         self._add_part(name, "surface", RigidTransform(middle), mesh, look)
         self._table.add_structure(name, semantic_class)
-        self.blame(name, cause)
+        self.record_cause(name, cause)
 
     def finish(self) -> World:
         """Returns the changed world, with a new structure table and new notes.

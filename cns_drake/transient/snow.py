@@ -73,7 +73,7 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
                     editing, part, ground, depth, is_ground
                 )
         if changed:
-            editing.blame(structure.name, _CAUSE)
+            editing.record_cause(structure.name, _CAUSE)
     if ground.carriageway.is_empty:
         editing.note(
             "snow: no structure of class road along the drive: no road is "

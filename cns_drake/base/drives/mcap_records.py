@@ -215,7 +215,7 @@ def locate_records(
                 raise _DamageError(
                     f"a record of {end - start} bytes is too large"
                 )
-            for offset, record in _parse(opcode, stream.read(end - start)):
+            for offset, record in _records_in(opcode, stream.read(end - start)):
                 yield position, offset, record
         except _FAULTS as error:
             text = " ".join(str(error).split()) or type(error).__name__
@@ -301,7 +301,9 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
     return None
 
 
-def _parse(opcode: int, content: bytes) -> Iterator[tuple[int, McapRecord]]:
+def _records_in(
+    opcode: int, content: bytes
+) -> Iterator[tuple[int, McapRecord]]:
     """Yields the records of interest that a record is or contains.
 
     Each comes with its offset in an uncompressed chunk [bytes].

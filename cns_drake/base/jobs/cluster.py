@@ -41,7 +41,7 @@ Listener = Callable[..., None]
 _ANSWER_TIMEOUT = 10.0
 # Greatest number of jobs side by side; each is a process.
 _MOST_JOBS = 1024
-# Dask's name for the key of all jobs.
+# First part of the keys of all jobs in Dask.
 _KIND = "job"
 
 
