@@ -10,7 +10,7 @@ import numpy as np
 
 # Height of sidewalks above the carriageway [m].
 KERB_HEIGHT = 0.12
-# Sharpest turn from one street into another that drives take.
+# Drives and traffic take no sharper turn from one street into another.
 SHARPEST_TURN_DEG = 125.0
 
 

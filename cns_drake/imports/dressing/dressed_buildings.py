@@ -12,13 +12,18 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.site import Site
 from cns_drake.city.geometry import Model, UpperSides, turned_up
-from cns_drake.imports.dressing import facade_pieces, facade_plan, roof_pieces
+from cns_drake.imports.dressing import facade_pieces, roof_pieces
 from cns_drake.imports.dressing.bare_buildings import (
     BareBuilding,
     split_buildings,
 )
 from cns_drake.imports.dressing.drive_views import DriveViews
-from cns_drake.imports.dressing.facade_plan import FacadePlan
+from cns_drake.imports.dressing.facade_plan import (
+    FacadePlan,
+    plan_facade,
+    with_doors,
+    with_shops,
+)
 from cns_drake.imports.dressing.wall_panels import Panel, find_panels
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
@@ -172,7 +177,7 @@ def _plan_facades(
     before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
     heights = ground.height(before[:, :2])
     plans = [
-        facade_plan.plan_facade(
+        plan_facade(
             panel,
             bare[panel.building].style,
             bare[panel.building].base,
@@ -195,24 +200,36 @@ def _plan_facades(
     lines = [street.line for street in streets]
     ways = MultiLineString([*lines, *(drive.path for drive in drives)])
     to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    return _with_fronts(plans, to_way, paving)
+
+
+def _with_fronts(
+    plans: Sequence[FacadePlan], to_way: np.ndarray, paving: UpperSides
+) -> dict[int, list[FacadePlan]]:
+    """Returns number of a building -> its plans, with doors and shops.
+
+    Args:
+        plans: plans of walls.
+        to_way: distance of each wall from the nearest street or drive [m]. The
+            nearest wall of a building has its door.
+        paving: upper sides of the paving in front of the walls.
+    """
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, plan in enumerate(plans):
         groups[plan.panel.building].append(k)
-    for members in groups.values():
+    found: dict[int, list[FacadePlan]] = {}
+    for number, members in groups.items():
         possible = [k for k in members if plans[k].on_street]
-        # The wall with the building's door.
         front = min(possible, key=lambda k: (to_way[k], k), default=None)
+        found[number] = []
         for k in members:
             plan = plans[k]
             if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
-                plan = facade_plan.with_shops(plan, paving)
+                plan = with_shops(plan, paving)
             if k == front:
-                plan = facade_plan.with_doors(plan, paving)
-            plans[k] = plan
-    return {
-        number: [plans[k] for k in members]
-        for number, members in groups.items()
-    }
+                plan = with_doors(plan, paving)
+            found[number].append(plan)
+    return found
 
 
 def _visible_panels(

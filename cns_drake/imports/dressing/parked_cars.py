@@ -51,8 +51,8 @@ def may_park_on(side: str, street: Street) -> bool:
     return not values & set(TABLES["no parking"])
 
 
-class Row(NamedTuple):
-    """A street along which cars may park.
+class DressedStreet(NamedTuple):
+    """A street along which objects are placed, and cars may park.
 
     Attributes:
         name: name of the street.
@@ -68,7 +68,10 @@ class Row(NamedTuple):
 
 
 def park_along(
-    room: StreetRoom, row: Row, lines: BaseGeometry, rng: np.random.Generator
+    room: StreetRoom,
+    row: DressedStreet,
+    lines: BaseGeometry,
+    rng: np.random.Generator,
 ) -> None:
     """Parks cars at random on the sides of a street that allow parking.
 

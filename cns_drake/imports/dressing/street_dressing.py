@@ -11,7 +11,7 @@ from cns_drake.city.placement.objects import pick_key
 from cns_drake.imports.dressing.guessed_streets import HALF_STREET
 from cns_drake.imports.dressing.parked_cars import (
     ROWS_WITHIN,
-    Row,
+    DressedStreet,
     fill_car_park,
     may_park_on,
     park_along,
@@ -95,16 +95,20 @@ def dress_streets(
 
 def _streets_to_dress(
     streets: Sequence[Street], drives: Sequence[WaypointRoute]
-) -> Iterator[Row]:
+) -> Iterator[DressedStreet]:
     """Yields the streets; without streets, drives as middles of streets."""
     for street in streets:
         may_park = (may_park_on("right", street), may_park_on("left", street))
         half = street.width / 2.0
-        yield Row(street.name, LineString(street.line), half, may_park)
+        yield DressedStreet(
+            street.name, LineString(street.line), half, may_park
+        )
     if not streets:
         for number, drive in enumerate(drives):
             line = LineString(drive.path)
-            yield Row(f"drive_{number}", line, HALF_STREET, (True, True))
+            yield DressedStreet(
+                f"drive_{number}", line, HALF_STREET, (True, True)
+            )
 
 
 def _off_carriageway(
@@ -158,7 +162,9 @@ def _place_from_file(
         room.found.no_room += 1
 
 
-def _place_lamps(room: StreetRoom, row: Row, rng: np.random.Generator) -> None:
+def _place_lamps(
+    room: StreetRoom, row: DressedStreet, rng: np.random.Generator
+) -> None:
     """Places lamps along a street where the file has none."""
     s = float(rng.uniform(3.0, 12.0))
     side = 1.0
@@ -181,7 +187,7 @@ def _place_lamps(room: StreetRoom, row: Row, rng: np.random.Generator) -> None:
 
 
 def _place_small_objects(
-    room: StreetRoom, row: Row, rng: np.random.Generator
+    room: StreetRoom, row: DressedStreet, rng: np.random.Generator
 ) -> None:
     """Places small objects along a street if the file has none at all."""
     s = float(rng.uniform(3.0, 12.0))

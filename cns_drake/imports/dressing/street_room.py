@@ -71,8 +71,10 @@ class PlacedObjects:
 class StreetRoom:
     """Places small objects in a city where there is room.
 
-    The objects are added to `found` (a `PlacedObjects`). `lamps` lists the
-    positions (x, y) of the street lamps among these objects [m].
+    Attributes:
+        found: the objects that are placed.
+        paths: paths of the drives [m].
+        lamps: positions (x, y) of the street lamps among the objects [m].
     """
 
     def __init__(
@@ -83,7 +85,7 @@ class StreetRoom:
         bottom: Sequence[Structure],
         found: PlacedObjects,
     ):
-        """Takes the ground of everything that stands already.
+        """Takes the room of everything that stands already.
 
         Args:
             structures: structures of the city.
@@ -175,11 +177,7 @@ class StreetRoom:
             round(yaw, 4),
             kind=name_stem(kind),
         )
-        feet = structure.p_WFs[:, :2]
-        heights, guessed = self._laid.heights(feet), self._ground.height(feet)
-        # A street far above the guessed ground is a bridge or a roof.
-        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)
-        heights = np.where(is_laid, heights, guessed)
+        heights = self._standing_heights(structure.p_WFs[:, :2])
         z = round(float(heights.min()), 3)
         footprint = placed(model.footprint, xy, yaw)
         if (
@@ -194,19 +192,26 @@ class StreetRoom:
             name += "_"
         self._names.add(name)
         structure = replace(structure, name=name, xyz=(x, y, z))
+        triangles = _bounding_triangles(footprint, z)
         self.found.structures.append(
-            Imported(
-                structure,
-                title_of(kind),
-                None,
-                _bounding_triangles(footprint, z),
-            )
+            Imported(structure, title_of(kind), None, triangles)
         )
         if kind == "lamp_post":
             self.lamps.append((x, y))
         return True
 
+    def _standing_heights(self, feet: np.ndarray) -> np.ndarray:
+        """Returns the heights (N,) on which feet (N, 2) stand [m].
+
+        These are the heights of streets and other ground in the file, or else
+        of the guessed ground.
+        """
+        heights, guessed = self._laid.heights(feet), self._ground.height(feet)
+        is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)
+        return np.where(is_laid, heights, guessed)
+
     def _is_built(self, footprint: BaseGeometry) -> bool:
+        """Returns whether a wall stands on a footprint, or close to it."""
         around = footprint.buffer(_FROM_WALL, quad_segs=1)
         xy = shapely.get_coordinates(around.exterior)
         xy = np.concatenate([xy, shapely.get_coordinates(footprint.centroid)])
@@ -215,6 +220,7 @@ class StreetRoom:
 
 
 def title_of(kind: str) -> str:
+    """Returns a kind of object as a title, such as `Lamp post`."""
     return kind.replace("_", " ").capitalize()
 
 

@@ -75,7 +75,7 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
             ["building", "grass"],
         ),
         (
-            {"building": "Row House"},
+            {"building": "DressedStreet House"},
             {"amenity": "parking"},
             ["row_house", "parking"],
         ),
