@@ -142,6 +142,10 @@ def flat_surface(
 
 
 def level_rings(polygon: Polygon, z: float) -> list[np.ndarray]:
+    """Returns the rings of a polygon, (N, 3) each, at a height z [m].
+
+    The first corner of a ring is not repeated at its end.
+    """
     rings = (polygon.exterior, *polygon.interiors)
     return [
         np.column_stack(

@@ -13,8 +13,8 @@ from cns_drake.imports.structures import Imported
 _SHARED = 0.3
 
 
-def with_gone(
-    gone: Sequence[Imported], others: Iterable[Imported]
+def with_former_buildings(
+    former: Sequence[Imported], others: Iterable[Imported]
 ) -> list[Imported]:
     """Returns the structures of a past city: `others`, and former buildings.
 
@@ -23,7 +23,7 @@ def with_gone(
     construction is known, and otherwise the former building.
 
     Args:
-        gone: the former buildings, demolished at an unknown date.
+        former: the former buildings, demolished at an unknown date.
         others: structures of today, which stood in the past city as well.
     """
     others = list(others)
@@ -31,12 +31,12 @@ def with_gone(
     tree = STRtree([one.structure.model.footprint for one in later])
     stood: list[Imported] = []
     replaced: set[Imported] = set()
-    for one in gone:
+    for one in former:
         outline = one.structure.model.footprint
         there = [
             later[k]
             for k in np.sort(tree.query(outline, "intersects"))
-            if _share_place(outline, later[k].structure.model.footprint)
+            if _are_in_same_place(outline, later[k].structure.model.footprint)
         ]
         if any(new.year is not None for new in there):
             continue
@@ -45,6 +45,6 @@ def with_gone(
     return [one for one in others if one not in replaced] + stood
 
 
-def _share_place(one: BaseGeometry, other: BaseGeometry) -> bool:
+def _are_in_same_place(one: BaseGeometry, other: BaseGeometry) -> bool:
     shared = one.intersection(other).area
     return bool(shared > _SHARED * min(one.area, other.area))

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from shapely import STRtree
 
 from cns_drake.city.geometry import MeshShape
-from cns_drake.imports.former_buildings import with_gone
+from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.named_randomness import random_share
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.imports.structures import Imported
@@ -66,7 +66,7 @@ def grow(
     stood: list[Imported] = []
     if city.gone:
         before = first
-        first = with_gone(city.gone, before)
+        first = with_former_buildings(city.gone, before)
         stood = [one for one in first if one in set(city.gone)]
         missing += [one.draw_name for one in set(before) - set(first)]
     extra = [new for new in variants.values() if new in set(first)]

@@ -11,7 +11,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.foreign_city import ForeignCity
-from cns_drake.imports.former_buildings import with_gone
+from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.structures import Imported, boxes_of
 from cns_drake.scene.labels import MAX_INSTANCE
@@ -94,7 +94,7 @@ def stage_city(
         gone = [one for one in found if one not in today]
     elif options.dressed:
         standing = {
-            stage: with_gone(
+            stage: with_former_buildings(
                 [one for one in some if not _is_here(one)],
                 [one for one in some if _is_here(one)],
             )

@@ -10,6 +10,8 @@ import numpy as np
 
 # Height of sidewalks above the carriageway [m].
 KERB_HEIGHT = 0.12
+# Width of a sidewalk whose file gives none [m].
+SIDEWALK_WIDTH = 2.0
 # Drives and traffic take no sharper turn from one street into another.
 SHARPEST_TURN_DEG = 125.0
 

@@ -17,6 +17,9 @@ _MAX_LENGTH = 100_000.0
 # town, the path deviates from the middle of the lane by less than 10 cm.
 POINT_SPACING = 2.0
 
+# Distance between the points from which a path is interpolated [m].
+DENSE_SPACING = 0.25
+
 Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 

@@ -31,7 +31,7 @@ Turn = Literal["left", "straight", "right"]
 _Pose = tuple[float, float, float, float]
 
 # A path through a junction is a turn if its heading changes by more than this.
-_STRAIGHT_LIMIT_DEG = 35.0
+STRAIGHT_LIMIT_DEG = 35.0
 # Beyond this change of heading it is a U-turn, which is not allowed.
 _U_TURN_LIMIT_DEG = 150.0
 # Roads may overlap by this much before they count as crossing [m^2].
@@ -217,7 +217,7 @@ def _turn_deg(a: _Pose, b: _Pose) -> float:
 
 def _turn_of(angle_deg: float, num_arms: int) -> Turn:
     """Returns the kind of turn; straight on wherever two roads only join."""
-    if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
+    if num_arms == 2 or abs(angle_deg) <= STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
 

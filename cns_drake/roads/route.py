@@ -8,13 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
 from cns_drake.base.elementary import smooth_step
 from cns_drake.base.errors import InputError
-from cns_drake.roads.lane_path import LanePath, sample_lane_path
+from cns_drake.roads.lane_path import DENSE_SPACING, LanePath, sample_lane_path
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
 from cns_drake.roads.u_turn import find_loop
 
-# Distance between the points from which the path is interpolated [m].
-_DENSE_SPACING = 0.25
 # Length of a lane change where the road has room for it [m].
 LANE_CHANGE_LENGTH = 50.0
 # Least length of a lane change [m].
@@ -248,7 +246,7 @@ def _leg_points(
         raise ValueError(
             f"the road is too short for turning round at {end:.1f} m"
         )
-    count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
+    count = int(np.ceil((end - start) / DENSE_SPACING)) + 1
     travelled = np.linspace(start, end, count)
     offset = np.full(count, first)
     if first != last:
@@ -382,7 +380,7 @@ def _legal_connection(
     Raises:
         ValueError: there is no legal connection.
     """
-    way = network.connection(previous.exit_lane, leg.entry_lane, _DENSE_SPACING)
+    way = network.connection(previous.exit_lane, leg.entry_lane, DENSE_SPACING)
     if not network.is_legal(way):
         rule = {
             "left": "a left turn leads from lane 1 to lane 1",

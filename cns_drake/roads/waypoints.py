@@ -11,7 +11,12 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
 from cns_drake.roads.centreline import Centreline
-from cns_drake.roads.lane_path import LanePath, check_length, sample_lane_path
+from cns_drake.roads.lane_path import (
+    DENSE_SPACING,
+    LanePath,
+    check_length,
+    sample_lane_path,
+)
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
 from cns_drake.roads.waypoint_file import read_waypoints
 
@@ -22,8 +27,6 @@ _CORNER_RADIUS = 8.0
 _SHARPEST_TURN_DEG = 150.0
 # Waypoints closer than this to the one before count as the same [m].
 _SAME_PLACE = 1e-3
-# Distance between the points from which the path is interpolated [m].
-_DENSE_SPACING = 0.25
 
 
 def load_waypoint_path(
@@ -175,7 +178,7 @@ def _rounded_path(
     edges = np.diff(corners[:, :2], axis=0)
     headings = arctan2(edges[:, 1], edges[:, 0])
     turns = np.abs(wrapped(np.diff(headings)))
-    count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
+    count = int(np.ceil(curve.length / DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
     from scipy.interpolate import PchipInterpolator
 

@@ -103,6 +103,7 @@ class FacadePlan:
 
     @property
     def stands_on_ground(self) -> bool:
+        """Whether the wall begins at the ground, and not above a roof."""
         return self.ground > -_ON_GROUND
 
     @property

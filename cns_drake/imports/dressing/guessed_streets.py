@@ -10,7 +10,6 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry import looks_up, turned_up
 from cns_drake.imports.dressing.paving import (
     GRID,
-    SIDEWALK_WIDTH,
     area_outside,
     near_drives,
     paved_structure,
@@ -20,7 +19,7 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, joined_triangles, parts_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.ground import Ground
-from cns_drake.imports.streets import KERB_HEIGHT
+from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH
 from cns_drake.imports.structures import Imported
 
 # Half the width of a street of unknown width [m].

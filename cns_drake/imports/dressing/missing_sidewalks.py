@@ -11,7 +11,6 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.imports.dressing.paving import (
     GRID,
     PAVED_WITHIN,
-    SIDEWALK_WIDTH,
     area_outside,
     near_drives,
     paved_structure,
@@ -20,7 +19,7 @@ from cns_drake.imports.dressing.paving import (
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.streets import KERB_HEIGHT, Street
+from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
 from cns_drake.imports.structures import Imported
 
 # Streets of these kinds have sidewalks unless their tags say otherwise.

@@ -15,8 +15,6 @@ from cns_drake.imports.structures import Imported, make_imported
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
 PAVED_WITHIN = 80.0
-# Width of an added sidewalk [m].
-SIDEWALK_WIDTH = 2.0
 # Grid size of set operations on areas [m].
 GRID = 0.001
 

@@ -77,9 +77,9 @@ def dress_streets(
     for one in structures:
         if one.kind == "Tree":
             room.keep_tree(_off_carriageway(room, one, near, courses))
-    for number, one in enumerate(small_objects):
-        if room.is_near(np.array([one.xy] * 2), _OBJECTS_WITHIN):
-            _place_from_file(room, one, number, near, courses, seed)
+    for number, small in enumerate(small_objects):
+        if room.is_near(np.array([small.xy] * 2), _OBJECTS_WITHIN):
+            _place_from_file(room, small, number, near, courses, seed)
     for one in structures:
         if one.kind == "Parking":
             fill_car_park(room, one, seed)

@@ -22,6 +22,17 @@ SHORTEST_PIECE = 1e-5
 def read_course(
     elements: Iterable[Element], name: str, faults: ImportFaults
 ) -> list[road_model.Piece]:
+    """Returns the pieces of a road's course, in their order along the road.
+
+    Args:
+        elements: the elements `geometry` of the road.
+        name: name of the road, as an example in `faults`.
+        faults: counts pieces without length, and gaps between pieces.
+
+    Raises:
+        ValueError: a piece has an impossible length or curve; the message names
+            its line.
+    """
     found: list[road_model.Piece] = []
     for one in elements:
         length = one.number("length")

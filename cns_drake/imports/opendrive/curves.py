@@ -42,6 +42,7 @@ class Arc:
     curvature: float
 
     def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        """Returns u, v [m] and heading [rad], (N, 3), as `Shape` says."""
         half = self.curvature * ds / 2.0
         # The chord, which for a line points straight ahead.
         chord = ds * np.sinc(half / np.pi)
@@ -51,6 +52,7 @@ class Arc:
 
     @property
     def sharpest(self) -> float:
+        """Greatest curvature [1/m]."""
         return abs(self.curvature)
 
 
@@ -73,6 +75,7 @@ class Spiral:
         self._before = before
 
     def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        """Returns u, v [m] and heading [rad], (N, 3), as `Shape` says."""
         index = np.clip(
             (ds / self._panel).astype(int), 0, len(self._before) - 1
         )
@@ -128,6 +131,7 @@ class Cubic:
         self.sharpest = float(turns.max()) / (length / (4 * _PANELS))
 
     def evaluate(self, ds: np.ndarray) -> np.ndarray:
+        """Returns u, v [m] and heading [rad], (N, 3), as `Shape` says."""
         p = ds if self._by_parameter else self._parameter(ds * self._scale)
         return np.stack([self._u(p), self._v(p), self._heading(p)], axis=1)
 

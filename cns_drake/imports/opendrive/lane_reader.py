@@ -17,6 +17,11 @@ _HIGHEST_LANE = 1.0
 def read_cubics(
     elements: Iterable[Element], start: str, offset: float = 0.0
 ) -> road_model.Cubics:
+    """Returns the function of the distance along a road that elements define.
+
+    Each element has the coefficients `a` to `d` of a cubic polynomial. The
+    polynomial begins at the value of the attribute `start`, plus `offset` [m].
+    """
     return road_model.Cubics(
         [
             (
@@ -29,13 +34,27 @@ def read_cubics(
 
 
 def step_function(rows: Iterable[tuple[float, float]]) -> road_model.Cubics:
-    """Returns a step function; each row is a start and the value from there."""
+    """Returns a step function of the distance along a road.
+
+    Each row has the start of a step [m], and the value from this start on.
+    """
     return road_model.Cubics([(*row, 0.0, 0.0, 0.0) for row in rows])
 
 
 def read_sections(
     road: Element, length: float, name: str, faults: ImportFaults
 ) -> list[road_model.LaneSection]:
+    """Returns the lane sections of a road, in their order along the road.
+
+    Args:
+        road: the road in the file.
+        length: length of the road [m]; sections beyond it are left out.
+        name: name of the road, as an example in `faults`.
+        faults: counts lanes and marks that are changed.
+
+    Raises:
+        ValueError: a lane is impossible; the message names its line.
+    """
     elements = list(road.all("lanes", "laneSection"))
     elements.sort(key=lambda one: one.number("s"))
     starts = [one.number("s") for one in elements]
@@ -73,6 +92,10 @@ def read_sections(
 
 
 def is_single_sided(section: Element) -> bool:
+    """Returns whether a section has lanes on one side of the road only.
+
+    The lanes on the other side continue from the section before.
+    """
     return section.value("singleSide", "false").lower() in ("true", "1")
 
 

@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Finish, Structure, triangulate
-from cns_drake.imports.colours import Rgb
+from cns_drake.imports.colours import WHITE, Rgb
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.opendrive.lanes import LaneBand
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
@@ -40,8 +40,8 @@ _ASIDE = 0.12
 _ABOVE = 0.015
 _SHORTEST = 0.05
 _COLOURS: dict[str, Rgb] = {
-    "standard": (0.86, 0.86, 0.84),
-    "white": (0.86, 0.86, 0.84),
+    "standard": WHITE,
+    "white": WHITE,
     "yellow": (0.86, 0.70, 0.22),
     "red": (0.70, 0.20, 0.18),
     "blue": (0.20, 0.32, 0.62),

@@ -15,18 +15,19 @@ from cns_drake.imports.openstreetmap.local_metres import Local
 from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
+    is_railway,
     is_tunnel,
     path_width,
     sidewalk_sides,
     street_width,
 )
+from cns_drake.imports.streets import SIDEWALK_WIDTH
 from cns_drake.imports.structures import Imported
 
 # Distance of a parapet from the edge of the street [m].
 _PARAPET_FROM_EDGE = 0.2
 _PARAPET_THICKNESS = 0.25
 _PARAPET_HEIGHT = 1.0
-_BRIDGE_SIDEWALK_WIDTH = 2.0
 _PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 
@@ -47,6 +48,7 @@ class Bridges:
 
     @property
     def left_out(self) -> AbstractSet[str]:
+        """Ids of the bridges and tunnels that a dressed city does not have."""
         return self.over_streets | self.tunnels
 
 
@@ -59,7 +61,7 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
     used = [
         way
         for way in ways
-        if way.tags.get("railway") in ("rail", "light_rail", "tram")
+        if is_railway(way.tags)
         or street_width(way.tags) is not None
         or path_width(way.tags) is not None
     ]
@@ -83,10 +85,10 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
 
 
 def _height_rank(way: OsmWay) -> tuple[float, str]:
-    """Returns what is greater for the upper one of two ways that cross.
+    """Returns a rank that is greater for the upper one of two ways that cross.
 
-    One of two bridges in the same layer is above the other; the file does not
-    say which, and so the name decides.
+    The file does not say which of two bridges in the same layer is above the
+    other, so the name decides.
     """
     if not has_tag(way.tags, "bridge"):
         return -math.inf, ""
@@ -111,7 +113,7 @@ def parapets(
             aside = (
                 width / 2.0
                 + _PARAPET_FROM_EDGE
-                + (_BRIDGE_SIDEWALK_WIDTH if walk else 0.0)
+                + (SIDEWALK_WIDTH if walk else 0.0)
             )
             edge = course.offset_curve(side * aside)
             strips.append(

@@ -11,7 +11,8 @@ _LIFECYCLE = tuple(TABLES["lifecycle"].split())
 def element_kind(tags: Tags) -> str:
     """Returns the kind of an element in words, from the first known tag.
 
-    For example, it is `highway=residential`, or `other` without a known tag.
+    An example is `highway=residential`. Without a known tag, the kind is
+    `other`.
     """
     for key in _KIND_KEYS:
         if has_tag(tags, key):

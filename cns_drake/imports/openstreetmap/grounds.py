@@ -31,7 +31,9 @@ def _look_of(entry: list) -> Look:
     return Look(kind, semantic_class, (red, green, blue), z)
 
 
-LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
+_LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
+# The first entry of the table is water.
+WATER_LOOK = _LOOKS[0][0]
 
 
 def ground_areas(
@@ -77,7 +79,7 @@ def _detailed_look(tags: Tags) -> Look | None:
         if tags.get("parking") in _NOT_ON_GROUND:
             return None
         return Look("Parking", "parking", None, -0.03)
-    for look, entry in LOOKS:
+    for look, entry in _LOOKS:
         if any(
             tags.get(key) in values.split()
             for key, values in entry.items()

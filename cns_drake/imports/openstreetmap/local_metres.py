@@ -47,4 +47,5 @@ class Local:
         return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
+        """Converts a polygon from degrees to metres."""
         return shapely.transform(polygon, self)

@@ -13,12 +13,11 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.features import OsmWay
-from cns_drake.imports.openstreetmap.grounds import LOOKS
+from cns_drake.imports.openstreetmap.grounds import WATER_LOOK
 from cns_drake.imports.openstreetmap.local_metres import Local
 from cns_drake.imports.openstreetmap.looks import flat_structure
 from cns_drake.imports.structures import Imported
 
-_WATER_LOOK = LOOKS[0][0]
 # A coastline that ends within the city is extended by this length [m].
 _COAST_EXTENSION = 3000.0
 # Probes at this distance from a coastline find the side of the sea [m].
@@ -57,7 +56,7 @@ def sea(
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
     yield from flat_structure(
-        f"sea_{coasts[0].name}", _WATER_LOOK, faces.parts_of(water), faults
+        f"sea_{coasts[0].name}", WATER_LOOK, faces.parts_of(water), faults
     )
 
 

@@ -14,14 +14,20 @@ from cns_drake.traffic import lane_graph
 
 # A signal belongs to a junction within this distance [m].
 _JUNCTION_WITHIN = 25.0
-# It belongs to the junction's ways that pass within this distance [m].
+# A signal controls the ways of its junction that pass within this distance [m].
 _WAY_WITHIN = 6.0
 
 
 def junctions_with_signals(
     traffic: StreetTraffic, streets: Iterable[Street], signals: np.ndarray
 ) -> list[BaseGeometry]:
-    """Returns the places of junctions that have signals."""
+    """Returns the places of junctions that have signals, as points.
+
+    Args:
+        traffic: the lanes, and the nodes of junctions.
+        streets: the streets that meet there.
+        signals: (N, 2) places of traffic signals [m].
+    """
     if not len(signals):
         return []
     places = {
@@ -43,8 +49,12 @@ def with_signals(
 ) -> lane_graph.LaneGraph:
     """Returns the lanes, with signals of two phases at some junctions.
 
-    The first phase is for the direction from which the junction is first
-    entered, the second for the direction across it.
+    The first phase is for the direction in which the first way of a junction
+    begins, and the second phase is for the direction across.
+
+    Args:
+        graph: the lanes.
+        signals: places of the junctions that get signals.
     """
     ways = [k for k, piece in enumerate(graph.pieces) if piece.is_way]
     if not signals or not ways:

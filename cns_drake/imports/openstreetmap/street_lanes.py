@@ -17,11 +17,10 @@ from cns_drake.base.angles import wrapped
 from cns_drake.imports.openstreetmap import lane_tags, speed_tags
 from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
 from cns_drake.roads.centreline import blend
+from cns_drake.roads.network import STRAIGHT_LIMIT_DEG
 from cns_drake.traffic.lane_joining import DirectedLane
 from cns_drake.traffic.polylines import SPACING
 
-# A way through a junction is a turn if its heading changes by more than this.
-_STRAIGHT_DEG = 35.0
 # Length of the running mean that rounds the corners of a street [m].
 _ROUNDED_OVER = 7.0
 # Length of the running mean that rounds a lane on the inner side of a sharp
@@ -91,10 +90,12 @@ class _Lane:
 
     @property
     def exit_arm(self) -> _Arm:
+        """End of the stretch at which traffic leaves the lane."""
         return self.stretch, -1 if self.is_forward else 0
 
     @property
     def entry_arm(self) -> _Arm:
+        """End of the stretch at which traffic enters the lane."""
         return self.stretch, 0 if self.is_forward else -1
 
 
@@ -297,7 +298,7 @@ class _MeetingStreets:
         outer = (here - 1 - first.number, there - 1 - last.number)
         if all(layout.forward * layout.backward == 0 for layout in layouts):
             return outer[1] == min(outer[0], there - 1)
-        if not is_junction or abs(turn_deg) <= _STRAIGHT_DEG:
+        if not is_junction or abs(turn_deg) <= STRAIGHT_LIMIT_DEG:
             return last.number == min(first.number, there - 1)
         if turn_deg * self.side > 0:
             return first.number == last.number == 0

@@ -8,6 +8,7 @@ from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports import faces
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
 from cns_drake.imports.openstreetmap.local_metres import Local
@@ -22,10 +23,14 @@ from cns_drake.imports.openstreetmap.way_tags import (
     sidewalk_sides,
     street_width,
 )
-from cns_drake.imports.streets import KERB_HEIGHT, Street, StreetPlaces
+from cns_drake.imports.streets import (
+    KERB_HEIGHT,
+    SIDEWALK_WIDTH,
+    Street,
+    StreetPlaces,
+)
 from cns_drake.imports.structures import Imported
 
-_SIDEWALK_WIDTH = 2.0
 _ROAD = Look("Road", "road", None, 0.0)
 _WALK = Look("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 
@@ -39,12 +44,7 @@ def street_surfaces(
     faults.
     """
     faults = features.faults
-    for kind, ids in (
-        ("bridge over a street or railway, left out", bridges.over_streets),
-        ("tunnel, left out", bridges.tunnels),
-    ):
-        for name in sorted(ids):
-            faults.add(kind, name)
+    _count_left_out(bridges, faults)
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
     for name, tags, line, _ in features.ways:
@@ -65,7 +65,7 @@ def street_surfaces(
         roads.append((name, course.buffer(width / 2.0, 4)))
         for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
             if has:
-                reach = side * (width / 2.0 + _SIDEWALK_WIDTH)
+                reach = side * (width / 2.0 + SIDEWALK_WIDTH)
                 strip = course.buffer(reach, single_sided=True)
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
@@ -76,6 +76,15 @@ def street_surfaces(
     for name, area in walks:
         areas = faces.parts_of(area.difference(paved))
         yield from flat_structure(f"walk_{name}", _WALK, areas, faults)
+
+
+def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:
+    for kind, ids in (
+        ("bridge over a street or railway, left out", bridges.over_streets),
+        ("tunnel, left out", bridges.tunnels),
+    ):
+        for name in sorted(ids):
+            faults.add(kind, name)
 
 
 def _is_elsewhere(name: str, tags: Tags, bridges: Bridges) -> bool:

@@ -115,7 +115,7 @@ def _sidewalks(
 def _are_free(
     traffic: StreetTraffic, structures: Iterable[Imported]
 ) -> np.ndarray:
-    """Returns (L,) which lanes are free of everything in the file."""
+    """Returns (L,) bool: whether no structure of the file blocks a lane."""
     solid = [
         one.triangles
         for one in structures

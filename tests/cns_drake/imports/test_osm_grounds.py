@@ -75,7 +75,7 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
             ["building", "grass"],
         ),
         (
-            {"building": "DressedStreet House"},
+            {"building": "Row House"},
             {"amenity": "parking"},
             ["row_house", "parking"],
         ),
