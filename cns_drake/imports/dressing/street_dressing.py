@@ -144,6 +144,16 @@ def _place_from_file(
     courses: Sequence[LineString],
     seed: int,
 ) -> None:
+    """Places a small object of the file, moved off the carriageway.
+
+    Args:
+        room: room in the city.
+        one: the small object.
+        number: number of the object among all small objects.
+        streets: the streets near drives.
+        courses: middle line of each of these streets.
+        seed: seed of the random draws.
+    """
     name = f"{one.kind}_{one.source}"
     if one.source.startswith("w"):
         name += f"_{number}"

@@ -18,8 +18,9 @@ from cns_drake.roads.waypoints import make_waypoint_path
 # Paths of vehicles are quintic splines (`cns_drake.motion`). The points of a
 # path are their control points.
 _DEGREE = 5
-# The bends of a proposed drive are this many times wider than the car's
-# tightest one, because the drive may be on a slope and its numbers are rounded.
+# Least radius of a proposed drive's bends, as a multiple of the car's smallest
+# turning radius. It is above 1, because the drive may be on a slope and its
+# numbers are rounded.
 _MARGIN = 1.01
 # Distance between the places where bends and room are checked [m].
 _CHECK_SPACING = 0.25
@@ -30,13 +31,14 @@ Obstacle = np.ndarray
 # Takes places (N, 2) along a path [m]. Returns the first place (2,) without
 # room for a car, or None.
 Room = Callable[[np.ndarray], np.ndarray | None]
-# Greatest distance between waypoints, so that heights are followed, and least
-# distance from corners [m].
+# Greatest distance between waypoints, so that the drive follows the ground, and
+# least distance of additional waypoints from corners [m].
 _WAYPOINT_SPACING = 15.0
 # Tolerances of waypoints relative to the path that was found, tried in turn
 # [m].
 _TOLERANCES = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Numbers of cells in a running mean; the values were found by trial.
+# Numbers of places in the running mean that smooths a line, tried in turn; the
+# values were found by trial.
 _MEAN_WINDOWS = (5, 11, 17)
 
 

@@ -10,12 +10,15 @@ from cns_drake.base.xml_elements import Element
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import curves, road_model
 
+# Greatest length of a road [m].
 LONGEST_ROAD = 100_000.0
-# Pieces of a road's course that are farther apart are counted [m].
+# A gap between two pieces of a road's course is counted if it is wider than
+# this [m].
 WIDEST_JOINT = 0.1
 # Greatest curvature of a curve [1/m].
 _SHARPEST = 100.0
-# Shorter pieces are left out [m].
+# Pieces of a road's course, and lane sections, are left out if they are shorter
+# than this [m].
 SHORTEST_PIECE = 1e-5
 
 

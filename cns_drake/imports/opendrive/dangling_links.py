@@ -6,6 +6,7 @@ from cns_drake.base.xml_elements import Element
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lane_reader import is_single_sided
 
+# Elements of links at the two ends of a road or lane.
 _ENDS = ("predecessor", "successor")
 
 

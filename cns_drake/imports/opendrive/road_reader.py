@@ -35,10 +35,11 @@ from cns_drake.imports.opendrive.unread import count_unread
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 # Greatest speed limit [m/s].
 _FASTEST = 100.0
-# Larger networks, such as whole countries, are refused [m].
+# Greatest extent of a network along x or y; whole countries are refused [m].
 _LARGEST = 20_000.0
+# Greatest length of all roads of a network together [m].
 _MOST_TOGETHER = 2_000_000.0
-# Roads farther from the origin than this are moved to it [m].
+# If any road is farther from the origin than this, all are moved to it [m].
 _FAR_AWAY = 10_000.0
 # Lengths that differ by less than this are equal [m].
 _ROUNDING = 0.01
