@@ -35,11 +35,15 @@ from cns_drake.sensors.lidar.lidar import Lidar as Lidar
 from cns_drake.sensors.lidar.measurement import (
     MeasurementModel as MeasurementModel,
 )
+from cns_drake.sensors.lidar.nonrepeating_patterns import (
+    NoddingPattern as NoddingPattern,
+)
+from cns_drake.sensors.lidar.nonrepeating_patterns import (
+    RosettePattern as RosettePattern,
+)
 from cns_drake.sensors.lidar.patterns import (
     DirectionPattern as DirectionPattern,
 )
-from cns_drake.sensors.lidar.patterns import NoddingPattern as NoddingPattern
-from cns_drake.sensors.lidar.patterns import RosettePattern as RosettePattern
 from cns_drake.sensors.lidar.patterns import SpinningPattern as SpinningPattern
 from cns_drake.sensors.lidar.patterns import (
     make_flash_pattern as make_flash_pattern,

@@ -13,11 +13,18 @@ import numpy as np
 
 from cns_drake.base.errors import did_you_mean
 from cns_drake.base.yaml_files import parse_yaml
-from cns_drake.sensors.lidar import patterns
-
-UnitPattern: TypeAlias = (
-    patterns.SpinningPattern | patterns.RosettePattern | patterns.NoddingPattern
+from cns_drake.sensors.lidar.nonrepeating_patterns import (
+    NoddingPattern,
+    RosettePattern,
 )
+from cns_drake.sensors.lidar.patterns import SpinningPattern
+
+# Name of a class of patterns in `presets.yaml` -> the class.
+_NONREPEATING = {
+    "RosettePattern": RosettePattern,
+    "NoddingPattern": NoddingPattern,
+}
+UnitPattern: TypeAlias = SpinningPattern | RosettePattern | NoddingPattern
 
 
 class LidarPreset(NamedTuple):
@@ -44,7 +51,7 @@ class LidarPreset(NamedTuple):
         """
         fields["min_range"], fields["max_range"] = ranges
         if "pattern" in fields:
-            kind = getattr(patterns, fields.pop("pattern"))
+            kind = _NONREPEATING[fields.pop("pattern")]
             for name, value in fields.items():
                 if isinstance(value, list):
                     fields[name] = tuple(value)
@@ -56,7 +63,7 @@ class LidarPreset(NamedTuple):
             np.linspace(*part) if isinstance(part, list) else [part]
             for part in fields.pop("rings_deg")
         ]
-        pattern = patterns.SpinningPattern(
+        pattern = SpinningPattern(
             elevations_rad=tuple(np.deg2rad(np.concatenate(rings)).tolist()),
             num_columns=fields.pop("columns"),
             period=fields.pop("period", 0.05),

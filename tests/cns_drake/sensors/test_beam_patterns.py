@@ -8,10 +8,12 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.sensors.lidar.patterns import (
-    DirectionPattern,
+from cns_drake.sensors.lidar.nonrepeating_patterns import (
     NoddingPattern,
     RosettePattern,
+)
+from cns_drake.sensors.lidar.patterns import (
+    DirectionPattern,
     SpinningPattern,
     make_flash_pattern,
 )
