@@ -15,7 +15,7 @@ from typing import Any
 # and traffic, so that a frame does not wait for the one before. A batch is a
 # large message with the small ones before it. A killed process loses waiting
 # batches, at most eight frames.
-_WAITING = 8
+_MOST_WAITING = 8
 # Messages with fewer bytes wait for the next large one: handing a small message
 # over takes longer than making it.
 _SMALL_BYTES = 1024
@@ -50,7 +50,7 @@ class BackgroundWriter:
     def __exit__(self, exception_type: type | None, *_: object) -> None:
         try:
             if exception_type is None:
-                self._hand_over(0)
+                self._submit_held(0)
         finally:
             self._thread.shutdown(cancel_futures=True)
 
@@ -68,10 +68,10 @@ class BackgroundWriter:
         self._held.append(message)
         size = sum([len(one) for one in message if isinstance(one, bytes)])
         if not 0 < size < _SMALL_BYTES or len(self._held) >= _MOST_HELD:
-            self._hand_over(_WAITING)
+            self._submit_held(_MOST_WAITING)
 
-    def _hand_over(self, waiting: int) -> None:
-        """Queues held messages; waits until `waiting` batches are left."""
+    def _submit_held(self, waiting: int) -> None:
+        """Queues held messages, and waits until `waiting` batches are left."""
         before = self._batches[-1] if self._batches else None
         self._batches.append(
             self._thread.submit(self._write_batch, self._held, before)

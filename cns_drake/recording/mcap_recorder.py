@@ -375,19 +375,19 @@ class McapRecorder(LeafSystem):
     def _add_image_ports(self, name: str, camera: RecordedCamera) -> None:
         def make(kind: str, image: Any, stamp_ns: int) -> dict:
             info, frame = camera.info, name
-            info_topic = recorded_topics.camera_info_topic(name)
+            info_topic = recorded_topics.camera_topic(name, "camera_info")
             if kind == "depth" and camera.depth is not None:
                 info, frame = camera.depth.info, depth_frame(name)
                 info_topic = recorded_topics.depth_info_topic(name)
             return {
-                recorded_topics.image_topic(name, kind): messages.make_image(
+                recorded_topics.camera_topic(name, kind): messages.make_image(
                     image.data, messages.ENCODINGS[kind], frame, stamp_ns
                 ),
                 info_topic: messages.make_camera_info(info, frame, stamp_ns),
             }
 
         for kind, image in _IMAGES.items():
-            topic = recorded_topics.image_topic(name, kind)
+            topic = recorded_topics.camera_topic(name, kind)
             port = f"{name}_{kind}"
             self._add_port(port, topic, functools.partial(make, kind), image())
 
@@ -397,7 +397,7 @@ class McapRecorder(LeafSystem):
         steps = self._schedule.steps
         step = math.gcd(*(steps[name] for name in steps if name not in waits))
         self.DeclarePeriodicPublishEvent(
-            period_sec=float(self._schedule.tick * step),
+            period_sec=float(self._schedule.exact_period * step),
             offset_sec=0.0,
             publish=self._write_due_messages,
         )

@@ -28,7 +28,7 @@ _EXACT = 1e-12
 EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
 # Placeholder for the numbers that change in a message that is made once. It is
 # a valid number of nanoseconds, and cannot occur in a text.
-_MARK = 0x3A17C0DE
+_PLACEHOLDER = 0x3A17C0DE
 IMAGE = "sensor_msgs/msg/Image"
 # At quality 90 of 100, colours are within a few levels of the original.
 _JPEG_QUALITY = 90
@@ -77,16 +77,18 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
     data = ros_types.serialize(
         ros_types.make_message(
             ros_types.POINT_CLOUD,
-            header=make_header(frame_id, _MARK * _NS_PER_S + _MARK),
+            header=make_header(
+                frame_id, _PLACEHOLDER * _NS_PER_S + _PLACEHOLDER
+            ),
             height=1,
-            width=_MARK,
+            width=_PLACEHOLDER,
             fields=_point_fields(dtype)[0],
             point_step=dtype.itemsize,
-            row_step=_MARK,
+            row_step=_PLACEHOLDER,
             is_dense=True,
         )
     )
-    start, _, middle, steps, end = data.split(struct.pack("=I", _MARK))
+    start, _, middle, steps, end = data.split(struct.pack("=I", _PLACEHOLDER))
     # The message ends with the length of the data, the data and one byte.
     return [start, middle, steps, end[-1:]]
 
@@ -170,7 +172,7 @@ def make_odometry(
         ros_types.ODOMETRY,
         header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
-        pose=(_place(X_WB), EXACT_COVARIANCE),
+        pose=(_pose_fields(X_WB), EXACT_COVARIANCE),
         twist=(twist, EXACT_COVARIANCE),
     )
 
@@ -189,12 +191,12 @@ def make_tf(
     return ros_types.make_message(
         ros_types.TF,
         transforms=[
-            (header, child, _place(X_PC)) for child, X_PC in X_PCs.items()
+            (header, child, _pose_fields(X_PC)) for child, X_PC in X_PCs.items()
         ],
     )
 
 
-def _place(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
+def _pose_fields(X: RigidTransform) -> tuple[np.ndarray, tuple[float, ...]]:
     """Returns the fields of a Pose, or of a Transform."""
     return X.translation(), to_quat_xyzw(X.rotation())
 

@@ -79,21 +79,21 @@ class BoxMessages:
                 SceneUpdate.
         """
         self._make = make
-        self._who: tuple[bytes, tuple[str, ...]] | None = None
+        self._identities: tuple[bytes, tuple[str, ...]] | None = None
 
     def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
         """Returns the message with all objects at a time [ns], as CDR."""
-        who = (objects.instance.tobytes(), objects.semantic_classes)
-        if who != self._who:
+        identities = (objects.instance.tobytes(), objects.semantic_classes)
+        if identities != self._identities:
             self._prepare(objects)
-            self._who = who
+            self._identities = identities
         numbers = np.column_stack(
             [objects.p_WO, objects.quat_xyzw, objects.sizes]
         )
         data = self._data.copy()
-        floats, words = _views(data)
-        floats[self._places] = numbers.ravel()[self._which]
-        words[self._stamps], words[self._stamps + 1] = divmod(
+        floats, words = _number_views(data)
+        floats[self._number_places] = numbers.ravel()[self._number_order]
+        words[self._stamp_places], words[self._stamp_places + 1] = divmod(
             stamp_ns, _NS_PER_S
         )
         return data.tobytes()
@@ -106,27 +106,27 @@ class BoxMessages:
         """
         count = _NUMBERS * len(objects.instance)
         marks = (_FIRST_MARK + np.arange(count)).reshape(-1, _NUMBERS)
-        who = zip(
+        pairs = zip(
             objects.instance.tolist(), objects.semantic_classes, strict=True
         )
-        message = self._make(list(who), marks)
+        message = self._make(list(pairs), marks)
         self._data = np.frombuffer(ros_types.serialize(message), np.uint8)
-        floats, words = _views(self._data)
+        floats, words = _number_views(self._data)
         with np.errstate(invalid="ignore"):
             which = floats - _FIRST_MARK
-            self._places = np.flatnonzero(
+            self._number_places = np.flatnonzero(
                 (which >= 0) & (which < count) & (which % 1 == 0)
             )
-        self._which = which[self._places].astype(int)
-        if len(np.unique(self._which)) != count:
+        self._number_order = which[self._number_places].astype(int)
+        if len(np.unique(self._number_order)) != count:
             raise ValueError("a message lacks some of its numbers")
         sec, nanosec = _STAMP_MARK
-        self._stamps = np.flatnonzero(
+        self._stamp_places = np.flatnonzero(
             (words[:-1] == sec) & (words[1:] == nanosec)
         )
 
 
-def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _number_views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns views of a message's bytes (L,) as float64 and as uint32."""
     body = data[_ENCAPSULATION:]
     return (
@@ -136,21 +136,23 @@ def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def marked_detections(
-    who: Sequence[tuple[int, str]], numbers: np.ndarray
+    identities: Sequence[tuple[int, str]], numbers: np.ndarray
 ) -> Any:
     """Returns a Detection3DArray with the boxes of N objects, without a time.
 
     A placeholder stands for the time stamp. The boxes are in the map frame W.
 
     Args:
-        who: instance id and class of each object.
+        identities: instance id and class of each object.
         numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
             each box.
     """
     header = messages.make_header(MAP_FRAME, _STAMP_MARK_NS)
     detections = []
-    for (instance, semantic_class), row in zip(who, numbers, strict=True):
-        pose, size = _box(row)
+    for (instance, semantic_class), row in zip(
+        identities, numbers, strict=True
+    ):
+        pose, size = _box_fields(row)
         certain = (pose, messages.EXACT_COVARIANCE)
         detections.append(
             {
@@ -165,20 +167,24 @@ def marked_detections(
     )
 
 
-def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
+def marked_boxes(
+    identities: Sequence[tuple[int, str]], numbers: np.ndarray
+) -> Any:
     """Returns a SceneUpdate message with the boxes of N objects.
 
     The message deletes all boxes that were sent before. The time stamps of the
     message are placeholders. The boxes are in the map frame W.
 
     Args:
-        who: instance id and class of each object.
+        identities: instance id and class of each object.
         numbers: (N, 10) position [m], orientation (x, y, z, w) and size [m] of
             each box.
     """
     stamp = messages.make_header(MAP_FRAME, _STAMP_MARK_NS).stamp
     entities = []
-    for (instance, semantic_class), row in zip(who, numbers, strict=True):
+    for (instance, semantic_class), row in zip(
+        identities, numbers, strict=True
+    ):
         color = (*_RGB.get(semantic_class, _OTHER_RGB), _OPACITY)
         entities.append(
             {
@@ -186,7 +192,7 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
                 "frame_id": MAP_FRAME,
                 "id": instance,
                 "metadata": [("class", semantic_class)],
-                "cubes": [(*_box(row), color)],
+                "cubes": [(*_box_fields(row), color)],
             }
         )
     return ros_types.make_message(
@@ -196,7 +202,7 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
     )
 
 
-def _box(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
+def _box_fields(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
     """Returns the fields of a box's pose, and its size."""
     return (numbers[:3], numbers[3:7]), numbers[7:]
 

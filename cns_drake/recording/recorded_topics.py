@@ -59,8 +59,9 @@ def recording_topics(
         if (layouts or {}).get(name, "cns") != "cns":
             topics.append(labels_topic(name))
     for name in camera_names:
-        topics += [image_topic(name, kind) for kind in ENCODINGS]
-        topics.append(camera_info_topic(name))
+        topics += [
+            camera_topic(name, kind) for kind in (*ENCODINGS, "camera_info")
+        ]
     topics += map(depth_info_topic, depth_camera_names)
     topics += [IMU_TOPIC] if with_imu else []
     topics += [ODOMETRY_TOPIC] if with_odometry else []
@@ -96,24 +97,22 @@ def make_calibration(
 
 
 def points_topic(lidar_name: str) -> Topic:
+    """Returns the topic of a LiDAR's points."""
     return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
 
 
 def labels_topic(lidar_name: str) -> Topic:
+    """Returns the topic of the labels of points that have another layout."""
     return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
 
 
-def image_topic(camera_name: str, kind: str) -> Topic:
-    return Topic(f"/{camera_name}/{kind}", IMAGE)
-
-
 def camera_topic(camera_name: str, kind: str) -> Topic:
-    """Returns the name and message type of a camera's topic.
+    """Returns a topic of a camera.
 
     Args:
         camera_name: name of the camera.
-        kind: what the topic carries: `image`, `depth`, `label` or
-            `camera_info`.
+        kind: what the topic carries: `image` (compressed), `color`, `depth`,
+            `label` or `camera_info`.
     """
     message_type = {
         "image": ros_types.COMPRESSED_IMAGE,
@@ -123,8 +122,5 @@ def camera_topic(camera_name: str, kind: str) -> Topic:
 
 
 def depth_info_topic(camera_name: str) -> Topic:
+    """Returns the topic of depth images' intrinsics, if they are their own."""
     return Topic(f"/{camera_name}/depth/camera_info", CAMERA_INFO)
-
-
-def camera_info_topic(camera_name: str) -> Topic:
-    return Topic(f"/{camera_name}/camera_info", CAMERA_INFO)

@@ -106,7 +106,7 @@ def repair_mcap(
         user_errors(part),
         open(part, "wb") as stream,
     ):
-        repair = _copy(read(size), stream, definitions, output)
+        repair = _write_repaired(read(size), stream, definitions, output)
     return repair
 
 
@@ -166,7 +166,7 @@ def _find_definitions(
     return _Definitions(header.profile if header else "", schemas, channels)
 
 
-def _copy(
+def _write_repaired(
     records: Iterable[McapRecord | Fault],
     stream: BinaryIO,
     definitions: _Definitions,

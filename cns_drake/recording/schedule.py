@@ -42,21 +42,21 @@ class Schedule:
     """The times of several streams of messages, as ticks of one clock.
 
     Attributes:
-        tick: time between ticks [s].
+        exact_period: time between ticks [s], as a fraction.
         steps: name of a stream -> number of ticks between two messages of the
             stream. The first message of every stream is due at tick 0.
         ends: name of a stream -> the last tick at which the stream can have a
             message. Streams without an entry have no end.
     """
 
-    tick: Fraction
+    exact_period: Fraction
     steps: Mapping[str, int]
     ends: Mapping[str, int]
 
     @property
     def period(self) -> float:
         """Time between ticks [s]."""
-        return float(self.tick)
+        return float(self.exact_period)
 
     def due(self, tick: int) -> list[str]:
         """Returns the names of the streams that have a message at a tick."""
@@ -83,7 +83,7 @@ class Schedule:
     def time_ns(self, tick: int) -> int:
         """Returns the time of a tick since the start [ns]."""
         # Integer arithmetic: fractions would take longer than a message.
-        numerator, denominator = self.tick.as_integer_ratio()
+        numerator, denominator = self.exact_period.as_integer_ratio()
         doubled = 2 * tick * numerator * _NS_PER_S + denominator
         return doubled // (2 * denominator)
 
@@ -102,14 +102,14 @@ def make_schedule(
         name: Fraction(period).limit_denominator(_FINEST)
         for name, period in periods.items()
     }
-    shared = math.lcm(*(period.denominator for period in exact.values()))
-    ticks = math.gcd(*(int(period * shared) for period in exact.values()))
-    tick = Fraction(ticks, shared)
+    shared = math.lcm(*(own.denominator for own in exact.values()))
+    ticks = math.gcd(*(int(own * shared) for own in exact.values()))
+    period = Fraction(ticks, shared)
     return Schedule(
-        tick,
-        {name: int(period / tick) for name, period in exact.items()},
+        period,
+        {name: int(own / period) for name, own in exact.items()},
         {
-            name: round(Fraction(time).limit_denominator(_FINEST) / tick)
+            name: round(Fraction(time).limit_denominator(_FINEST) / period)
             for name, time in (until or {}).items()
         },
     )

@@ -64,14 +64,8 @@ def plan_recording(scenario: Scenario) -> RecordingPlan:
         for name, sensor in scenario.further_sensors.items()
     }
     for name, camera in scenario.cameras.items():
-        for kind, is_there in (
-            ("image", True),
-            ("depth", camera.depth),
-            ("label", camera.label),
-            ("camera_info", True),
-        ):
-            if is_there:
-                further[camera_topic(name, kind)] = camera.rate
+        for kind in camera.streams:
+            further[camera_topic(name, kind)] = camera.rate
     topics = recording_topics(
         scenario.lidars,
         layouts=layouts,

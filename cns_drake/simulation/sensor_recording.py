@@ -15,9 +15,8 @@ from cns_drake.recording.recorded_topics import (
     IMU_TOPIC,
     ODOMETRY_TOPIC,
     TF_TOPIC,
-    camera_info_topic,
+    camera_topic,
     depth_info_topic,
-    image_topic,
     make_calibration,
     points_topic,
     recording_topics,
@@ -105,8 +104,12 @@ def add_mcap_recorder(
     names = [*(lidar.get_name() for lidar in lidars), *cameras]
     for k, one in enumerate(names):
         check_sensor_name(one, names[:k])
-    X_BSs = {lidar.get_name(): _place_of(lidar, odometry) for lidar in lidars}
-    recorded = {key: _describe(camera) for key, camera in cameras.items()}
+    X_BSs = {
+        lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
+    }
+    recorded = {
+        key: _recorded_camera(camera) for key, camera in cameras.items()
+    }
     X_BI = None
     if imu is not None and odometry is not None:
         X_BI = odometry.place_of(
@@ -139,7 +142,8 @@ def add_mcap_recorder(
             X_BI=X_BI,
             cameras=recorded,
             schedule=_make_schedule(
-                _periods(period, rates or {}, lidars, cameras, imu), topics
+                _message_periods(period, rates or {}, lidars, cameras, imu),
+                topics,
             ),
             imu_variances=variances,
             start_ns=start_ns,
@@ -178,7 +182,7 @@ def connect_by_name(
             builder.Connect(port, recorder.GetInputPort(key))
 
 
-def _periods(
+def _message_periods(
     period: float | None,
     rates: Mapping[str, float],
     lidars: Collection[Lidar],
@@ -216,9 +220,8 @@ def _make_schedule(
     sensor_of = {IMU_TOPIC: "imu", ODOMETRY_TOPIC: "odometry"}
     for name in periods:
         sensor_of[points_topic(name)] = name
-        for kind in ENCODINGS:
-            sensor_of[image_topic(name, kind)] = name
-        sensor_of[camera_info_topic(name)] = name
+        for kind in (*ENCODINGS, "camera_info"):
+            sensor_of[camera_topic(name, kind)] = name
         sensor_of[depth_info_topic(name)] = name
     # `/tf` has all moving frames, at the highest rate of any of them.
     moving = min(period for name, period in periods.items() if name != "imu")
@@ -233,17 +236,21 @@ def _make_schedule(
     )
 
 
-def _place_of(
+def _pose_at_odometry(
     lidar: Lidar, odometry: OdometrySensor | None
 ) -> RigidTransform | None:
-    """Returns X_BS if the LiDAR is on the body of the odometry."""
+    """Returns X_BS if the LiDAR is on the odometry's body, or else None."""
     if odometry is None or odometry.frame_id != lidar.parent_frame_id:
         return None
     return odometry.X_PB.inverse() @ lidar.X_PB
 
 
-def _describe(camera: RgbdSensor) -> RecordedCamera:
-    """Returns the intrinsics and poses of colour (and label) and of depth."""
+def _recorded_camera(camera: RgbdSensor) -> RecordedCamera:
+    """Returns how a camera is recorded: its intrinsics and its pose.
+
+    Intrinsics and pose are those of colour and label images. Depth images have
+    their own only if they differ.
+    """
     color, depth = (
         RecordedCamera(core.intrinsics(), core.sensor_pose_in_camera_body())
         for core in (
@@ -251,13 +258,13 @@ def _describe(camera: RgbdSensor) -> RecordedCamera:
             camera.default_depth_render_camera().core(),
         )
     )
-    if _image_geometry(color) == _image_geometry(depth):
+    if _projection(color) == _projection(depth):
         return color
     return color._replace(depth=depth)
 
 
-def _image_geometry(camera: RecordedCamera) -> tuple:
-    """Returns size, intrinsics and pose: equal if two images coincide."""
+def _projection(camera: RecordedCamera) -> tuple:
+    """Returns size, intrinsics and pose, which are equal for equal images."""
     info = camera.info
     return (
         info.width(),

@@ -39,6 +39,13 @@ class CameraSection(Section):
     depth: bool = False
     label: bool = False
 
+    @property
+    def streams(self) -> tuple[str, ...]:
+        """What is recorded: `image`, `depth`, `label` and `camera_info`."""
+        depth = ("depth",) if self.depth else ()
+        label = ("label",) if self.label else ()
+        return ("image", *depth, *label, "camera_info")
+
     @model_validator(mode="before")
     @classmethod
     def _read_radians(cls, values: Any) -> Any:
