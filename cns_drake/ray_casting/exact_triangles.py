@@ -9,7 +9,6 @@ notes on the LiDAR.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import inv
@@ -17,16 +16,13 @@ from pydrake.math import inv
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits
+from cns_drake.ray_casting.triangle_tree import (
+    MOST_DEPTH,
+    TriangleTree,
+    make_tree,
+)
 from cns_drake.scene.surfaces import TriangleSurface, merge_triangles
 
-# Greatest number of triangles in a leaf.
-_LEAF_SIZE = 4
-# Boxes are this much wider than the triangles on each side [m].
-_BOX_MARGIN = 1e-6
-# Number of planes, plus one, at which dividing a node is considered.
-_BINS = 16
-# Depth of nodes from which on they are halved, so that stacks suffice.
-_DEEPEST = 100
 # Tolerance of a hit beside an edge, as a share of the triangle's size. With it,
 # no ray passes between two triangles that share an edge.
 _EDGE_TOLERANCE = 1e-9
@@ -34,27 +30,6 @@ _EDGE_TOLERANCE = 1e-9
 _ROUNDING_TOLERANCE = 1e-14
 # Greatest error of a hit by rounding, as a share of the triangle's size.
 _PARALLEL = 1e-3
-
-
-class _Tree(NamedTuple):
-    """The T triangles of a group, and boxes around them.
-
-    Attributes:
-        corners: (T, 3, 3) corners of each triangle in the group's frame L [m],
-            sorted by leaves.
-        owners: (T,) the group's member to which each belongs.
-        boxes: (K, 2, 3) least and greatest coordinates of each node [m]; node 0
-            contains all.
-        begins: (K,) first triangle of a leaf, or first of the two children of
-            another node.
-        counts: (K,) number of triangles of a leaf, 0 for other nodes.
-    """
-
-    corners: np.ndarray
-    owners: np.ndarray
-    boxes: np.ndarray
-    begins: np.ndarray
-    counts: np.ndarray
 
 
 class ExactTriangles:
@@ -67,7 +42,7 @@ class ExactTriangles:
             groups: the groups, already placed (see `RayGroup.place`). Each cast
                 takes their current poses and motions.
         """
-        by_content: dict[tuple, _Tree] = {}
+        by_content: dict[tuple, TriangleTree] = {}
         self._found = []
         for row, group in enumerate(groups):
             flat = [
@@ -78,7 +53,7 @@ class ExactTriangles:
             if flat:
                 content = group.content()
                 if content not in by_content:
-                    by_content[content] = _make_tree(*merge_triangles(flat))
+                    by_content[content] = make_tree(*merge_triangles(flat))
                 indices = np.array([index for index, *_ in group.members])
                 self._found.append((row, group, by_content[content], indices))
 
@@ -111,147 +86,6 @@ class ExactTriangles:
             )
 
 
-def _make_tree(surface: TriangleSurface, owners: np.ndarray) -> _Tree:
-    """Returns the tree of a surface's triangles.
-
-    Nodes are divided by the surface area heuristic (Wald 2007, with bins).
-    """
-    corners = surface.p_GVset[surface.triangles].astype(float)
-    low, high = (
-        corners.min(axis=1) - _BOX_MARGIN,
-        corners.max(axis=1) + _BOX_MARGIN,
-    )
-    order = np.arange(len(corners))
-    boxes = np.empty((2 * len(corners), 2, 3))
-    begins = np.empty(2 * len(corners), np.int64)
-    counts = np.empty(2 * len(corners), np.int64)
-    size = _divide(low, high, order, boxes, begins, counts)
-    return _Tree(
-        corners[order],
-        owners[order].astype(np.int64),
-        boxes[:size].copy(),
-        begins[:size].copy(),
-        counts[:size].copy(),
-    )
-
-
-@compiled
-def _half_area(box: np.ndarray) -> float:
-    """Returns half the surface area of a box, 0 for an empty one."""
-    x, y, z = (
-        box[1, 0] - box[0, 0],
-        box[1, 1] - box[0, 1],
-        box[1, 2] - box[0, 2],
-    )
-    return x * y + y * z + z * x if x >= 0.0 else 0.0
-
-
-@compiled
-def _widen(box: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    for i in range(3):
-        box[0, i] = min(box[0, i], low[i])
-        box[1, i] = max(box[1, i], high[i])
-
-
-@compiled
-def _empty(box: np.ndarray) -> None:
-    for i in range(3):
-        box[0, i], box[1, i] = np.inf, -np.inf
-
-
-@compiled
-def _divide(
-    low: np.ndarray,
-    high: np.ndarray,
-    order: np.ndarray,
-    boxes: np.ndarray,
-    begins: np.ndarray,
-    counts: np.ndarray,
-) -> int:
-    """Fills the nodes of a tree, and sorts `order`; returns their number.
-
-    Every node is divided where the expected cost of a ray is least, among
-    planes across the widest axis of its triangles' middles. The function is
-    compiled, because a city has a million nodes.
-    """
-    bins = np.empty((_BINS, 2, 3))
-    in_bin = np.empty(_BINS, np.int64)
-    behind, side = np.empty(_BINS), np.empty((2, 3))
-    pending = np.empty((2 * _DEEPEST, 3), np.int64)
-    pending[0, 0], pending[0, 1], pending[0, 2] = 0, 0, len(order)
-    waiting = 1
-    size = 1
-    while waiting:
-        waiting -= 1
-        node, begin = pending[waiting, 0], pending[waiting, 1]
-        end = pending[waiting, 2]
-        _empty(boxes[node])
-        _empty(side)
-        for k in range(begin, end):
-            one = order[k]
-            _widen(boxes[node], low[one], high[one])
-            for i in range(3):
-                middle = low[one, i] + high[one, i]
-                side[0, i] = min(side[0, i], middle)
-                side[1, i] = max(side[1, i], middle)
-        begins[node], counts[node] = begin, end - begin
-        if end - begin <= _LEAF_SIZE:
-            continue
-        axis = 0
-        for i in range(1, 3):
-            if side[1, i] - side[0, i] > side[1, axis] - side[0, axis]:
-                axis = i
-        start = side[0, axis]
-        width = side[1, axis] - side[0, axis]
-        split = begin
-        if width > 0.0:
-            scale = _BINS * (1.0 - 1e-9) / width
-            for k in range(_BINS):
-                _empty(bins[k])
-                in_bin[k] = 0
-            for k in range(begin, end):
-                one = order[k]
-                place = int(scale * (low[one, axis] + high[one, axis] - start))
-                _widen(bins[place], low[one], high[one])
-                in_bin[place] += 1
-            _empty(side)
-            number = 0
-            for k in range(_BINS - 1, 0, -1):
-                _widen(side, bins[k, 0], bins[k, 1])
-                number += in_bin[k]
-                behind[k] = number * _half_area(side)
-            _empty(side)
-            number = 0
-            least = np.inf
-            best = 1
-            for k in range(1, _BINS):
-                _widen(side, bins[k - 1, 0], bins[k - 1, 1])
-                number += in_bin[k - 1]
-                cost = number * _half_area(side) + behind[k]
-                if cost < least:
-                    least, best = cost, k
-            other = end
-            while split < other:
-                one = order[split]
-                place = int(scale * (low[one, axis] + high[one, axis] - start))
-                if place < best:
-                    split += 1
-                else:
-                    other -= 1
-                    order[split], order[other] = order[other], one
-        # Halves, if all middles are the same, or nodes would be too deep.
-        if split in (begin, end) or waiting > _DEEPEST:
-            split = (begin + end) // 2
-        begins[node], counts[node] = size, 0
-        for k in range(2):
-            pending[waiting, 0] = size + k
-            pending[waiting, 1] = split if k else begin
-            pending[waiting, 2] = end if k else split
-            waiting += 1
-        size += 2
-    return size
-
-
 @compiled
 def _entry_distance(
     boxes: np.ndarray, node: int, p: np.ndarray, r: np.ndarray, limit: float
@@ -277,7 +111,7 @@ def _entry_distance(
 
 @compiled
 def _cast(
-    tree: _Tree,
+    tree: TriangleTree,
     R_LO: np.ndarray,
     p_OL: np.ndarray,
     row: int,
@@ -295,7 +129,7 @@ def _cast(
     corners, boxes = tree.corners, tree.boxes
     p, d, r, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     a, b, s = np.empty(3), np.empty(3), np.empty(3)
-    stack = np.empty(2 * _DEEPEST, np.int64)
+    stack = np.empty(2 * MOST_DEPTH, np.int64)
     begins, counts = tree.begins, tree.counts
     for ray in range(len(p_Oset)):
         for i in range(3):
