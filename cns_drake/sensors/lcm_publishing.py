@@ -150,10 +150,12 @@ class SignalToLcm(framework.LeafSystem):
             else:
                 self.DeclareAbstractInputPort(f"u{index}", port.Allocate())
         self.DeclareAbstractOutputPort(
-            "lcmt_drake_signal", lambda: Value(lcmt_drake_signal()), self._calc
+            "lcmt_drake_signal",
+            lambda: Value(lcmt_drake_signal()),
+            self._calc_message,
         )
 
-    def _calc(self, context: Context, output: AbstractValue) -> None:
+    def _calc_message(self, context: Context, output: AbstractValue) -> None:
         inputs = [
             self.get_input_port(index).Eval(context)
             for index in range(self.num_input_ports())

@@ -80,53 +80,83 @@ def add_cameras(
         that supplies the images, and a description of how they are recorded.
         Connect the output port to the recorder's input port of the same name.
     """
-    found = {}
     # Drake warns that 16-bit depth images end at 65 m; no such images are
     # recorded.
     logging.getLogger("drake").addFilter(_is_worth_telling)
+    streams = {}
     for name, config in cameras.items():
         info = CameraInfo(
             config.width, config.height, math.radians(config.fov_y_deg)
         )
-        clipping = ClippingRange(_NEAR, _FAR)
-        core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
         X_BC = optical_pose(config)
-        eyes = {}
-        for kind, scene_graph in scene.scene_graphs.items():
-            # The names cannot clash: no name in a scenario has a minus sign.
-            eyes[kind] = builder.AddNamedSystem(
-                f"{name}-{kind}",
-                RgbdSensor(
-                    scene.frames[base],
-                    X_BC,
-                    ColorRenderCamera(core),
-                    DepthRenderCamera(core, DepthRange(2 * _NEAR, _DEEPEST)),
-                ),
-            )
-            builder.Connect(
-                scene_graph.get_query_output_port(),
-                eyes[kind].query_object_input_port(),
-            )
-        sky = builder.AddNamedSystem(f"{name}-sky", SkyPainter(info))
-        for port in (
-            eyes["colours"].color_image_output_port(),
-            eyes["colours"].body_pose_in_world_output_port(),
-        ):
-            builder.Connect(port, sky.GetInputPort(port.get_name()))
-        color = sky.get_output_port(), ImageRgba8U()
-        ports = {"image": color, "camera_info": color}
+        sensors = _add_sensors(builder, scene, base, name, info, X_BC)
+        color = _add_sky(builder, name, info, sensors["colours"])
+        # Kind of stream -> the port of its images, and an image.
+        ports = {
+            "image": (color, ImageRgba8U()),
+            "camera_info": (color, ImageRgba8U()),
+        }
         if config.depth:
-            depth = eyes["classes"].depth_image_32F_output_port()
+            depth = sensors["classes"].depth_image_32F_output_port()
             ports["depth"] = depth, ImageDepth32F()
         if config.label:
-            label = eyes["classes"].label_image_output_port()
+            label = sensors["classes"].label_image_output_port()
             ports["label"] = label, ImageLabel16I()
         make = _message_makers(info)
         for kind, (port, example) in ports.items():
             topic = camera_topic(name, kind)
             recorded = RecordedSensor(topic, X_BC, make[kind], name, example)
-            found[f"{name}_{kind}"] = port, recorded
-    return found
+            streams[f"{name}_{kind}"] = port, recorded
+    return streams
+
+
+def _add_sensors(
+    builder: DiagramBuilder,
+    scene: CameraScene,
+    base: FrameId,
+    name: str,
+    info: CameraInfo,
+    X_BC: RigidTransform,
+) -> dict[str, RgbdSensor]:
+    """Adds a camera's sensor for each copy of the scene.
+
+    For the arguments, see `add_cameras`; X_BC is the camera's optical pose.
+
+    Returns:
+        Kind of the copy, see `CameraScene` -> the sensor.
+    """
+    clipping = ClippingRange(_NEAR, _FAR)
+    core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
+    sensors = {}
+    for kind, scene_graph in scene.scene_graphs.items():
+        # The names cannot clash: no name in a scenario has a minus sign.
+        sensors[kind] = builder.AddNamedSystem(
+            f"{name}-{kind}",
+            RgbdSensor(
+                scene.frames[base],
+                X_BC,
+                ColorRenderCamera(core),
+                DepthRenderCamera(core, DepthRange(2 * _NEAR, _DEEPEST)),
+            ),
+        )
+        builder.Connect(
+            scene_graph.get_query_output_port(),
+            sensors[kind].query_object_input_port(),
+        )
+    return sensors
+
+
+def _add_sky(
+    builder: DiagramBuilder, name: str, info: CameraInfo, sensor: RgbdSensor
+) -> OutputPort:
+    """Adds the sky to a camera's colour images; returns the port of these."""
+    painter = builder.AddNamedSystem(f"{name}-sky", SkyPainter(info))
+    for port in (
+        sensor.color_image_output_port(),
+        sensor.body_pose_in_world_output_port(),
+    ):
+        builder.Connect(port, painter.GetInputPort(port.get_name()))
+    return painter.get_output_port()
 
 
 def _is_worth_telling(record: logging.LogRecord) -> bool:
