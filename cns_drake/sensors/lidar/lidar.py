@@ -115,15 +115,18 @@ class Lidar(LeafSystem):
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject, casts rays on a hierarchy of its own, and rebuilds the parts of
-    this hierarchy that have changed. `geometry` (from `geometry_port`) lists
-    the geometry, and is computed only after a change. Without this port, the
-    LiDAR lists all geometry at every scan, which in a world of thousands of
-    geometries takes longer than the scan.
+    this hierarchy that have changed. `geometry` lists the geometry; the output
+    port of `geometry_port` computes this list only after a change. If
+    `geometry` is not connected, the LiDAR lists all geometry at every scan. In
+    a world of thousands of geometries, this takes longer than the scan.
 
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
         X_PB: the pose of the LiDAR in P, named as in Drake's RgbdSensor.
         pattern: the beams of a revolution.
+        role: the role of the geometry that the LiDAR sees.
+        causal: whether a scan is the revolution that ends at the time of the
+            output.
 
     Example:
         from cns_drake import Lidar, make_beam_pattern
@@ -157,18 +160,19 @@ class Lidar(LeafSystem):
             returns: the model of a real unit; None for ideal returns. With a
                 model, only the resolution is taken from `measurement`.
             moving_bodies: frame -> index of its body in the port
-                `body_spatial_velocities`, which only a LiDAR with this has.
-            role: role of the geometry that it sees.
-            unseen: frames and geometries that it does not see; by default
-                P, unless that is the world's frame.
+                `body_spatial_velocities`. The LiDAR has this port only if this
+                argument is given.
+            role: role of the geometry that the LiDAR sees.
+            unseen: frames and geometries that the LiDAR does not see; by
+                default P, unless P is the frame of the world.
             structures: table of the structures' labels and instance ids. By
-                default, structures have no class, and ids in alphabetical
-                order.
-            anchored_frames: frames that never move, besides the world's; their
-                geometry is cheaper to cast on. If such a frame moves after all,
-                all static geometry is rebuilt.
-            num_threads: number of threads that share its rays; the measurement
-                does not depend on it.
+                default, structures have no class, and their ids follow the
+                alphabetical order of their names.
+            anchored_frames: frames that never move, besides the frame of the
+                world; rays are cast faster on their geometry. If such a frame
+                moves after all, all static geometry is rebuilt.
+            num_threads: number of threads that share the rays; the measurement
+                does not depend on this number.
             causal: whether a scan is the revolution that ends at the time of
                 the output; by default the revolution starts at that time.
 
@@ -402,11 +406,11 @@ class Lidar(LeafSystem):
     def _check_context(self, context: Context) -> None:
         """Checks that a Context is the one of this LiDAR.
 
-        With any other Context, the cache entries of another system would be
-        read, or memory that does not exist.
+        With another Context, Drake would read the cache entries of another
+        system, or invalid memory.
 
         Raises:
-            RuntimeError: it is not.
+            RuntimeError: the Context does not belong to this LiDAR.
         """
         try:
             self.ValidateContext(context)
@@ -582,7 +586,7 @@ def _check_role(role: Role) -> None:
     """Checks that a role is a role of geometry.
 
     Raises:
-        TypeError: it is not.
+        TypeError: the role is another object.
     """
     if not isinstance(role, Role) or role == Role.kUnassigned:
         raise TypeError(

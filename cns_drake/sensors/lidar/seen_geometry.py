@@ -47,11 +47,11 @@ class GeometryView:
     Attributes:
         parent_frame_id: the frame P that carries the LiDAR.
         role: role of the geometry that is seen.
-        unseen: frames and geometries that are not seen; None for P, unless that
-            is the world's frame.
+        unseen: frames and geometries that are not seen; None for P, unless P is
+            the frame of the world.
         structures: table of the structures' labels and instance ids; None for
             ids in alphabetical order.
-        anchored_frames: frames that never move, besides the world's.
+        anchored_frames: frames that never move, besides the frame of the world.
         num_threads: number of threads that share the rays.
     """
 
@@ -110,8 +110,7 @@ class SeenGeometry:
             records: all geometry with the LiDAR's role; if None, this function
                 lists the geometry.
             motions: motions of frames that move during the revolution.
-            known: poses of frames that are known, so that the SceneGraph need
-                not be queried.
+            known: known poses, for which the SceneGraph is not queried.
             seen: the ball within which beams can hit geometry.
             p_WS: the position of the sensor in the world, (3,) [m].
 
@@ -160,7 +159,7 @@ class SeenGeometry:
         return self._materials
 
     def _read(self, records: GeometryList, world: FrameId) -> None:
-        """Reads the geometry that is seen, out of a list of all geometry."""
+        """Reads the geometry that is seen, from a list of all geometry."""
         unseen = self._view.unseen
         if unseen is None:
             unseen = frozenset([self._view.parent_frame_id]) - {world}
