@@ -248,13 +248,14 @@ def scan(
             make_pattern,
             make_returns,
         )
-        from cns_drake.simulation import scanning
+        from cns_drake.simulation.scan_files import check_ending, save_scan
+        from cns_drake.simulation.scanning import scan_world
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
-    scanning.check_ending(output)
+    check_ending(output)
     check_writable(output)
     config = make_lidar_config(lidar)
     pattern = make_pattern(config)
@@ -267,8 +268,8 @@ def scan(
     config = config.replaced(returns=chosen or "ideal")
     model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
     doing("casting rays")
-    points = scanning.scan_world(loaded, X_WS, pattern, model)
-    scanning.save_scan(points, output)
+    points = scan_world(loaded, X_WS, pattern, model)
+    save_scan(points, output)
     show(
         {"output": str(output), "points": len(points)},
         f"{output}: {len(points)} points",

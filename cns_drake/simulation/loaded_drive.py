@@ -57,6 +57,20 @@ class LoadedDrive:
         return self.scenario.frames
 
     @property
+    def structures(self) -> list[dict]:
+        """A description of each structure of the world, ready for JSON."""
+        return [
+            {
+                "instance": entry.instance,
+                "name": entry.name,
+                "class": entry.semantic_class,
+                "label": entry.label,
+                **({"causes": list(entry.causes)} if entry.causes else {}),
+            }
+            for entry in self.world.structures
+        ]
+
+    @property
     def base_link(self) -> RigidBody:
         """The vehicle's body B."""
         return self.world.plant.GetBodyByName(BASE_FRAME, self.world.vehicle)
@@ -97,17 +111,3 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         world,
         traffic,
     )
-
-
-def structure_list(world: World) -> list[dict]:
-    """Returns a description of each structure of a world, ready for JSON."""
-    return [
-        {
-            "instance": entry.instance,
-            "name": entry.name,
-            "class": entry.semantic_class,
-            "label": entry.label,
-            **({"causes": list(entry.causes)} if entry.causes else {}),
-        }
-        for entry in world.structures
-    ]

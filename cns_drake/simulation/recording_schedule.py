@@ -85,10 +85,10 @@ def plan_recording(scenario: Scenario) -> RecordingPlan:
         rates[points_topic(name).name] = lidar.rate
         if lidar.layout != "cns":
             rates[labels_topic(name).name] = lidar.rate
-    return RecordingPlan(topics, _schedule(scenario, rates), layouts)
+    return RecordingPlan(topics, _topic_schedule(scenario, rates), layouts)
 
 
-def _schedule(scenario: Scenario, rates: dict[str, int]) -> Schedule:
+def _topic_schedule(scenario: Scenario, rates: dict[str, int]) -> Schedule:
     """Returns the schedule of topics, given their messages per second."""
     periods = {name: 1.0 / rate for name, rate in rates.items()}
     assert scenario.frames is not None

@@ -1,18 +1,11 @@
 """A single scan of any SDF world from any pose."""
 
-import io
-from pathlib import Path
-
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.base.complete_files import completing
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder
-from cns_drake.base.points import encode_bin, encode_pcd, to_xyzi
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar.adding import connect_lidar
@@ -55,48 +48,6 @@ def still_scene(
     """
     lidar, context = _stationary_lidar(world, X_WS, pattern)
     return lidar.EvalScene(context)
-
-
-def check_ending(path: Path) -> None:
-    """Checks that `save_scan` knows the format of a file from its ending.
-
-    Raises:
-        InputError: the ending is not .pcd, .bin or .npy.
-    """
-    if path.suffix not in _ENCODERS:
-        raise InputError(
-            f"{path}: unknown ending '{path.suffix}'; use one of "
-            f"{', '.join(_ENCODERS)}"
-        )
-
-
-def save_scan(scan: np.ndarray, path: Path) -> None:
-    """Saves x, y, z and intensity of a scan to a file.
-
-    The ending of the file name sets the format: `.bin` is KITTI's (float32 x y
-    z intensity), `.npy` an array (N, 4) of the same numbers, `.pcd` a binary
-    PCD file.
-
-    Args:
-        scan: structured array (N,) with these four fields.
-        path: the file.
-
-    Raises:
-        InputError: the file has another ending or cannot be written.
-    """
-    check_ending(path)
-    make_folder(path.parent)
-    with completing(path) as part:
-        part.write_bytes(_ENCODERS[path.suffix](scan))
-
-
-def _encode_npy(scan: np.ndarray) -> bytes:
-    stream = io.BytesIO()
-    np.save(stream, to_xyzi(scan))
-    return stream.getvalue()
-
-
-_ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}
 
 
 def _stationary_lidar(

@@ -31,7 +31,7 @@ from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scene.world import structures_in
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.sensors.lidar.beams import BeamPattern
-from cns_drake.simulation.loaded_drive import load_drive, structure_list
+from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.station import make_station
 
 
@@ -90,7 +90,7 @@ class SimulatedDrive(Drive):
         self.X_BS = sensor_pose(next(iter(scenario.lidars.values())))
         self._scenario = scenario
         self._num_frames = drive.num_frames
-        self._instances = index_instances(structure_list(world), self.name)
+        self._instances = index_instances(drive.structures, self.name)
         self.structures = structures_in(world)
         doing("building the diagram")
         self._diagram = make_station(drive)

@@ -36,7 +36,6 @@ from cns_drake.sensors.lidar.config import describe_unit
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
-    structure_list,
 )
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
@@ -216,7 +215,7 @@ def _make_bag(
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
-            "structures.json": structure_list(drive.world),
+            "structures.json": drive.structures,
             "calibration.json": make_calibration(
                 drive.X_BSs
                 | {

@@ -34,7 +34,8 @@ from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import make_pattern
 from cns_drake.sensors.lidar.presets import make_beam_pattern
-from cns_drake.simulation.scanning import save_scan, scan_world
+from cns_drake.simulation.scan_files import save_scan
+from cns_drake.simulation.scanning import scan_world
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.conditions import conditions
 from cns_drake.studies.experiment_files import load_experiment
