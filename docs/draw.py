@@ -54,18 +54,20 @@ from evaluation.methods.layered_overlap import (
     LayeredOverlapConfig,
 )
 from evaluation.report import point_rendering
-from evaluation.results import charts, summaries
-from evaluation.results.drawing import (
+from evaluation.results.charts.kinds import draw_chart
+from evaluation.results.figure_text import name_lines
+from evaluation.results.headlines import SURVIVES, listed, survivors
+from evaluation.results.keys import OWN, STAGE
+from evaluation.results.ranking import rank_methods
+from evaluation.results.styles import (
     GONE,
     INK,
     METHOD_STYLES,
     NEW,
     PALE,
-    name_lines,
     unit_rgb,
 )
-from evaluation.results.headlines import SURVIVES, listed, survivors
-from evaluation.results.table import OWN, STAGE, Results, Row
+from evaluation.results.table import Results, Row
 from evaluation.results.table_forms import title
 
 # The methods that this project made; all others are published ones.
@@ -143,7 +145,7 @@ def survival(path: Path) -> str:
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
-    ranked = {gate: summaries.ranking(rows[gate])[0] for gate in rows}
+    ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
     order = [one.method for one in ranked[False]][::-1]
     figure = Figure(figsize=(_WIDTH, 5.4), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -298,7 +300,7 @@ def ranking(path: Path) -> None:
             found.setdefault(place, []).append(row)
     radii = sorted({radius for *_, radius in found})
     every = [row for rows in found.values() for row in rows]
-    order = [one.method for one in summaries.ranking(every)[0]]
+    order = [one.method for one in rank_methods(every)[0]]
     figure = Figure(figsize=(_WIDTH, 13.6), layout="constrained")
     blocks = list(itertools.product(metrics, gates))
     parts = figure.subfigures(len(blocks), 1)
@@ -310,7 +312,7 @@ def ranking(path: Path) -> None:
         for axes, radius in zip(panels, radii, strict=True):
             for k, (kind, look) in enumerate(kinds.items()):
                 rows = found.get((metric, gate, kind, radius), [])
-                for one in summaries.ranking(rows)[0] if rows else ():
+                for one in rank_methods(rows)[0] if rows else ():
                     y = order.index(one.method) + 0.25 * (k - 1)
                     colour = METHOD_STYLES[one.method][0]
                     ends = [one.interval.low, one.interval.high]
@@ -443,7 +445,7 @@ def upkeep(
                 row = _realisation(line)
                 of_condition.setdefault(line["condition"], []).append(row)
         found = {
-            condition: summaries.ranking(rows)[0]
+            condition: rank_methods(rows)[0]
             for condition, rows in of_condition.items()
         }
         measured = {one.method for some in found.values() for one in some}
@@ -503,7 +505,7 @@ def ladder(path: Path) -> None:
     """Draws the ladder of Suburbia."""
     results = Results.read(ROOT / "docs/notes/ladder_suburbia.csv")
     chart = {"kind": "matrix", "over": "cause", "metric": "kept"}
-    drawn = charts.draw(chart, results, 480)
+    drawn = draw_chart(chart, results, 480)
     _head(drawn.figure, "Weather, lateral offset\nand sensor cost most")
     drawn.figure.savefig(path, dpi=220)
 

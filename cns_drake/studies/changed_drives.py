@@ -28,7 +28,7 @@ from cns_drake.studies.viewpoints import (
     with_lidars_moved,
 )
 from cns_drake.traffic.vehicles import room_for_vehicles
-from evaluation.results.table import LAST, OWN
+from evaluation.results.keys import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.
 _UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")

@@ -31,8 +31,8 @@ from cns_drake.studies.viewpoints import VIEWPOINTS, with_lidars_beside
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import CAUSE, OWN
-from evaluation.study.tasks.task import USUAL_LENGTH
+from evaluation.results.keys import CAUSE, OWN
+from evaluation.study.tasks.pair import USUAL_LENGTH
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from cns_drake.studies.nested_fields import (
     nested,
     set_field,
 )
-from evaluation.results.table import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
+from evaluation.results.keys import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
 
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")

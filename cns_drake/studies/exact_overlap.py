@@ -26,7 +26,7 @@ from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.drives import Drive, check_same_world
-from evaluation.drives.sampling import within_range
+from evaluation.drives.scan_clouds import within_range
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE

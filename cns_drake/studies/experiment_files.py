@@ -16,7 +16,7 @@ from cns_drake.studies.conditions import conditions
 from cns_drake.studies.experiment import Experiment, in_long_form
 from cns_drake.studies.method_variants import method_variants
 from cns_drake.studies.nested_fields import Changes, merged, nested
-from evaluation.results.table import FROZEN_REDRAW
+from evaluation.results.keys import FROZEN_REDRAW
 
 _FOLDER = Path(__file__).with_name("experiments")
 

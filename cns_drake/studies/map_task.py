@@ -9,13 +9,14 @@ from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies import map_truth
 from evaluation.map_update.baselines import BASELINES
 from evaluation.study.sources import RecordingSource
+from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.map_scores import (
     TRUTH,
     MapScores,
     MapTask,
     score_methods,
 )
-from evaluation.study.tasks.task import Jobs, Pair, Result
+from evaluation.study.tasks.pair import Pair, Result
 
 _COST = 60.0
 

@@ -66,7 +66,7 @@ from evaluation.map_update.structures import (
     structure_changes,
     write_structures,
 )
-from evaluation.results.drawing import GONE, NEW
+from evaluation.results.styles import GONE, NEW
 from evaluation.study.sources import DriveSource, RecordingSource
 
 # A surface this near to a point is its own [m].

@@ -31,7 +31,8 @@ from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
 from cns_drake.transient.ground_surface import GROUND_CLASSES
-from evaluation.drives.sampling import gather, sample_frames
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.overlap_truth import (
     compared_frames,
@@ -215,7 +216,7 @@ def export_run(
         if options.format == "overlap":
             data = encode_bin(drive.scan(int(frame)))
         else:
-            cloud = gather(
+            cloud = cloud_at(
                 drive,
                 int(frame),
                 options.scans,

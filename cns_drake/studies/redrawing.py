@@ -35,7 +35,7 @@ from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
 from cns_drake.studies.map_step import MakeMap, make_maps
-from evaluation.results.table import FROZEN_REDRAW
+from evaluation.results.keys import FROZEN_REDRAW
 
 # Start of the first line of each input that is written here.
 _MARK = "# Of a city drawn anew by cns-drake"

@@ -27,7 +27,7 @@ from cns_drake.studies.recording import (
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.collection import RecordingInfo
+from evaluation.study.map_drives import RecordingInfo
 from evaluation.study.stages_report import StagesReport
 
 # Mean size of a page.

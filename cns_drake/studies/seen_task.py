@@ -23,15 +23,9 @@ from cns_drake.studies.map_upkeep import UpkeptSource
 from evaluation.drives.sampling import sample_frames
 from evaluation.recognition.result_number import Number
 from evaluation.study.sources import DriveSource
-from evaluation.study.tasks.task import (
-    OPENING_COST,
-    SCAN_COST,
-    Jobs,
-    Pair,
-    Result,
-    Task,
-    positive,
-)
+from evaluation.study.tasks.jobs import OPENING_COST, SCAN_COST, Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Task, check_positive
 
 # Events in which a structure appears under its own name; in all others, the
 # successor appears.
@@ -136,7 +130,7 @@ class SeenTask(Task):
     defaults: ClassVar[Mapping[str, Any]] = {"spacing": 5.0}
 
     def check(self, name: str, value: Any, where: str) -> None:
-        positive(value, where)
+        check_positive(value, where)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if not pair.ages:

@@ -19,11 +19,12 @@ from cns_drake.studies.named_stages import MissingError
 from cns_drake.studies.protocol_fields import condition_protocol
 from cns_drake.studies.recording import is_recorded
 from evaluation.map_update.upkeep import NOT_MAINTAINED
-from evaluation.results.table import CAUSE
+from evaluation.results.keys import CAUSE
 from evaluation.study.parts import MakePart
 from evaluation.study.sources import RecordingSource
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import OPENING_COST, NamedDrive, Pair, job_name
+from evaluation.study.tasks.jobs import OPENING_COST, job_name
+from evaluation.study.tasks.pair import NamedDrive, Pair
 
 # Expected time to update a map by a usual drive, once it is open [s].
 _UPKEEP_COST = 60.0

@@ -34,30 +34,20 @@ from cns_drake.studies.recorded_conditions import recorded_conditions
 from cns_drake.studies.seen_task import SeenTask
 from cns_drake.studies.simulated_pairs import SimulatedPairs
 from cns_drake.studies.viewpoints import VIEWPOINTS, with_lidars_beside
-from evaluation.results.charts import check
+from evaluation.results.charts.kinds import check_chart
+from evaluation.results.keys import LEVEL
 from evaluation.results.page import write_page
-from evaluation.results.table import (
-    LEVEL,
-    QUERIES,
-    RESULTS,
-)
-from evaluation.study.collection import (
-    MapDrives,
-)
+from evaluation.results.table import QUERIES, RESULTS
 from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.recorded import (
-    ExtractionJobs,
-    recorded_comparisons,
-)
+from evaluation.study.extraction_jobs import ExtractionJobs
+from evaluation.study.map_drives import MapDrives
+from evaluation.study.recorded_pairs import recorded_pairs
 from evaluation.study.tasks.change import ChangeTask
+from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import LocaliseTask
+from evaluation.study.tasks.pair import NamedDrive, Pair
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
-from evaluation.study.tasks.task import (
-    Jobs,
-    NamedDrive,
-    Pair,
-    Task,
-)
+from evaluation.study.tasks.task import Task
 
 TASKS: Mapping[str, type[Task]] = {
     task.name: task
@@ -153,7 +143,7 @@ class Study:
                 frozen_drives(self.experiment.frozen)
         for chart in self.experiment.charts:
             with errors_at(self.source):
-                check(chart)
+                check_chart(chart)
         self._protocol = condition_protocol(self._conditions[0], self.source)
         self._made = MadeMaps(self.output / "cities")
         self._maps = ExperimentMaps(
@@ -318,7 +308,7 @@ class Study:
 
     def _recorded_pairs(self, city: MapDrives) -> Iterator[Pair]:
         """Returns the pairs of recordings in all conditions."""
-        return recorded_comparisons(
+        return recorded_pairs(
             city,
             recorded_conditions(city, self._conditions, self.source),
             self.experiment.seeds[0],

@@ -6,7 +6,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.control_drives import control_drive
 from cns_drake.studies.nested_fields import Changes
-from evaluation.results.table import CAUSE, LEVEL, NO_CAUSE
+from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE
 
 
 class UniqueNames:

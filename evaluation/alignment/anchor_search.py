@@ -15,7 +15,7 @@ from cns_drake.base.angles import wrapped
 from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track
 from evaluation.alignment.submaps import Submaps
-from evaluation.drives.sampling import gather
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.scan_context import ScanContext
 
 # Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
@@ -75,7 +75,7 @@ def find_candidates(source: Submaps, target: Submaps) -> Candidates:
     """Returns pairs of keyframes of two drives that look alike."""
     method = ScanContext()
     places = [
-        method.describe_place(gather(target.drive, frame, 1, _MAX_RANGE))
+        method.describe_place(cloud_at(target.drive, frame, 1, _MAX_RANGE))
         for frame in track(
             target.frames, f"describing {target.name}", len(target), "scans"
         )
@@ -86,7 +86,7 @@ def find_candidates(source: Submaps, target: Submaps) -> Candidates:
         range(len(source)), f"recognising {source.name}", len(source), "scans"
     ):
         frame = int(source.frames[k])
-        query = method.describe(gather(source.drive, frame, 1, _MAX_RANGE))
+        query = method.describe(cloud_at(source.drive, frame, 1, _MAX_RANGE))
         scores = np.nan_to_num(method.score(query, database), nan=-np.inf)
         for place in np.argsort(-scores, kind="stable")[:_CANDIDATES]:
             if not np.isfinite(scores[place]):

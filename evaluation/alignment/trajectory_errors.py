@@ -30,7 +30,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.mcap_messages import checked_poses
 from cns_drake.base.errors import InputError
 from evaluation.drives.sampling import travelled
-from evaluation.drives.text_tables import Trajectory
+from evaluation.drives.trajectories import Trajectory
 
 Frame = Literal["lidar", "base_link"]
 # Length of the parts over which an odometry drifts [m].

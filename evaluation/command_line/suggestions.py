@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.terminal import next_command
-from evaluation.results.comparing import compare
+from evaluation.results.table_comparison import compare_tables
 
 
 def suggest_comparison(folder: Path) -> None:
@@ -15,5 +15,5 @@ def suggest_comparison(folder: Path) -> None:
     of an experiment for which no results are shipped.
     """
     with contextlib.suppress(InputError):
-        compare([folder])
+        compare_tables([folder])
         next_command("cns-eval", "compare", folder)

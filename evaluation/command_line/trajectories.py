@@ -50,10 +50,8 @@ def measure_estimate(
         json: whether to print JSON.
     """
     from evaluation.alignment.trajectory_errors import trajectory_errors
-    from evaluation.drives.text_tables import (
-        parse_seconds,
-        read_quaternions,
-    )
+    from evaluation.drives.text_tables import parse_seconds
+    from evaluation.drives.trajectories import read_quaternions
 
     found = read_quaternions(estimate, None, parse_seconds)
     errors = trajectory_errors(truth, found, frame, time_offset)

@@ -18,12 +18,13 @@ import numpy as np
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
-    is_local,
     keep_spanned,
     list_stamped,
     read_packed,
 )
-from evaluation.drives.text_tables import parse_microseconds, read_angles
+from evaluation.drives.text_tables import parse_microseconds
+from evaluation.drives.trajectories import read_angles
+from evaluation.drives.utm_poses import is_local
 
 _SCANS = "lidar"
 _POSES = "applanix/lidar_poses.csv"
@@ -39,7 +40,8 @@ _POINT = np.dtype(
     ]
 )
 _LONGEST_GAP_NS = 1_000_000_000
-# Origin of W on the UTM grid, in Toronto; see `scan_files.ORIGIN` [m].
+# Origin of W on the UTM grid, in Toronto [m]; chosen like the one in
+# `evaluation.drives.utm_poses.to_world`.
 _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 
 
@@ -69,14 +71,14 @@ class BoreasDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=X_WS,
-            read=_read,
+            read=_read_scan,
             tables=[trajectory.path],
             notes=unknown + notes,
             unit="alpha-prime",
         )
 
 
-def _read(path: Path, stamp_ns: int) -> np.ndarray:
+def _read_scan(path: Path, stamp_ns: int) -> np.ndarray:
     stored = read_packed(path, _STORED)
     check_below(stored, "laser", _NUM_LASERS)
     points = np.empty(len(stored), _POINT)

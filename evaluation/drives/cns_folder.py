@@ -24,12 +24,9 @@ from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import YamlLoader, parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.drives.scan_files import FileDrive, first_there, list_stamped
-from evaluation.drives.text_tables import (
-    pose_matrices,
-    read_quaternions,
-    read_stamped_rows,
-)
+from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
+from evaluation.drives.text_tables import read_stamped_rows
+from evaluation.drives.trajectories import pose_matrices, read_quaternions
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"
@@ -79,7 +76,7 @@ class CnsFolderDrive(FileDrive):
         """
         chosen: list[str] = []
         folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
-        folder = first_there(folders, chosen)
+        folder = first_existing(folders, chosen)
         if folder is None:
             raise InputError(
                 f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
@@ -144,7 +141,7 @@ def holds_cns(path: Path) -> bool:
 
 def _find_mount(path: Path, notes: list[str]) -> Path | None:
     folders = (path, path.parent, path.parent.parent)
-    return first_there(
+    return first_existing(
         [folder / _MOUNT for folder in folders if is_there(folder / _MOUNT)],
         notes,
     )
@@ -159,7 +156,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
         lines = [
             x for x in read_text(path).splitlines() if not x.startswith("%")
         ]
-        X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
+        X_BS = _first_pose(parse_yaml("\n".join(lines), _OpenCvLoader), path)
     if X_BS is None:
         raise InputError(
             f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"
@@ -173,19 +170,19 @@ def _read_mount(path: Path | None) -> np.ndarray:
     return X_BS
 
 
-class _Loader(YamlLoader):
+class _OpenCvLoader(YamlLoader):
     """Loads YAML and ignores custom tags, such as OpenCV's for matrices."""
 
 
-_Loader.add_multi_constructor(
+_OpenCvLoader.add_multi_constructor(
     "tag:yaml.org,2002:opencv",
     lambda loader, suffix, node: loader.construct_mapping(node, deep=True),
 )
 
 
-def _find_pose(node: Any, path: Path) -> np.ndarray | None:
+def _first_pose(node: Any, path: Path) -> np.ndarray | None:
     """Returns the first transformation in a YAML tree, as (4, 4)."""
-    numbers = _numbers(node)
+    numbers = _number_array(node)
     if numbers is not None and len(numbers) in (12, 16):
         if len(numbers) == 16 and not np.array_equal(
             numbers[12:], [0.0, 0.0, 0.0, 1.0]
@@ -194,21 +191,23 @@ def _find_pose(node: Any, path: Path) -> np.ndarray | None:
         return pose_matrices(path, numbers[None, :12])[0]
     if isinstance(node, dict):
         lowered = {str(key).lower(): value for key, value in node.items()}
-        p = _numbers(lowered.get("translation"))
-        rotation = _numbers(lowered.get("rotation"))
+        p = _number_array(lowered.get("translation"))
+        rotation = _number_array(lowered.get("rotation"))
         if p is not None and rotation is not None and len(p) == 3:
-            return _compose(p, rotation, path)
+            return _composed_pose(p, rotation, path)
         children = list(node.values())
     else:
         children = node if isinstance(node, list) else []
     for child in children:
-        X = _find_pose(child, path)
+        X = _first_pose(child, path)
         if X is not None:
             return X
     return None
 
 
-def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
+def _composed_pose(
+    p: np.ndarray, rotation: np.ndarray, path: Path
+) -> np.ndarray:
     """Returns the pose of a position and a quat_xyzw or a 3 x 3 matrix."""
     if len(rotation) == 4:
         R = poses.rotation_from_quaternion(rotation)
@@ -221,7 +220,7 @@ def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
     return pose_matrices(path, np.c_[R, p].reshape(1, 12))[0]
 
 
-def _numbers(node: Any) -> np.ndarray | None:
+def _number_array(node: Any) -> np.ndarray | None:
     """Returns the numbers of a list, flat or nested, or of keys x, y, z, w."""
     if isinstance(node, dict):
         keys = [key for key in "xyzw" if key in node]

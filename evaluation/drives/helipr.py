@@ -14,15 +14,14 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
-    DATUM,
     FileDrive,
     check_below,
     keep_spanned,
     list_stamped,
     read_packed,
-    to_world,
 )
-from evaluation.drives.text_tables import read_quaternions
+from evaluation.drives.trajectories import read_quaternions
+from evaluation.drives.utm_poses import DATUM, to_world
 
 _SCANS = "LiDAR"
 _POSES = "LiDAR_GT"
@@ -74,7 +73,7 @@ class HeliprDrive(FileDrive):
 
     If there is a file `LiDAR_GT/global_<lidar>_gt.txt`, the poses come from
     this file, and W has the axes of the UTM grid but an origin near the drives
-    (see `evaluation.drives.scan_files.to_world`). Otherwise the poses come from
+    (see `evaluation.drives.utm_poses.to_world`). Otherwise the poses come from
     `LiDAR_GT/<lidar>_gt.txt`, and W is the frame of this file. Points without a
     return are left out.
     """

@@ -37,14 +37,13 @@ from cns_drake.base.files import is_there, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.listing import listed
 from cns_drake.base.number_text import parse_rows
-from evaluation.drives.scan_files import BinDrive, first_there, read_packed
+from evaluation.drives.scan_files import BinDrive, first_existing, read_packed
 from evaluation.drives.text_tables import (
     check_increasing,
     parse_seconds,
-    pose_matrices,
     read_numbers,
-    read_poses,
 )
+from evaluation.drives.trajectories import pose_matrices, read_poses
 
 _SCANS = "velodyne"
 _LABELS = "labels"
@@ -251,7 +250,7 @@ def _rows_of_scans(
 def _poses_path(path: Path, notes: list[str]) -> Path:
     resolved = path.resolve()
     common = resolved.parent.parent / "poses" / f"{resolved.name}.txt"
-    found = first_there([common, path / "poses.txt"], notes)
+    found = first_existing([common, path / "poses.txt"], notes)
     if found is None:
         raise InputError(
             f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt"

@@ -15,15 +15,13 @@ from cns_drake.base.drives.drive import SCENARIO, read_scenario
 from cns_drake.base.drives.mulran_frames import X_BS
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
-    DATUM,
     BinDrive,
-    first_there,
-    is_local,
+    first_existing,
     keep_spanned,
     list_stamped,
-    to_world,
 )
-from evaluation.drives.text_tables import read_matrices
+from evaluation.drives.trajectories import read_matrices
+from evaluation.drives.utm_poses import DATUM, is_local, to_world
 
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")
@@ -42,7 +40,7 @@ class MulranDrive(BinDrive):
     """A drive of MulRan.
 
     W is the UTM grid with an origin near the drives (see
-    `evaluation.drives.scan_files.to_world`). If the poses are in local
+    `evaluation.drives.utm_poses.to_world`). If the poses are in local
     coordinates, W is the drive's own frame. The pose of a scan is interpolated
     at its stamp. Points without a return, which are stored as (0, 0, 0), are
     left out. A complete scan has two fields in addition to the stored fields:
@@ -118,4 +116,4 @@ def holds_mulran(path: Path) -> bool:
 
 def _scan_folder(path: Path, notes: list[str]) -> Path | None:
     folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
-    return first_there(folders, notes)
+    return first_existing(folders, notes)

@@ -18,12 +18,13 @@ from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (
     FileDrive,
     check_below,
-    first_there,
+    first_existing,
     keep_spanned,
     list_stamped,
     read_packed,
 )
-from evaluation.drives.text_tables import parse_microseconds, read_angles
+from evaluation.drives.text_tables import parse_microseconds
+from evaluation.drives.trajectories import read_angles
 
 _SCANS = "velodyne_sync"
 _HITS = "velodyne_hits.bin"
@@ -127,7 +128,7 @@ def _poses_path(path: Path, notes: list[str]) -> Path:
     name = f"groundtruth_{resolved.name}.csv"
     beside = resolved.parent
     folders = (path, beside, beside / "ground_truth")
-    found = first_there([folder / name for folder in folders], notes)
+    found = first_existing([folder / name for folder in folders], notes)
     if found is None:
         raise InputError(
             f"{path}: NCLT: no {name}, neither in it nor beside it nor in"

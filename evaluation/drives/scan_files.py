@@ -10,7 +10,6 @@ import numpy as np
 
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
-from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.listing import listed
@@ -18,47 +17,6 @@ from cns_drake.base.points import FARTHEST_RETURN, check_range
 from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns
-
-DATUM = "utm-52n"
-
-# Ranges of easting and northing on the northern half of the Earth.
-_LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
-
-
-def is_local(X_WB: np.ndarray) -> bool:
-    """Returns whether poses (N, 4, 4) are in local coordinates, not in UTM.
-
-    Poses are taken as local if all x and y are within 100 km of zero.
-    """
-    return bool((np.abs(X_WB[:, :2, 3]) < _LIMITS[0][0]).all())
-
-
-def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
-    """Returns poses X_WB (N, 4, 4) from poses in the UTM grid U, zone 52N.
-
-    W has its axes east, north and up, and its origin at a fixed point of that
-    grid near the drives of MulRan and HeLiPR. Coordinates in W are at most a
-    few kilometres, which float32 resolves to under a millimetre. UTM
-    coordinates can be thousands of kilometres, which float32 resolves only to
-    0.25 m.
-
-    Raises:
-        InputError: if a position cannot be in UTM metres.
-    """
-    p_UB = X_UB[:, :3, 3]
-    for axis, (name, limits) in enumerate(
-        zip(("easting", "northing"), _LIMITS, strict=True)
-    ):
-        bad = (p_UB[:, axis] < limits[0]) | (p_UB[:, axis] > limits[1])
-        if bad.any():
-            first = int(np.flatnonzero(bad)[0])
-            raise InputError(
-                f"{path}: {name}: {p_UB[first, axis]:g} m of pose {first + 1}"
-                " is no UTM coordinate"
-            )
-    X_WB = X_UB.copy()
-    X_WB[:, :3, 3] -= ORIGIN
-    return X_WB
 
 
 class FileDrive(Drive):
@@ -152,7 +110,9 @@ class FileDrive(Drive):
             raise IndexError(f"scan {index} of {len(self)}")
         path = self._files[index]
         with user_errors(path), value_errors(path):
-            return _returns(self._read(path, int(self._stamps_ns[index])))
+            return _without_no_returns(
+                self._read(path, int(self._stamps_ns[index]))
+            )
 
 
 class BinDrive(FileDrive):
@@ -211,7 +171,7 @@ def list_stamped(
     return [files[i] for i in order], stamps_ns[order]
 
 
-def first_there(candidates: Iterable[Path], notes: list[str]) -> Path | None:
+def first_existing(candidates: Iterable[Path], notes: list[str]) -> Path | None:
     """Returns the first of several files or folders that exists, or None.
 
     If other files or folders exist as well and differ from the first, a note is
@@ -293,7 +253,7 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
         )
 
 
-def _returns(points: np.ndarray) -> np.ndarray:
+def _without_no_returns(points: np.ndarray) -> np.ndarray:
     """Returns the points without those at the origin: beams with no return.
 
     Raises:

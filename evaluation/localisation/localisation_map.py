@@ -17,7 +17,8 @@ from evaluation.alignment.registration import Surface, make_surface
 from evaluation.clouds.cloud_files import read_blocks
 from evaluation.clouds.notes import OnNote, no_note
 from evaluation.drives.joined_drive import JoinedDrive
-from evaluation.drives.sampling import sample_frames, within_range
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import within_range
 from evaluation.localisation.settings import (
     MAX_RANGE,
     Settings,

@@ -20,7 +20,8 @@ from cns_drake.base import poses
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.progress import track
-from evaluation.drives.sampling import cropped, sample_frames
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cropped
 from evaluation.localisation.estimators import Estimator
 from evaluation.localisation.fit import fit_at
 from evaluation.localisation.initial_poses import Starts

@@ -34,7 +34,7 @@ from cns_drake.base.progress import track
 from evaluation.clouds.cloud_files import read_blocks, read_cloud
 from evaluation.clouds.npy_files import read_npy
 from evaluation.drives.sampling import sample_frames
-from evaluation.drives.text_tables import read_poses
+from evaluation.drives.trajectories import read_poses
 from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
 from evaluation.map_update.map_builder import MapBuilder
 

@@ -7,7 +7,7 @@ import itertools
 from evaluation.paper.paper_values import paper
 from evaluation.recognition.metrics import Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.result_tables import recognition_table
+from evaluation.report.tables.recognition import recognition_table
 from evaluation.results.table_forms import Cell, title
 
 RING = title("ring++")

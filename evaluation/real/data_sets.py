@@ -23,10 +23,10 @@ from evaluation.clouds.cloud_files import read_cloud
 from evaluation.clouds.notes import OnNote
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
-from evaluation.drives.text_tables import read_poses, read_quaternions
+from evaluation.drives.trajectories import read_poses, read_quaternions
 from evaluation.real import image_sequences, sessions
 from evaluation.study.sources import RecordingSource
-from evaluation.study.tasks.task import NamedDrive
+from evaluation.study.tasks.pair import NamedDrive
 
 # Folders that other modules read.
 _OTHERS = (image_sequences.FOLDER, sessions.FOLDER)

@@ -35,9 +35,9 @@ from evaluation.clouds.count_images import (
 )
 from evaluation.clouds.notes import OnNote
 from evaluation.drives.scan_files import FileDrive
-from evaluation.drives.text_tables import read_poses
+from evaluation.drives.trajectories import read_poses
 from evaluation.recognition.describing import Role
-from evaluation.study.tasks.task import NamedDrive
+from evaluation.study.tasks.pair import NamedDrive
 
 # Name of the folder with a folder for each sequence.
 FOLDER = "kitti_bev"

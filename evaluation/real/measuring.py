@@ -49,11 +49,13 @@ from evaluation.recognition.result_number import Number
 from evaluation.results.table import QueryRows, Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.engine import Engine
-from evaluation.study.measurements import DescribedSource
+from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.sources import DriveSource
+from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import SHIPPED, LocaliseTask
+from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 from evaluation.study.tasks.place import PlaceTask, PoseTask
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result, Task
+from evaluation.study.tasks.task import Task
 
 _SIMULATED = replace(FAIR_PROTOCOL, scans_per_place=1)
 # Every real scan is a query and a place.

@@ -18,8 +18,11 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed
 from cns_drake.base.number_text import number_within
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
-from evaluation.results.drawing import METHOD_STYLES, escape_dollars, save
-from evaluation.results.table import Row, made_by
+from evaluation.results.figure_files import save_figure
+from evaluation.results.figure_text import escape_dollars
+from evaluation.results.keys import made_by
+from evaluation.results.styles import METHOD_STYLES
+from evaluation.results.table import Row
 
 FOLDER = "sessions"
 CHART = "sessions"
@@ -124,5 +127,5 @@ def draw_sessions(rows: Sequence[Row], folder: Path) -> Path:
         axes.set_ylim(0.0, 1.02)
         axes.grid(alpha=0.3)
         axes.legend(loc="lower left")
-        save(figure, folder / CHART, ("pdf", "png"))
+        save_figure(figure, folder / CHART, ("pdf", "png"))
     return folder / f"{CHART}.png"

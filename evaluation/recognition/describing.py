@@ -10,7 +10,9 @@ import numpy as np
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
-from evaluation.drives.sampling import QuerySensor, gather, sample_frames
+from evaluation.drives.query_sensor import QuerySensor
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.method import Method, check_number
 from evaluation.recognition.bootstrap import route_blocks
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors
@@ -127,7 +129,7 @@ class _FrameClouds:
         key = sensor, kind, max_range
         if key not in self._clouds:
             number, before, fields = kind
-            self._clouds[key] = gather(
+            self._clouds[key] = cloud_at(
                 self._drive,
                 self.frame,
                 number,

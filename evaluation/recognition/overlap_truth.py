@@ -22,7 +22,8 @@ from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
-from evaluation.drives.sampling import gather, sample_frames
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 
@@ -74,7 +75,7 @@ def overlap_matrix(
     """
 
     def see_scan(frame: int) -> Seen:
-        return SeenSurfaces.of(gather(database, frame, 1, protocol.max_range))
+        return SeenSurfaces.of(cloud_at(database, frame, 1, protocol.max_range))
 
     query_frames, placed = compared_frames(database, query, protocol)
     clouds = [

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from cns_drake.base.drives.drive import Drive
-    from evaluation.drives.sampling import QuerySensor
+    from evaluation.drives.query_sensor import QuerySensor
     from evaluation.methods.method import Method, PlaceScan
 
 
@@ -136,7 +136,7 @@ class RetrievalProtocol:
         """
         if not self._changes_queries:
             return None
-        from evaluation.drives.sampling import QuerySensor
+        from evaluation.drives.query_sensor import QuerySensor
 
         return QuerySensor.draw(
             self.seed,
@@ -151,10 +151,10 @@ class RetrievalProtocol:
 
         The sensor is changed as by `query_sensor`.
         """
-        from evaluation.drives.sampling import gather
+        from evaluation.drives.scan_clouds import cloud_at
 
         sensor = self.query_sensor(frame)
-        return gather(drive, frame, 1, self.max_range, sensor=sensor)
+        return cloud_at(drive, frame, 1, self.max_range, sensor=sensor)
 
     def query_poses(self, X_WS: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the poses (Q, 4, 4) of the queries' sensors in the world.

@@ -13,7 +13,7 @@ from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
 from evaluation.clouds.notes import OnNote, no_note
-from evaluation.drives.sampling import cropped
+from evaluation.drives.scan_clouds import cropped
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places

@@ -11,14 +11,9 @@ from evaluation.localisation.results import RIGHT_TRANSLATION
 from evaluation.localisation.tracking import LOST
 from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.results.charts import styles
-from evaluation.results.drawing import (
-    INK,
-    PALE,
-    escape_dollars,
-    name_lines,
-    save,
-)
+from evaluation.results.figure_files import save_figure
+from evaluation.results.figure_text import escape_dollars, name_lines
+from evaluation.results.styles import INK, PALE, method_styles
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 # Size of the names of curves [pt]: 12 px on a phone, which shows one panel.
@@ -41,7 +36,9 @@ def draw_pr_curves(
         stem: path of the files without the ending.
     """
     pairs = by_pair(results)
-    style_of = styles(in_table_order(result.method for result in results))
+    style_of = method_styles(
+        in_table_order(result.method for result in results)
+    )
     size = (9.2, 0.3 + 2.6 * len(pairs))
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(
@@ -68,7 +65,7 @@ def draw_pr_curves(
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")
-    save(figure, stem)
+    save_figure(figure, stem)
 
 
 def _draw_curve(
@@ -136,4 +133,4 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     for axes in (top, bottom):
         axes.grid(alpha=0.3)
         axes.margins(x=0.01)
-    save(figure, stem, ("png",))
+    save_figure(figure, stem, ("png",))

@@ -22,13 +22,9 @@ from evaluation.report.point_rendering import (
     render,
     shade_by_height,
 )
-from evaluation.results.drawing import (
-    PIXELS,
-    Legend,
-    escape_dollars,
-    save,
-    unit_rgb,
-)
+from evaluation.results.figure_files import PIXELS, save_figure
+from evaluation.results.figure_text import escape_dollars
+from evaluation.results.styles import Legend, unit_rgb
 
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
@@ -258,7 +254,7 @@ def _draw_panels(
             frameon=False,
             fontsize=8,
         )
-    save(figure, stem, PIXELS)
+    save_figure(figure, stem, PIXELS)
 
 
 def _show(axes: Axes, picture: Picture) -> None:

@@ -5,49 +5,54 @@ The page needs neither a network nor other files.
 
 import base64
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import functools
-import itertools
 from pathlib import Path
 from urllib.parse import quote
 
 import jinja2
 from markupsafe import Markup
-from matplotlib import colormaps
-from matplotlib.colors import to_hex, to_rgb
-import numpy as np
 
 from cns_drake.base.complete_files import write_text
-from cns_drake.base.errors import InputError
 from cns_drake.base.listing import natural_key
-from evaluation.change.drive_change import ChangeResult, symmetric_changes
-from evaluation.recognition.costs import Cost
-from evaluation.recognition.fault_kinds import (
-    FAULT_KINDS,
-    PairEvidence,
-    fault_words,
-)
+from evaluation.change.drive_change import symmetric_changes
+from evaluation.recognition.fault_kinds import FAULT_KINDS, fault_words
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report import conclusions, result_tables
-from evaluation.report.map_figures import ROUTE_COLOURS
-from evaluation.report.page_data import (
-    Illustration,
-    PageDrive,
-    Section,
-    browser_data,
-)
+from evaluation.report import ranking
+from evaluation.report.contents import Report
+from evaluation.report.illustrations import Illustration
+from evaluation.report.page_data import browser_data
 from evaluation.report.reference import NO_REFERENCE, Reference
-from evaluation.results.charts import draw, styles
-from evaluation.results.drawing import save
+from evaluation.report.route_pictures import (
+    BAR_LENGTH,
+    route_colours,
+    route_picture,
+)
+from evaluation.report.tables import survival
+from evaluation.report.tables.change import change_table
+from evaluation.report.tables.costs import cost_numbers, cost_table
+from evaluation.report.tables.differences import (
+    difference_numbers,
+    difference_table,
+)
+from evaluation.report.tables.faults import fault_numbers, fault_table
+from evaluation.report.tables.poses import pose_error_numbers, pose_table
+from evaluation.report.tables.queries import query_table
+from evaluation.report.tables.recognition import (
+    audit_table,
+    metric_numbers,
+    recognition_table,
+    sessions_table,
+)
 from evaluation.results.page_frame import (
     PageSection,
     environment,
     framed_page,
     read_asset,
 )
-from evaluation.results.table import OWN, STAGE, Results
+from evaluation.results.styles import method_styles
 from evaluation.results.table_forms import (
     MISSING,
     Table,
@@ -58,6 +63,8 @@ from evaluation.results.table_forms import (
 )
 
 _TEMPLATES = "page_template"
+# Number of colours in the legend of a route.
+_LEGEND_COLOURS = 9
 _TITLE = "Structural change and place recognition"
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 # Name of a section -> its heading, in the order of the page.
@@ -73,140 +80,6 @@ _SECTIONS = {
 # The sections that are shown from the start.
 _OPEN = ("summary", "browser")
 _SCRIPTS = ("state.js", "pictures.js", "page.js")
-# Number of pieces of one colour in a drawn route.
-_NUM_PIECES = 48
-# Size of the marks of start and end, as a part of the picture.
-_MARK = 0.016
-# Length of the scale bar [m].
-_BAR_LENGTH = 50.0
-_SCATTER = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
-# Controls, in which nothing changes, show no trend.
-_CHANGED: dict[str, str] = {**_SCATTER, STAGE: OWN}
-_DUMBBELL = {"kind": "dumbbell", "over": STAGE, "metric": "auc"}
-_SURVIVAL = "AUC without and with the change, and the share that is retained"
-# Width of charts [px].
-_WIDTH = 480
-
-
-@dataclass
-class Report:
-    """The contents of a report.
-
-    Attributes:
-        results: the results of all pairs and of their controls, with or without
-            geometric verification as the report's protocol says.
-        changes: change between the stages of each map.
-        pairs: place recognition results of each pair of drives and, if there
-            is one, of its control (the same routes without a change of the
-            city).
-        recognitions: place recognition of all pairs without their controls, and
-            of drives compared with themselves.
-        sessions: place recognition in databases of several drives through one
-            stage, each next to the database that contains only the first of
-            these drives.
-        differences: AUC differences between methods.
-        evidence: (database, query) -> evidence on why the best-scoring place
-            of a query is wrong.
-        tracks: drive -> time stamps and poses, also for the controls.
-        drives: drive -> what the page shows of it.
-        illustrations: figures, in the order of the page.
-        costs: time and memory of each method.
-        notes: notes for the reader.
-        made_by: version, protocol and settings of methods that made the report.
-        pages: drive -> address of the web page of its recording, relative to
-            the report; drives without a page may be left out.
-        reference: published numbers to compare with.
-        repeated: results by the protocol of the published numbers, if this
-            protocol differs from that of the report.
-    """
-
-    results: Results = field(default_factory=lambda: Results((), ()))
-    changes: list[ChangeResult] = field(default_factory=list)
-    pairs: list[conclusions.Controlled] = field(default_factory=list)
-    recognitions: list[PlaceOutcome] = field(default_factory=list)
-    sessions: list[PlaceOutcome] = field(default_factory=list)
-    differences: Sequence[result_tables.MethodDifference] = ()
-    evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
-    tracks: dict[str, result_tables.DriveTrack] = field(default_factory=dict)
-    drives: dict[str, PageDrive] = field(default_factory=dict)
-    illustrations: list[Illustration] = field(default_factory=list)
-    costs: Sequence[Cost] = ()
-    notes: Sequence[str] = ()
-    made_by: Sequence[str] = ()
-    pages: Mapping[str, str] = field(default_factory=dict)
-    reference: Reference = NO_REFERENCE
-    repeated: list[PlaceOutcome] = field(default_factory=list)
-
-    @functools.cached_property
-    def survivals(self) -> list[conclusions.Survival]:
-        """Results of each method with and without change, on each pair."""
-        stages = {
-            name: stage
-            for one, _ in self.pairs
-            for name, stage in zip(
-                (one.database, one.query),
-                one.pair[1:],
-                strict=True,
-            )
-        }
-        return conclusions.survivals(self.results.rows, stages)
-
-    @property
-    def compared(self) -> list[PlaceOutcome]:
-        """Results for which there are published numbers to compare."""
-        known = filter(self.reference.covers, self.recognitions)
-        return [*known, *self.repeated]
-
-
-def chart_illustrations(report: Report, folder: Path) -> list[Illustration]:
-    """Draws the charts with the results of all maps.
-
-    Charts of published numbers stand next to the charts of the report. A chart
-    without data is left out, with a note in the report.
-
-    Args:
-        report: the report.
-        folder: folder for the files.
-
-    Returns:
-        The figures that were drawn.
-    """
-    name = "AUC against TCR_sym"
-    charts: list[tuple[str, str, Section, dict[str, str], Results]] = [
-        ("auc_over_tcr", name, "figures", _CHANGED, report.results)
-    ]
-    if report.compared:
-        published = report.reference.to_results()
-        name = f"{name}, of {report.reference.title}"
-        stem = "auc_over_tcr_published"
-        charts.insert(0, (stem, name, "figures", _SCATTER, published))
-    if any(control for _, control in report.pairs):
-        charts.append(
-            ("survival", _SURVIVAL, "survival", _DUMBBELL, report.results)
-        )
-    shown = []
-    for stem, words, section, chart, results in charts if report.pairs else ():
-        gates = {"gate": tuple(results.distinct("gate"))}
-        try:
-            drawn = draw({**chart, **gates}, results, _WIDTH, alone=True)
-            save(drawn.figure, folder / stem)
-        except InputError as error:
-            report.notes = [*report.notes, f"{words}: left out: {error}"]
-            continue
-        legend = []
-        for label, (colour, *_) in drawn.legend.items():
-            red, green, blue = (round(255 * part) for part in to_rgb(colour))
-            legend.append(((red, green, blue), label))
-        shown.append(
-            Illustration(
-                folder / stem,
-                words,
-                "svg",
-                section=section,
-                legend=tuple(legend),
-            )
-        )
-    return shown
 
 
 def write_report(
@@ -241,21 +114,19 @@ def _write_tables(
     """Writes wide tables, which are views of the results."""
     results = report.recognitions
     every = [*results, *report.repeated]
-    queries = result_tables.query_table(results, report.tracks, report.evidence)
+    queries = query_table(results, report.tracks, report.evidence)
     # Evidence is of the queries that the other results got wrong.
-    again = result_tables.query_table(report.repeated, report.tracks, {})
+    again = query_table(report.repeated, report.tracks, {})
     numbers = {
-        "survival": conclusions.survival_numbers(report.survivals),
-        "tcr": result_tables.change_table(
-            report.changes, report.reference, report.evidence
-        ),
-        "place_recognition": result_tables.audit_table(every, report.reference),
-        "poses": result_tables.pose_error_numbers(results),
-        "metrics": result_tables.metric_numbers(every),
-        "differences": result_tables.difference_numbers(report.differences),
-        "why": result_tables.fault_numbers(results, report.evidence),
+        "survival": survival.survival_numbers(report.survivals),
+        "tcr": change_table(report.changes, report.reference, report.evidence),
+        "place_recognition": audit_table(every, report.reference),
+        "poses": pose_error_numbers(results),
+        "metrics": metric_numbers(every),
+        "differences": difference_numbers(report.differences),
+        "why": fault_numbers(results, report.evidence),
         "query_details": replace(queries, rows=queries.rows + again.rows),
-        "query_details_unchanged": result_tables.query_table(
+        "query_details_unchanged": query_table(
             [
                 replace(control, pair=one.pair)
                 for one, control in report.pairs
@@ -266,7 +137,7 @@ def _write_tables(
         ),
     }
     if report.costs:
-        numbers["costs"] = result_tables.cost_numbers(report.costs)
+        numbers["costs"] = cost_numbers(report.costs)
     for name, table in numbers.items():
         table.write_csv(folder / f"{name}.csv")
         if name not in ("why", "differences") and name in tables:
@@ -354,28 +225,22 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
     ]
     if report.compared:
         counted.append((report.compared, None, report.reference))
-    changes = result_tables.change_table(
-        report.changes, report.reference, report.evidence
-    )
+    changes = change_table(report.changes, report.reference, report.evidence)
     return {
-        "survival": [conclusions.survival_table(report.survivals)],
+        "survival": [survival.survival_table(report.survivals)],
         "tcr": [changes.without_empty("paper")],
         "place_recognition": [
-            result_tables.recognition_table(
+            recognition_table(
                 some, report.changes, mode, reference, report.evidence
             )
             for some, mode, reference in counted
         ],
-        "differences": [result_tables.difference_table(report.differences)],
-        "why": [result_tables.fault_table(results, report.evidence)],
-        "poses": [result_tables.pose_table(results)],
-        "costs": [result_tables.cost_table(report.costs)],
-        "audit": [
-            result_tables.audit_table(
-                [*results, *report.repeated], report.reference
-            )
-        ],
-        "sessions": [result_tables.sessions_table(report.sessions)],
+        "differences": [difference_table(report.differences)],
+        "why": [fault_table(results, report.evidence)],
+        "poses": [pose_table(results)],
+        "costs": [cost_table(report.costs)],
+        "audit": [audit_table([*results, *report.repeated], report.reference)],
+        "sessions": [sessions_table(report.sessions)],
     }
 
 
@@ -383,20 +248,20 @@ def _content(
     report: Report, tables: Mapping[str, Sequence[Table]]
 ) -> dict[str, object]:
     """Returns the values for the templates of the text and of the page."""
-    ranked, headline = conclusions.ranked_methods(
+    ranked, headline = ranking.ranked_methods(
         report.results, report.differences
     )
     return {
         "report": report,
         "tables": tables,
         "ranked": ranked,
-        "beside": conclusions.further_columns(report.results),
-        "styles": styles(in_table_order(one.method for one in ranked)),
+        "beside": ranking.further_columns(report.results),
+        "styles": method_styles(in_table_order(one.method for one in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes
         ),
-        "survival_summary": conclusions.survival_summary(report.survivals),
+        "survival_summary": survival.survival_summary(report.survivals),
     }
 
 
@@ -424,55 +289,6 @@ def _drives_of_maps(report: Report) -> dict[str, list[str]]:
     return groups
 
 
-def route_picture(drive: PageDrive) -> Markup:
-    """Returns a drive's route on its map from above, as an SVG element.
-
-    The route is red at its start and blue at its end. One unit is one metre; x
-    points right and y down. The picture of the map is an element `image` with
-    the id `view-<name of the drive>`, which the query browser uses as well.
-    """
-    left, right, bottom, top = drive.extent
-    width, height = right - left, top - bottom
-    size = _MARK * max(width, height)
-    data = base64.b64encode(drive.view).decode("ascii")
-    route = drive.route * [1.0, -1.0]
-    (x0, y0), (x1, y1) = route[0], route[-1]
-    end, base = right - 0.03 * width, -bottom - 0.03 * height
-    mark = [[x0, y0 - size], [x0 - size, y0 + size], [x0 + size, y0 + size]]
-    # Pieces are joined at their ends.
-    last = len(route) - 1
-    num = min(_NUM_PIECES, max(last, 1))
-    ends = np.linspace(0, last, num + 1).astype(int)
-    pieces = [route[a : b + 1] for a, b in itertools.pairwise(ends)]
-    return Markup(
-        _render(
-            "route.svg",
-            name=drive.name,
-            box=_numbers([left, -top, width, height]),
-            image=f"data:image/webp;base64,{data}",
-            route=_points(route),
-            pieces=zip(_route_colours(num), map(_points, pieces), strict=True),
-            start=_points(np.array(mark)),
-            end=_numbers([x1 - size, y1 - size, 2 * size]),
-            bar=_numbers([end - _BAR_LENGTH, end, base]),
-        )
-    )
-
-
-def _route_colours(num: int = 9) -> list[str]:
-    """Returns colours from the start of a route to its end."""
-    colours = colormaps[ROUTE_COLOURS](np.linspace(0.0, 1.0, num))
-    return [to_hex(colour) for colour in colours]
-
-
-def _points(line: np.ndarray) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
-
-
-def _numbers(values: Iterable[float]) -> list[str]:
-    return [f"{value:.2f}" for value in values]
-
-
 def _data_address(one: Illustration) -> str:
     """Returns a data URL that contains the figure."""
     path = one.stem.with_name(f"{one.stem.name}.{one.page_kind}")
@@ -493,18 +309,18 @@ def _environment() -> jinja2.Environment:
         {
             "captioned": _captioned,
             "data_address": _data_address,
-            "interval_text": conclusions.interval_text,
+            "interval_text": survival.interval_text,
             "markdown": escape_markdown,
             "method_title": title,
-            "percent": conclusions.percent,
+            "percent": survival.percent,
             "quoted": quote,
             "route_picture": route_picture,
         },
     )
     found.globals |= {
-        "bar_length": round(_BAR_LENGTH),
+        "bar_length": round(BAR_LENGTH),
         "missing": MISSING,
-        "no_control": conclusions.NO_CONTROL,
-        "route_colours": _route_colours(),
+        "no_control": survival.NO_CONTROL,
+        "route_colours": route_colours(_LEGEND_COLOURS),
     }
     return found

@@ -1,26 +1,21 @@
 """Data for the script of a report's page: drives, and pairs of drives."""
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import io
-from pathlib import Path
-from typing import Literal
 import zlib
 
 from matplotlib import image
 import numpy as np
-from PIL import Image
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.jpeg_images import to_jpeg
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.report.camera_images import CameraImages
 from evaluation.report.point_rendering import Picture
-from evaluation.results.drawing import Legend
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 # Points in all scans of a page. At some 3 bytes each they leave room for the
@@ -28,73 +23,9 @@ from evaluation.results.table_forms import by_pair, in_table_order, title
 _POINTS_OF_A_PAGE = 5_000_000
 # Images of cameras in a page [bytes].
 _IMAGES_OF_A_PAGE = 6_000_000
-# Longer side of an image [pixels].
-_IMAGE_SIDE = 320
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
 _WEBP_QUALITY = 75
-
-Section = Literal["survival", "change", "recognition", "figures", "print"]
-
-
-@dataclass(frozen=True)
-class Illustration:
-    """A figure of the report.
-
-    Attributes:
-        stem: path of the figure without ending.
-        title: title of the figure.
-        page_kind: format of the figure on the page, "svg" or "webp".
-        section: section of the page that shows the figure; "print" for a figure
-            that the page does not show.
-        num_panels: number of panels side by side; a phone shows one at a time.
-        legend: the colours (red, green, blue), each with its meaning. The page
-            shows these colours below the figure.
-    """
-
-    stem: Path
-    title: str
-    page_kind: str
-    section: Section = "figures"
-    num_panels: int = 1
-    legend: Legend = ()
-
-
-@dataclass(frozen=True)
-class CameraImages:
-    """M camera images that are nearest in time to K LiDAR frames of a drive.
-
-    Attributes:
-        stamps_ns: (K,) time stamps of the LiDAR frames [ns].
-        times_ns: (M,) times of the images, increasing [ns]. An image can be the
-            nearest image for several frames.
-        files: the M images as JPEG.
-    """
-
-    stamps_ns: np.ndarray
-    times_ns: np.ndarray
-    files: list[bytes]
-
-    def to_data(self, step: int) -> dict:
-        """Returns every `step`-th image, and which image each frame shows.
-
-        Returns:
-            A mapping for JSON. `files` contains the images as base64 text. Two
-            lists have an entry for each of the K frames: `nearest` is the index
-            in `files` of the image that is nearest in time, and `later` is the
-            time of this image minus the time of the frame [s].
-        """
-        times_ns = self.times_ns[::step]
-        nearest = _nearest(times_ns, self.stamps_ns)
-        later = 1e-9 * (times_ns[nearest] - self.stamps_ns)
-        return {
-            "files": [
-                base64.b64encode(one).decode("ascii")
-                for one in self.files[::step]
-            ],
-            "nearest": nearest.tolist(),
-            "later": np.round(later, 2).tolist(),
-        }
 
 
 @dataclass(frozen=True)
@@ -122,7 +53,7 @@ class PageDrive:
     images: CameraImages | None = None
 
 
-def make_drive(
+def make_page_drive(
     name: str,
     view: Picture,
     X_WS: np.ndarray,
@@ -159,45 +90,6 @@ def make_drive(
     )
 
 
-def camera_images(
-    drive: Drive, stamps_ns: np.ndarray, on_note: Callable[[str], None]
-) -> CameraImages | None:
-    """Returns the camera images that are nearest in time to given frames.
-
-    The result is None if the drive has no camera, or no image can be decoded.
-
-    Args:
-        drive: the drive.
-        stamps_ns: (K,) time stamps of the frames [ns].
-        on_note: is called with a note if images could not be decoded.
-
-    Raises:
-        InputError: if the drive cannot be read.
-    """
-    times_ns = drive.image_stamps_ns
-    shown = {}
-    faults = 0
-    if len(times_ns) == 0:
-        return None
-    for number in np.unique(_nearest(times_ns, stamps_ns)):
-        data = drive.image(number)
-        try:
-            with Image.open(io.BytesIO(data)) as picture:
-                shown[number] = to_jpeg(picture, longest=_IMAGE_SIDE)
-        except Exception:  # Decoders of damaged files raise any.
-            faults += 1
-    if faults:
-        on_note(f"{drive.name}: {faults} camera images cannot be decoded")
-    if not shown:
-        return None
-    return CameraImages(stamps_ns, times_ns[list(shown)], [*shown.values()])
-
-
-def _nearest(times_ns: np.ndarray, wanted_ns: np.ndarray) -> np.ndarray:
-    """Returns, for each wanted time, the index of the nearest of `times_ns`."""
-    return np.searchsorted((times_ns[1:] + times_ns[:-1]) // 2, wanted_ns)
-
-
 def browser_data(
     recognitions: Sequence[PlaceOutcome],
     drives: Mapping[str, PageDrive],
@@ -208,7 +100,7 @@ def browser_data(
     """Returns the data of the query browser, ready for JSON.
 
     Top views of the maps are not included: the browser uses the top views in
-    the pictures that `evaluation.report.page.route_picture` makes.
+    the pictures that `evaluation.report.route_pictures.route_picture` makes.
 
     Args:
         recognitions: results of methods on pairs of drives.

@@ -1,6 +1,12 @@
 """The common tables of all results, with summaries, charts and rankings.
 
-`table` reads and writes `results.csv` and `queries.csv`, `summaries` computes
-numbers from these tables, `charts` and `page` show the tables, and `comparing`
-ranks methods together with the shipped tables in `baselines`.
+- `table` contains `results.csv` and `queries.csv`. Their rows begin with a key
+  of `keys`; `table_lines` reads their lines.
+- `summaries` and `ranking` compute numbers from these tables.
+  `compared_answers` compares methods by their answers, `headlines` says in
+  words which methods differ and survive, and `ranges` contains the possible
+  values of each metric.
+- `charts`, `page` and `table_forms` show tables as charts, pages and text.
+- `table_comparison` compares tables with one another, and with the shipped
+  tables in `baselines`.
 """

@@ -7,14 +7,8 @@ p-value below 0.05, see `evaluation.recognition.metrics`.
 from collections.abc import Iterable, Mapping, Sequence
 import math
 
-from evaluation.recognition.significance import compared_by_auc
-from evaluation.results.summaries import (
-    LEAST_UNITS,
-    Ranked,
-    check_same_queries,
-    drive_number,
-    ranking,
-)
+from evaluation.results.compared_answers import compared_answers
+from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
 from evaluation.results.table import Answers, QueryRows, Row
 from evaluation.results.table_forms import title
 
@@ -76,8 +70,8 @@ def survival(rows: Sequence[Row]) -> str:
     """Returns the AUC that methods retain, and which methods survive.
 
     A method survives if it retains at least 90 % of its AUC strict, by the
-    lower limit of the 95 % t interval of `ranking`, whose units are cities.
-    Fewer than four cities do not show whether a method survives.
+    lower limit of the 95 % t interval of `rank_methods`. The interval's units
+    are cities. Fewer than four cities do not show whether a method survives.
 
     Args:
         rows: rows of the metric `kept_strict`, of changed conditions.
@@ -85,7 +79,7 @@ def survival(rows: Sequence[Row]) -> str:
     Returns:
         One or two sentences; empty if no condition has results of all methods.
     """
-    ranked, _ = ranking(rows)
+    ranked, _ = rank_methods(rows)
     if not ranked:
         return ""
     number = len({row.map for row in rows})
@@ -140,23 +134,18 @@ def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     Returns:
         A clause; empty if there is one method, or the answers are unknown.
     """
-    asked = {one.but(): one for one in queries.answers} if queries else {}
+    asked = {one.identity: one for one in queries.answers} if queries else {}
     table: dict[tuple, dict[str, tuple[float, Answers]]] = {}
     for row in rows:
-        if row.but() in asked:
-            some = table.setdefault(row.but("method"), {})
-            some[row.label] = row.value, asked[row.but()]
+        if row.identity in asked:
+            some = table.setdefault(row.without("method"), {})
+            some[row.label] = row.value, asked[row.identity]
     labels = {row.label: None for row in rows}
     common = [some for some in table.values() if len(some) == len(labels)]
     if len(labels) < 2 or not common:
         return ""
-    for some in common:
-        (_, first), *others = some.values()
-        for _, other in others:
-            check_same_queries(first, other)
-    compared = compared_by_auc(
-        {n: [some[n][1].outcomes for some in common] for n in labels},
-        [drive_number(next(iter(some.values()))[1]) for some in common],
+    compared = compared_answers(
+        {n: [some[n][1] for some in common] for n in labels}
     )
     best = max(labels, key=lambda n: sum(some[n][0] for some in common))
     p_values = {pair: p for pair, (_, p) in compared.items()}

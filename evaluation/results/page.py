@@ -16,20 +16,15 @@ from cns_drake.base.csv_files import write_csv
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.version import __version__
-from evaluation.results import charts as drawing
-from evaluation.results.drawing import save
+from evaluation.results.charts.chart import NARROW, WIDE
+from evaluation.results.charts.kinds import DrawnChart, draw_chart
+from evaluation.results.charts.words import in_words, value_words
+from evaluation.results.figure_files import save_figure
+from evaluation.results.keys import CAUSE, KEYS, LEVEL, SETTINGS
 from evaluation.results.page_frame import PageSection, environment, framed_page
 from evaluation.results.ranges import check_all
 from evaluation.results.summaries import Summary, means, summarised
-from evaluation.results.table import (
-    CAUSE,
-    COSTS,
-    KEYS,
-    LEVEL,
-    SETTINGS,
-    QueryRows,
-    Results,
-)
+from evaluation.results.table import COSTS, QueryRows, Results
 from evaluation.results.table_forms import in_table_order
 from evaluation.results.table_forms import title as title_of
 
@@ -100,15 +95,15 @@ def write_page(
     notes = list(notes)
     for number, chart in enumerate(charts, start=1):
         try:
-            alone = drawing.draw(chart, results, alone=True, queries=queries)
-            save(alone.figure, folder / f"chart_{number}", ("pdf", "png"))
+            alone = draw_chart(chart, results, alone=True, queries=queries)
+            save_figure(
+                alone.figure, folder / f"chart_{number}", ("pdf", "png")
+            )
             svgs = {
-                name: _svg(
-                    drawing.draw(chart, results, width), f"{name}{number}"
-                )
+                name: _svg(draw_chart(chart, results, width), f"{name}{number}")
                 for name, width in (
-                    ("wide", drawing.WIDE),
-                    ("narrow", drawing.NARROW),
+                    ("wide", WIDE),
+                    ("narrow", NARROW),
                 )
             }
         except InputError as error:
@@ -163,7 +158,7 @@ def write_page(
             "Charts",
             is_open=True,
             charts=shown,
-            wide=drawing.WIDE,
+            wide=WIDE,
             dashes=_DASHES,
         )
         sections.insert(0, charts_shown)
@@ -182,11 +177,11 @@ def write_page(
     return path
 
 
-def _svg(drawn: drawing.Drawn, prefix: str) -> Markup:
+def _svg(drawn: DrawnChart, prefix: str) -> Markup:
     """Returns a drawing as an element whose ids no other drawing has."""
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "chart"
-        save(drawn.figure, stem, ("svg",))
+        save_figure(drawn.figure, stem, ("svg",))
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
@@ -244,14 +239,14 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
         for name in in_table_order(row.label for row in rows)
         if any((name, gate, *one) in found for one in columns)
     ]
-    heads = [drawing.in_words(str(metric)) for metric, *_ in columns]
+    heads = [in_words(str(metric)) for metric, *_ in columns]
     title = _TASKS.get(task, task)
     if by_condition:
         title += f": {heads[0]}"
         if factors:
-            title += f" by {', '.join(map(drawing.in_words, factors))}"
+            title += f" by {', '.join(map(in_words, factors))}"
         heads = [
-            ", ".join(map(drawing.value_words, values, factors))
+            ", ".join(map(value_words, values, factors))
             for _, *values in columns
         ]
     return {"name": title, "metrics": heads, "rows": lines}
@@ -280,7 +275,7 @@ def _wide_table(results: Results) -> dict[str, Any]:
     """
     lines: dict[tuple, dict[str, Any]] = {}
     for row in results.rows:
-        line = lines.setdefault(row.but(), {})
+        line = lines.setdefault(row.identity, {})
         if not line:
             line.update((n, row[n]) for n in (*KEYS, *results.factors))
         line[row.metric] = row.value

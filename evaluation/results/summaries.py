@@ -15,34 +15,19 @@ import itertools
 import math
 from operator import itemgetter
 from typing import Any, NamedTuple
-import zlib
 
 import numpy as np
-from scipy.special import stdtrit
 from scipy.stats import rankdata
 
-from cns_drake.base.errors import InputError
 from evaluation.recognition.bootstrap import (
     UNKNOWN,
-    Interval,
     paired_samples,
     percentile_interval,
-    resampled_weights,
 )
 from evaluation.recognition.place_numbers import kept_share
 from evaluation.recognition.precision_recall import pr_curve
-from evaluation.results.ranges import Range, range_of
-from evaluation.results.table import (
-    CAUSE,
-    COSTS,
-    LEVEL,
-    NO_CAUSE,
-    Answers,
-    Key,
-    QueryRows,
-    Results,
-    Row,
-)
+from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
+from evaluation.results.table import COSTS, Answers, QueryRows, Results, Row
 
 # Factor: what updates the map of several drives.
 MAINTAIN = "database.maintain"
@@ -55,8 +40,6 @@ _AND = "+"
 _SAMPLES = 1000
 # Least number of points that show a trend.
 LEAST_POINTS = 5
-# Least number of maps or conditions whose spread gives a mean an interval.
-LEAST_UNITS = 4
 
 
 class Mean(NamedTuple):
@@ -173,7 +156,7 @@ def excesses(queries: QueryRows) -> list[Summary]:
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
     for one in queries.answers:
-        conditions.setdefault(one.but("seed"), []).append(one)
+        conditions.setdefault(one.without("seed"), []).append(one)
         name = one.map, one[CAUSE]
         levels[name] = max(one[LEVEL] or 0, levels.get(name, 0))
     found = []
@@ -186,7 +169,7 @@ def excesses(queries: QueryRows) -> list[Summary]:
             for cause, level in alone
         )
         groups = [
-            conditions.get(replace(key, factors=one).but("seed"), [])
+            conditions.get(replace(key, factors=one).without("seed"), [])
             for one in moved
         ]
         if len(names) != 2 or not all(groups):
@@ -281,7 +264,7 @@ def lifetimes(
     groups: dict[tuple, list[Row]] = {}
     for row in results.where(metric="kept").rows:
         if row[factor] is not None:
-            groups.setdefault(row.but("seed", factor), []).append(row)
+            groups.setdefault(row.without("seed", factor), []).append(row)
     found = []
     for some in groups.values():
         curves: dict[float, dict[int, float]] = {}
@@ -338,16 +321,16 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
     )
     values: dict[tuple, float] = {}
     for row in results.where(metric=x).rows:
-        values[row.but(*wider[0])] = row.value
+        values[row.without(*wider[0])] = row.value
         if not row.gate:
-            values[row.but(*wider[1])] = row.value
+            values[row.without(*wider[1])] = row.value
         if not row.method:
-            values[row.but(*wider[2])] = row.value
+            values[row.without(*wider[2])] = row.value
     found = []
     for row in results.where(metric=y).rows:
         at: object = row[x]
         if x not in results.factors:
-            keys = (row.but(*names) for names in wider)
+            keys = (row.without(*names) for names in wider)
             at = next((values[key] for key in keys if key in values), None)
         if isinstance(at, int | float) and not math.isnan(at + row.value):
             found.append((row, float(at)))
@@ -439,100 +422,6 @@ def _spearman(values: np.ndarray) -> np.ndarray:
         ranks /= np.linalg.norm(ranks, axis=-2, keepdims=True)
     # Without the error of the sums, by which the result may leave its range.
     return np.round(ranks.prod(axis=-1).sum(axis=-1), 12)
-
-
-def check_same_queries(one: Answers, other: Answers) -> None:
-    """Raises an error unless two methods answered the same queries.
-
-    Raises:
-        InputError: the two methods answered different queries.
-    """
-    frames, others = (a.columns["query_frame"] for a in (one, other))
-    if not np.array_equal(frames, others):
-        raise InputError(
-            f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
-            f" {other.label} answered different queries"
-        )
-
-
-def drive_number(queries: Answers) -> int:
-    """Returns a number of the drive of queries, equal in all tables."""
-    return zlib.crc32(f"{queries.map} {queries.query}".encode())
-
-
-class Ranked(NamedTuple):
-    """A method's mean of a metric over conditions, with a 95 % interval."""
-
-    method: str
-    value: float
-    interval: Interval
-
-
-def ranking(
-    rows: Iterable[Row], *, least_first: bool = False
-) -> tuple[list[Ranked], np.ndarray]:
-    """Returns methods ranked by their means over conditions.
-
-    Only conditions count that were measured with all methods. The intervals of
-    the means are t intervals. The independent units of the intervals are maps
-    if there are several maps, and conditions otherwise. Intervals are limited
-    to the metric's range. With two or three units, intervals are unknown,
-    because they would say next to nothing. The bootstrap samples contain the
-    same units for all methods and for all tables of the same maps; tables of
-    other maps are sampled independently. For a single condition, the intervals
-    come from the rows.
-
-    Args:
-        rows: rows of one metric.
-        least_first: whether a smaller value is better, so that the least value
-            comes first.
-
-    Returns:
-        The M methods, the best first; and (B, M) the mean of each method in
-        each bootstrap sample. Both are empty if no condition counts.
-    """
-    table: dict[tuple, dict[str, Row]] = {}
-    for row in rows:
-        if not math.isnan(row.value):
-            table.setdefault(row.but("method"), {})[row.label] = row
-    methods = {name for some in table.values() for name in some}
-    common = [some for some in table.values() if len(some) == len(methods)]
-    if not common:
-        return [], np.empty((0, 0))
-    names = sorted(methods)
-    values = np.array([[some[n].value for n in names] for some in common])
-    of_map = [some[names[0]].map for some in common]
-    units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
-    _, numbered = np.unique(units, return_inverse=True)
-    seed = zlib.crc32(" ".join(sorted(set(of_map))).encode())
-    weights = resampled_weights(len(common), seed, numbered)
-    with np.errstate(invalid="ignore"):
-        samples = weights @ values / weights.sum(axis=1, keepdims=True)
-    means = values.mean(axis=0)
-    first = common[0]
-    intervals = [Interval(first[n].low, first[n].high) for n in names]
-    number = int(numbered.max()) + 1
-    if number > 1:
-        intervals = [UNKNOWN] * len(names)
-    if number >= LEAST_UNITS:
-        is_in = numbered == np.arange(number)[:, None]
-        squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
-        spreads = np.sqrt(number / (number - 1) * squares) / len(common)
-        margins = stdtrit(number - 1, 0.975) * spreads
-        ends = np.clip(
-            [means - margins, means + margins],
-            *(range_of(first[names[0]].metric) or Range())[:2],
-        )
-        intervals = [Interval(*pair) for pair in ends.T.tolist()]
-    found = [
-        Ranked(*one)
-        for one in zip(names, means.tolist(), intervals, strict=True)
-    ]
-    sign = 1.0 if least_first else -1.0
-    order = sorted(
-        range(len(names)), key=lambda k: (sign * found[k].value, names[k])
-    )
-    return [found[k] for k in order], samples[:, order]
 
 
 def worths(results: Results, metric: str) -> list[Summary]:

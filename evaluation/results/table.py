@@ -1,65 +1,31 @@
 """The table of results, one number per row; and the table of queries.
 
-`results.csv` and `queries.csv` begin with the same columns: where, under which
-condition and how something was measured. All further columns are factors of an
-experiment. A factor is named by the path of its field in the experiment's file,
-such as `query.transient.snow`. The values of factors are numbers, text or truth
-values; a cell is empty where a factor does not apply.
+The rows of `results.csv` and `queries.csv` begin with the columns of a `Key`,
+followed by what was measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-import csv
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-import io
 import math
-from operator import itemgetter
 from pathlib import Path
-import re
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base.complete_files import write_text
-from cns_drake.base.csv_files import check_separator, csv_text
-from cns_drake.base.errors import InputError, errors_at
-from cns_drake.base.files import read_bytes
-from cns_drake.base.repetitions import repeated
-from cns_drake.base.terminal import note
-from cns_drake.base.version import __version__
-from evaluation.recognition.protocol import PROTOCOL_NAMES, RetrievalProtocol
+from cns_drake.base.csv_files import csv_text
+from cns_drake.base.errors import errors_at
+from evaluation.recognition.place_outcome import Number
 from evaluation.recognition.query_outcomes import QueryOutcomes
-from evaluation.recognition.result_number import Number
+from evaluation.results.keys import MEASURED, Key, key_columns
 from evaluation.results.ranges import Range, checked, range_of
+from evaluation.results.table_lines import TableLine, TableLines
 
 RESULTS = "results.csv"
 QUERIES = "queries.csv"
-# The beginning of a factor that is a setting of a method.
-SETTINGS = "methods."
-_BEFORE = ("experiment", "map", "database", "query", "seed")
-_BEHIND = ("task", "method", "gate", "protocol")
-# Columns that tables of earlier versions lack; their values are then unknown.
-_MADE = ("protocol_digest", "version")
-_NEEDED = (*_BEFORE, *_BEHIND)
-KEYS = (*_NEEDED, *_MADE)
-_MEASURED = ("metric", "value", "low", "high", "n")
-# A factor, and two of its values: a drive's own stage, or that of the query.
-STAGE = "both.stage"
-OWN = "own"
-LAST = "last"
-# The factor of the frozen redraws of the shipped maps.
-FROZEN_REDRAW = "both.redraw.frozen"
-# The factors of an experiment with cases: the name of the case, and its level.
-CAUSE = "cause"
-LEVEL = "level"
-# The cause of the condition without a change.
-NO_CAUSE = "none"
-# Names of columns in tables of earlier versions -> names of now.
-_FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
-# Names of other columns of `Key`, which no factor can have.
-_NAMED = frozenset(("label", *KEYS, *_MEASURED))
 # Columns of a query -> what kind of value they have.
 _ANSWERS = {
     "query_frame": int,
@@ -82,14 +48,6 @@ _ANSWERS = {
     "visible_change": float,
 }
 _NEEDED_ANSWERS = ("query_frame", "correct", "has_match", "score")
-# Type -> value that stands for an empty cell.
-_EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
-_NUMBER = re.compile(
-    r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
-)
-# Leading zeros belong to names, as in the stage 01.
-_NAME_OF_DIGITS = re.compile(r"0\d+")
-_TRUTH = {"0": False, "1": True, "false": False, "true": True}
 # Metrics whose intervals come from resampled queries, and may miss the value
 # itself by a little.
 _RESAMPLED = ("auc", "auc_strict", "r1")
@@ -101,128 +59,6 @@ _ROUNDING = 1e-9
 COSTS = ("query_time", "build_time", "memory")
 # Metrics that are known for any set of queries.
 _ALWAYS_KNOWN = ("auc", "auc_strict")
-# Columns of tables of earlier versions -> the command that makes such a table
-# now.
-_FORMER = (
-    ({"version", "db", "kept"}, "cns-drake study fresh"),
-    ({"db", "cause", "level"}, "cns-drake study ladder"),
-    ({"year", "seed", "kept"}, "cns-drake study years"),
-    ({"tenth", "half"}, "cns-drake study years"),
-    ({"db", "auc_unchanged"}, "cns-drake study stages"),
-    ({"tcr_sym", "recall_at_1"}, "cns-drake study trend"),
-    ({"others", "places", "query_ms"}, "cns-drake study size"),
-    ({"map", "db", "query"}, "cns-drake study stages"),
-)
-
-
-@dataclass(frozen=True)
-class Key:
-    """Where, under which condition and how something was measured.
-
-    Attributes:
-        experiment: name of the experiment.
-        map: name of the map.
-        database: name of the drive that makes the database.
-        query: name of the drive whose scans are the queries.
-        seed: seed of everything that is random.
-        factors: name -> value of each factor of the experiment. A factor that
-            does not apply is missing or None.
-        task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
-        method: method, estimator or baseline; "" for the task `change`.
-        gate: whether geometric verification rejected places, by the method's
-            own pose.
-        protocol: name of the protocol: `fair`, `paper` or `recorded` for the
-            shipped protocol as it is, and `own` for any other.
-        protocol_digest: hash of everything in the protocol that changes a
-            number, see `RetrievalProtocol.digest`; "" if unknown.
-        version: version of this program; "" if unknown.
-    """
-
-    experiment: str
-    map: str
-    database: str
-    query: str
-    seed: int
-    factors: Mapping[str, object]
-    task: str
-    method: str
-    gate: bool
-    protocol: str
-    protocol_digest: str = field(default="", kw_only=True)
-    version: str = field(default="", kw_only=True)
-
-    def __getitem__(self, column: str) -> object:
-        """Returns the value of a column, or `label`; None if it is unknown."""
-        if column in _NAMED:
-            return getattr(self, column, None)
-        return self.factors.get(column)
-
-    @property
-    def label(self) -> str:
-        """Name of the method, with its settings that are factors."""
-        start = f"{SETTINGS}{self.method}."
-        settings = (
-            f"{name.removeprefix(start)} {value}"
-            for name, value in self.factors.items()
-            if name.startswith(start) and value is not None
-        )
-        return ", ".join((self.method, *settings))
-
-    def but(self, *names: str) -> tuple[object, ...]:
-        """Returns the key without some of its columns, to group rows by.
-
-        If two rows have the same reduced key, they were measured under
-        conditions that differ only in the columns left out.
-
-        Args:
-            names: names of the columns to leave out. With `method`, settings of
-                methods, such as `methods.ring++.crop`, are left out as well.
-                With `protocol` or a field of the protocol, such as
-                `protocol.radius`, name and digest of the protocol are left out.
-                The version is never part of the key.
-
-        Returns:
-            The values of the remaining columns, in a fixed order.
-        """
-        if any(one.partition(".")[0] == "protocol" for one in names):
-            names = (*names, "protocol", "protocol_digest")
-        known = [name for name in KEYS if name not in (*names, "version")]
-        without_settings = "method" in names
-        applying = (
-            (name, value)
-            for name, value in self.factors.items()
-            if value is not None
-            and name not in names
-            and not (without_settings and name.startswith(SETTINGS))
-        )
-        return (
-            *(getattr(self, n) for n in known),
-            *sorted(applying, key=_NAME),
-        )
-
-
-_NAME: Callable[[Any], str] = itemgetter(0)
-
-
-def made_by(
-    protocol: RetrievalProtocol, settings: Mapping[str, object] | None = None
-) -> dict[str, Any]:
-    """Returns the columns of a `Key` that say how something was measured.
-
-    Args:
-        protocol: the protocol.
-        settings: name -> value of the settings that affect results, are no part
-            of the protocol, and differ from their defaults.
-
-    Returns:
-        `protocol`, `protocol_digest` and `version`. With settings, the protocol
-        is `own`.
-    """
-    return {
-        "protocol": "own" if settings else protocol.name,
-        "protocol_digest": protocol.digest(**(settings or {})),
-        "version": __version__,
-    }
 
 
 @dataclass(frozen=True)
@@ -330,7 +166,7 @@ class Results:
                 impossible value. The error names the line, the column and the
                 fault.
         """
-        table = _Cells.read(path, RESULTS, (*_NEEDED, *_MEASURED), _MADE)
+        table = TableLines.read(path, RESULTS, MEASURED)
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
         for one, key, identity in table.keyed():
@@ -352,7 +188,7 @@ class Results:
                 (*_key_cells(row, self.factors), *_measured_cells(row))
                 for row in self.rows
             ]
-        header = (*_BEFORE, *self.factors, *_BEHIND, *_MADE, *_MEASURED)
+        header = (*key_columns(self.factors), *MEASURED)
         write_text(path, csv_text(header, lines))
 
     def where(
@@ -426,16 +262,16 @@ class QueryRows:
         Raises:
             InputError: as `Results.read`.
         """
-        table = _Cells.read(
+        table = TableLines.read(
             path,
             QUERIES,
-            (*_NEEDED, *_NEEDED_ANSWERS),
-            (*_MADE, *_ANSWERS),
+            _NEEDED_ANSWERS,
+            _ANSWERS,
             # Tasks such as `change` and `map` have no queries.
             may_be_empty=True,
         )
         names = [name for name in _ANSWERS if name in table.columns]
-        found: dict[tuple[object, ...], tuple[dict, list[_Line]]] = {}
+        found: dict[tuple[object, ...], tuple[dict, list[TableLine]]] = {}
         for one, key, identity in table.keyed():
             found.setdefault(identity, (key, []))[1].append(one)
         return cls(
@@ -454,7 +290,7 @@ class QueryRows:
         Raises:
             InputError: the file cannot be written.
         """
-        header = (*_BEFORE, *self.factors, *_BEHIND, *_MADE, *_ANSWERS)
+        header = (*key_columns(self.factors), *_ANSWERS)
         write_text(path, csv_text(header, self._lines()))
 
     def _lines(self) -> Iterator[list[str]]:
@@ -476,7 +312,7 @@ def _factor_names(keys: Iterable[Key]) -> tuple[str, ...]:
 
 
 def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
-    names = (*_BEFORE, *factors, *_BEHIND, *_MADE)
+    names = key_columns(factors)
     cells = [_cell(key[name]) for name in names]
     cells[names.index("gate")] = str(int(key.gate))
     return cells
@@ -506,7 +342,7 @@ def _answer_cell(value: Any, kind: type) -> str:
 
 
 def _answer_columns(
-    lines: Sequence[_Line], names: Iterable[str], task: str
+    lines: Sequence[TableLine], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
     """Returns column -> checked values of all lines with the same key."""
     columns: dict[str, np.ndarray] = {}
@@ -540,7 +376,7 @@ def _answer_columns(
     return columns
 
 
-def _measured_values(one: _Line) -> dict[str, Any]:
+def _measured_values(one: TableLine) -> dict[str, Any]:
     """Returns a row's values in the columns after those of its key."""
     metric = one.text("metric")
     value, low, high = (
@@ -571,208 +407,3 @@ def _measured_values(one: _Line) -> dict[str, Any]:
         "high": high,
         "n": None if n < 0 else n,
     }
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A line of a table."""
-
-    file: Path
-    number: int
-    columns: Mapping[str, int]
-    cells: Sequence[str]
-
-    def fault(self, column: str, fault: str) -> InputError:
-        return InputError(f"{self.file}: line {self.number}: {column}: {fault}")
-
-    def cells_of(self, names: Iterable[str]) -> tuple[str, ...]:
-        return tuple([self.cells[self.columns[name]] for name in names])
-
-    def text(self, column: str) -> str:
-        cell = self.cells[self.columns[column]]
-        if not cell:
-            raise self.fault(column, "empty")
-        return cell
-
-    def value(self, column: str, kind: type) -> Any:
-        """Returns a cell as a value of a type.
-
-        The value of an empty cell is -1 for int, NaN for float, and "" for str.
-
-        Raises:
-            InputError: the cell contains no value of this type.
-        """
-        cell = self.cells[self.columns[column]]
-        if kind is bool:
-            if cell.lower() not in _TRUTH:
-                raise self.fault(column, f"{cell!r} is neither 0 nor 1")
-            return _TRUTH[cell.lower()]
-        if kind is str or not cell:
-            return cell or _EMPTY[kind]
-        if not _NUMBER.fullmatch(cell) or math.isinf(float(cell)):
-            raise self.fault(column, f"{cell!r} is no number")
-        if kind is float:
-            return float(cell)
-        # Programs with NaN for empty cells write whole numbers with a point.
-        whole = int(cell) if cell.isdigit() else float(cell)
-        if not 0 <= whole < 2**63 or whole != int(whole):
-            raise self.fault(column, f"{cell!r} is no whole number from 0 on")
-        return int(whole)
-
-    def factor(self, column: str) -> object:
-        """Returns the value of a factor: number, truth value, text or None."""
-        cell = self.cells[self.columns[column]]
-        if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
-            value = float(cell)
-            if math.isinf(value):
-                raise self.fault(column, f"{cell!r} is no number")
-            return int(cell) if cell.lstrip("+-").isdigit() else value
-        if cell.lower() in ("true", "false"):
-            return _TRUTH[cell.lower()]
-        return cell or None
-
-    def key(self, factors: Iterable[str]) -> dict[str, Any]:
-        """Returns the arguments with which to make the `Key` of this line.
-
-        `factors` contains the names of the columns with factors. Factors whose
-        cells are empty are left out.
-
-        Raises:
-            InputError: a cell is empty or has a value that is not allowed.
-        """
-        values: dict[str, Any] = {
-            name: self.text(name) for name in ("experiment", "map", "task")
-        }
-        for name in ("database", "query", "method", "protocol"):
-            values[name] = self.cells[self.columns[name]]
-        for name in filter(self.columns.__contains__, _MADE):
-            values[name] = self.cells[self.columns[name]]
-        values["seed"] = self.value("seed", int)
-        if values["seed"] < 0:
-            raise self.fault("seed", "empty")
-        values["gate"] = self.value("gate", bool)
-        known = {name: self.factor(name) for name in factors}
-        values["factors"] = {n: v for n, v in known.items() if v is not None}
-        if not values["method"] and values["task"] != "change":
-            raise self.fault("method", "empty")
-        names = (*PROTOCOL_NAMES, "")
-        if values["protocol"] not in names:
-            raise self.fault(
-                "protocol",
-                f"{values['protocol']!r} is none of {', '.join(names[:-1])}",
-            )
-        return values
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """The lines of a file, and where each column stands."""
-
-    file: Path
-    columns: Mapping[str, int]
-    factors: tuple[str, ...]
-    rows: Sequence[tuple[int, list[str]]]
-
-    @classmethod
-    def read(
-        cls,
-        path: str | Path,
-        usual: str,
-        needed: Iterable[str],
-        known: Iterable[str] = (),
-        *,
-        may_be_empty: bool = False,
-    ) -> _Cells:
-        """Reads the lines of a table of results.
-
-        Args:
-            path: the file, or a folder that contains it.
-            usual: name of the file in a folder.
-            needed: names of columns that the file must have.
-            known: names of further columns that are not factors.
-            may_be_empty: whether the file may have no rows.
-        """
-        path = Path(path)
-        file = path / usual if path.is_dir() else path
-        try:
-            text = read_bytes(file).decode("utf-8-sig")
-            check_separator(file, text)
-            reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-            (_, names), *rows = [
-                (reader.line_num, [cell.strip(" ") for cell in row])
-                for row in reader
-            ] or [(1, [])]
-        except UnicodeDecodeError:
-            raise InputError(f"{file}: not UTF-8 text") from None
-        except csv.Error as error:
-            raise InputError(f"{file}: not CSV: {error}") from None
-        for number, row in [(1, names), *rows]:
-            if not "".join(row).isprintable():
-                k, cell = next(
-                    (k, cell)
-                    for k, cell in enumerate(row)
-                    if not cell.isprintable()
-                )
-                name = names[k] if number > 1 and k < len(names) else k + 1
-                raise InputError(
-                    f"{file}: line {number}: {name}: {cell!r} has a control"
-                    " character"
-                )
-        needed = tuple(needed)
-        for former, now in _FORMER_NAMES.items():
-            if former in names and now not in names:
-                note(f"{file}: the column {former} is named {now} now")
-                names[names.index(former)] = now
-        width = len(names)
-        missing = [name for name in needed if name not in names]
-        for columns_then, command in _FORMER:
-            if missing and columns_then <= set(names):
-                raise InputError(
-                    f"{file}: a table of an earlier version; '{command}' makes"
-                    " one with the columns of now"
-                )
-        if missing:
-            raise InputError(f"{file}: no column '{missing[0]}'")
-        if "" in names:
-            raise InputError(f"{file}: line 1: column '' has no name")
-        for name in repeated(names):
-            raise InputError(f"{file}: line 1: column '{name}' is there twice")
-        others = {*needed, *known}
-        factors = [name for name in names if name not in others]
-        for name in factors:
-            if name in _NAMED:
-                raise InputError(f"{file}: line 1: '{name}' names no factor")
-        columns = {name: k for k, name in enumerate(names)}
-        rows = [one for one in rows if any(one[1])]
-        if not (rows or may_be_empty):
-            raise InputError(f"{file}: no rows")
-        for number, row in rows:
-            if len(row) != width:
-                raise InputError(
-                    f"{file}: line {number}: {len(row)} cells instead of"
-                    f" {width}"
-                )
-        return cls(file, columns, tuple(factors), rows)
-
-    def keyed(
-        self,
-    ) -> Iterator[tuple[_Line, dict[str, Any], tuple[object, ...]]]:
-        """Yields each line of the file with its key.
-
-        Yields:
-            The line; the attributes of its `Key`, by name; and all values of
-            the `Key` as a tuple, by which lines can be grouped.
-
-        Raises:
-            InputError: a line has a wrong key.
-        """
-        made = filter(self.columns.__contains__, _MADE)
-        names = (*_BEFORE, *self.factors, *_BEHIND, *made)
-        known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
-        for number, cells in self.rows:
-            one = _Line(self.file, number, self.columns, cells)
-            spelled = one.cells_of(names)
-            if spelled not in known:
-                key = one.key(self.factors)
-                known[spelled] = key, Key(**key).but()
-            yield one, *known[spelled]

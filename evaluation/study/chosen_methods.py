@@ -20,7 +20,7 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.methods.own_files import load_method
-from evaluation.results.table import SETTINGS
+from evaluation.results.keys import SETTINGS
 
 # The value of a parameter, as text.
 Setting = str | tuple[str, ...]

@@ -10,25 +10,23 @@ from cns_drake.base.jobs.running import Job
 from evaluation.recognition.describing import Role
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report import page, result_tables
+from evaluation.report.contents import Report
 from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import Reference
-from evaluation.results.table import LAST, OWN, STAGE
+from evaluation.report.tables.queries import DriveTrack
+from evaluation.results.keys import LAST, OWN, STAGE
 from evaluation.study import figures
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.collection import MapDrives, Recordings
 from evaluation.study.engine import Engine
+from evaluation.study.extraction_jobs import ExtractionJobs
 from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.feature_extraction import Further
+from evaluation.study.map_drives import MapDrives, Recordings
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.recorded import (
-    ExtractionJobs,
-    RecordedCondition,
-    recorded_comparisons,
-)
+from evaluation.study.recorded_pairs import RecordedCondition, recorded_pairs
 from evaluation.study.repeats import Repeat, repeats_of
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import Pair, Result
+from evaluation.study.tasks.pair import Pair, Result
 
 # Expected time to compare two drives by a method [s].
 _RECOGNITION_COST = 3.5
@@ -106,7 +104,7 @@ class CityReport:
 
     def _measured_pairs(self) -> list[Pair]:
         """Returns the pairs that the experiment measures, with controls."""
-        pairs = recorded_comparisons(
+        pairs = recorded_pairs(
             self._city,
             [
                 RecordedCondition({STAGE: LAST}, LAST, True, self._protocol),
@@ -182,7 +180,7 @@ class CityReport:
                 {STAGE: OWN}, OWN, False, self._protocol, drives
             )
             names = "+".join(one.name for one in drives)
-            for pair in recorded_comparisons(
+            for pair in recorded_pairs(
                 self._city, [condition], _SEED, lambda text: None
             ):
                 yield single, replace(pair, names=(names, pair.query.name))
@@ -247,9 +245,7 @@ class CityReport:
             and one.outcomes.has_match.any()
         ]
 
-    def collect(
-        self, report: page.Report, on_note: Callable[[str], None]
-    ) -> None:
+    def collect(self, report: Report, on_note: Callable[[str], None]) -> None:
         """Adds the results of the city to a report.
 
         Args:
@@ -293,9 +289,7 @@ class CityReport:
                 drives |= {one.name for one, _ in control.roles}
             for name in sorted(drives - report.tracks.keys()):
                 drive = self._files.features(name).drive.read()
-                report.tracks[name] = result_tables.DriveTrack(
-                    drive.stamps_ns, drive.X_WS
-                )
+                report.tracks[name] = DriveTrack(drive.stamps_ns, drive.X_WS)
         for pair, together in self._sessions:
             own = self._measured_or_control(pair)
             assert own is not None

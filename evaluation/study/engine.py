@@ -17,6 +17,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.forecast import forecast
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.progress import doing
+from evaluation.results.keys import made_by
 from evaluation.results.table import (
     QUERIES,
     RESULTS,
@@ -24,7 +25,6 @@ from evaluation.results.table import (
     QueryRows,
     Results,
     Row,
-    made_by,
 )
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.removed_descriptors import (
@@ -32,7 +32,9 @@ from evaluation.study.removed_descriptors import (
     renew_removed_descriptors,
 )
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Task
+from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.pair import NamedDrive, Pair
+from evaluation.study.tasks.task import Task
 
 # What a study takes is told if it takes longer, as costs of jobs say [s].
 _LONG = 60.0

@@ -16,7 +16,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import track
-from evaluation.drives.sampling import within_range
+from evaluation.drives.scan_clouds import within_range
 from evaluation.maps.voxel_maps import downsample
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
@@ -27,11 +27,11 @@ from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import KeptScans
+from evaluation.study.features import KeptScans
 from evaluation.study.parts import Part
 
 # Points at least this high above the ground are non-ground points [m].
-_STANDING = 0.5
+_LEAST_HEIGHT = 0.5
 # Edge of the cells in which a scan keeps one point for alignment [m].
 _CELL = 0.5
 # Greatest distance of two points that coincide [m].
@@ -99,7 +99,7 @@ def find_evidence(
     is_needed[matched] = True
     for places in wrong.values():
         is_needed[places[places >= 0]] = True
-    shown = {}
+    scans = {}
     for place in track(
         np.flatnonzero(is_needed).tolist(),
         f"reasons: reading {database.name}",
@@ -107,7 +107,7 @@ def find_evidence(
         "places",
     ):
         frame = int(first.place_frames[place])
-        shown[place] = _Shown.of(database, frame, protocol.max_range)
+        scans[place] = _ComparedScan.of(database, frame, protocol.max_range)
     classes = {
         number: str(one.get("class", "unknown"))
         for drive in (database, query)
@@ -124,23 +124,23 @@ def find_evidence(
         range(number), f"reasons: comparing {query.name}", number, "queries"
     ):
         frame = int(query_frames[row])
-        query_scan = _Shown.of(query, frame, protocol.max_range)
+        query_scan = _ComparedScan.of(query, frame, protocol.max_range)
         matches = matched[rows == row].tolist()
         right = None
         if matches and len(query_scan.points):
             seen = [
-                shown[k].seen.shares_of(query_scan.seen_from(shown[k]))
+                scans[k].seen.shares_of(query_scan.seen_from(scans[k]))
                 for k in matches
             ]
             best = int(np.argmax([one.shown for one in seen]))
-            right = shown[matches[best]]
+            right = scans[matches[best]]
             overlaps[row], hidden_shares[row] = seen[best]
             if classes:
                 changed[row], changed_classes[row] = _changed_share(
                     right, query_scan, classes
                 )
         answers = sorted({int(places[row]) for places in wrong.values()} - {-1})
-        compared = [shown[k] for k in answers]
+        compared = [scans[k] for k in answers]
         if answers and right is not None:
             compared.append(right)
         found = _coinciding_shares(query_scan, compared)
@@ -166,7 +166,7 @@ def _wrong_places(result: PlaceOutcome) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _ComparedScan:
     """A scan (N, 3) in the frame of the sensor [m], and its pose (4, 4).
 
     `instances` (N,) is the number of the structure on which each point lies;
@@ -180,7 +180,7 @@ class _Shown:
     @classmethod
     def of(
         cls, drive: Drive | KeptScans, frame: int, max_range: float
-    ) -> _Shown:
+    ) -> _ComparedScan:
         scan = drive.scan(frame)
         points = xyz(scan)
         kept = within_range(points, max_range)
@@ -200,45 +200,47 @@ class _Shown:
         return LayeredOverlap().describe_place(self.points)
 
     @cached_property
-    def standing(self) -> np.ndarray:
-        """(M, 3) centroids of the points on upright objects, per voxel [m]."""
+    def non_ground(self) -> np.ndarray:
+        """(M, 3) centroids of the non-ground points, per voxel [m]."""
         return downsample(
-            self.points[self.points[:, 2] > _least_standing_height()], _CELL
+            self.points[self.points[:, 2] > _non_ground_height()], _CELL
         )
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Search tree of the points on upright objects (`standing`)."""
-        return cKDTree(self.standing, balanced_tree=False, compact_nodes=False)
+        """Search tree of the non-ground points."""
+        return cKDTree(
+            self.non_ground, balanced_tree=False, compact_nodes=False
+        )
 
     def coinciding(self, points: np.ndarray) -> float:
         """Returns the share of given points that coincide with this scan.
 
-        A point coincides if it is at most 1 m from a point of the scan on an
-        upright object. The points (N, 3), N > 0, are in the frame of this
-        scan's sensor [m].
+        A point coincides if it is at most 1 m from a non-ground point of the
+        scan. The points (N, 3), N > 0, are in the frame of this scan's sensor
+        [m].
         """
         found, _ = self.tree.query(points, distance_upper_bound=_COINCIDENT)
         return float(np.isfinite(found).mean())
 
     @cached_property
-    def some(self) -> np.ndarray:
+    def sample(self) -> np.ndarray:
         """(M, 3) a random sample of the scan's points."""
         return sample_points(self.points)
 
     @cached_property
-    def some_instances(self) -> np.ndarray | None:
-        """(M,) number of the structure on which each point of `some` lies."""
+    def sample_instances(self) -> np.ndarray | None:
+        """(M,) number of the structure on which each point of `sample` lies."""
         return None if self.instances is None else sample_points(self.instances)
 
-    def seen_from(self, other: _Shown) -> np.ndarray:
-        """Returns the sample `some` in the frame of another scan's sensor."""
+    def seen_from(self, other: _ComparedScan) -> np.ndarray:
+        """Returns `sample` in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
-        return transform(X_OS, self.some)
+        return transform(X_OS, self.sample)
 
 
 def _changed_share(
-    place: _Shown, query: _Shown, classes: Mapping[int, str]
+    place: _ComparedScan, query: _ComparedScan, classes: Mapping[int, str]
 ) -> tuple[float, str]:
     """Returns the share of two scans that is new or gone, and its main class.
 
@@ -248,12 +250,12 @@ def _changed_share(
     changed: Counter[str] = Counter()
     total = 0
     for one, other in ((place, query), (query, place)):
-        points, instances = one.some, one.some_instances
+        points, instances = one.sample, one.sample_instances
         if instances is None or other.instances is None:
             return math.nan, ""
-        is_standing = points[:, 2] > _least_standing_height()
-        total += int(is_standing.sum())
-        is_gone = is_standing & ~np.isin(instances, other.instances)
+        is_non_ground = points[:, 2] > _non_ground_height()
+        total += int(is_non_ground.sum())
+        is_gone = is_non_ground & ~np.isin(instances, other.instances)
         X_OS = inverse(other.X_WS) @ one.X_WS
         is_open = ~other.seen.hides(transform(X_OS, points[is_gone]))
         changed.update(
@@ -267,33 +269,35 @@ def _changed_share(
     return changed.total() / total, name
 
 
-def _coinciding_shares(query: _Shown, places: Sequence[_Shown]) -> list[float]:
-    """Returns, for each place, the share of upright points that coincide.
+def _coinciding_shares(
+    query: _ComparedScan, places: Sequence[_ComparedScan]
+) -> list[float]:
+    """Returns, for each place, the share of non-ground points that coincide.
 
     Query and place are aligned at the pose that the method layered overlap
     finds, not at their true poses. The result is the lesser of two shares: of
     the query's points and of the place's points.
     """
     shared = [0.0] * len(places)
-    standing = [k for k, one in enumerate(places) if len(one.standing)]
-    if not (len(query.standing) and standing):
+    with_points = [k for k, one in enumerate(places) if len(one.non_ground)]
+    if not (len(query.non_ground) and with_points):
         return shared
     method = LayeredOverlap()
     poses = method.relative_poses(
         method.describe(query.points),
-        method.build_database([places[k].described for k in standing]),
-        range(len(standing)),
+        method.build_database([places[k].described for k in with_points]),
+        range(len(with_points)),
     )
-    for k, X_PQ in zip(standing, poses, strict=True):
+    for k, X_PQ in zip(with_points, poses, strict=True):
         if X_PQ is not None:
             place = places[k]
             shared[k] = min(
-                place.coinciding(transform(X_PQ, query.standing)),
-                query.coinciding(transform(inverse(X_PQ), place.standing)),
+                place.coinciding(transform(X_PQ, query.non_ground)),
+                query.coinciding(transform(inverse(X_PQ), place.non_ground)),
             )
     return shared
 
 
-def _least_standing_height() -> float:
-    """Returns the least height of standing points above the sensor [m]."""
-    return _STANDING - MethodConfig().sensor_height
+def _non_ground_height() -> float:
+    """Returns the least height of non-ground points above the sensor [m]."""
+    return _LEAST_HEIGHT - MethodConfig().sensor_height

@@ -1,200 +1,43 @@
-"""Feature extraction: maps, places and queries of a drive, in one pass."""
+"""Feature extraction: reads a drive once, for its map and descriptors."""
 
 from collections.abc import Callable, Mapping, Set
 import contextlib
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter, Step
-from cns_drake.base.points import xyz
-from cns_drake.base.progress import doing, track
-from evaluation.change.drive_maps import DriveMap
+from cns_drake.base.progress import doing
+from evaluation.change.drive_change import DriveMap
 from evaluation.drives import Drive, DriveNames
 from evaluation.drives.drive_views import RecentScans
-from evaluation.drives.sampling import cropped, sample_frames, within_range
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cropped
+from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.thumbnails import thumbnail
-from evaluation.maps.voxel_maps import (
-    CELL_SIZE,
-    VoxelAccumulator,
-    VoxelMap,
-    map_drive,
-)
+from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
 from evaluation.methods import MethodConfig
 from evaluation.recognition import describing
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.features import (
+    DriveSummary,
+    ExtractedFeatures,
+    KeptScans,
+    described_key,
+)
 from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
 from evaluation.study.study_files import FeatureFiles
 
-# Divisions of a cell's side for pictures, with a point in each 0.5 m.
-PICTURE_DIVISIONS = 2
 # A method, and what it describes of a drive by a second protocol.
 Further: TypeAlias = (
     "tuple[MethodChoice, frozenset[describing.Role], RetrievalProtocol]"
 )
-# Fields of the points of kept scans, where a drive has them.
-_KEPT_FIELDS = ("x", "y", "z", "instance")
-
-
-class MappedDrive(RecentScans):
-    """A drive that makes a map of its scans while they are read.
-
-    If scans are requested in nearly increasing order, each scan is read only
-    once.
-    """
-
-    def __init__(self, drive: Drive, kept: int):
-        super().__init__(drive, kept)
-        self._accumulator = VoxelAccumulator(CELL_SIZE, PICTURE_DIVISIONS)
-        self._num_mapped = 0
-
-    def scan(self, index: int) -> np.ndarray:
-        while self._num_mapped <= index:
-            self._map_next()
-        return super().scan(index)
-
-    def finish(self) -> tuple[VoxelMap, np.ndarray]:
-        """Reads the remaining scans, so that the map is complete.
-
-        Returns:
-            The map of all scans, in voxels of 1 m from which the change ratio
-            (TCR) is computed; and a finer cloud (K, 3) for pictures, in W [m].
-        """
-        left = range(self._num_mapped, len(self))
-        for _ in track(left, f"mapping {self.name}", len(left), "scans"):
-            self._map_next()
-        return self._accumulator.to_map(), self._accumulator.samples()
-
-    def _map_next(self) -> None:
-        scan = super().scan(self._num_mapped)
-        self._accumulator.add(scan, self.X_WS[self._num_mapped])
-        self._num_mapped += 1
-
-
-@dataclass(frozen=True)
-class DriveSummary:
-    """A drive with its map, and with its scans reduced to small pictures.
-
-    Attributes:
-        placed: names of the drive, its world frame and its map.
-        stamps_ns: (N,) int64 time stamps of all frames [ns].
-        X_WS: (N, 4, 4) poses of the sensor at all frames.
-        coarse: the map, in voxels of 1 m from which the change ratio (TCR) is
-            computed.
-        frames: (K,) frames that are places or queries; empty if the drive has
-            neither.
-        thumbnails: K reduced scans at these frames, see
-            `evaluation.maps.thumbnails`.
-    """
-
-    placed: DriveNames
-    stamps_ns: np.ndarray
-    X_WS: np.ndarray
-    coarse: VoxelMap
-    frames: np.ndarray
-    thumbnails: list[np.ndarray]
-
-    @property
-    def name(self) -> str:
-        return self.placed.name
-
-    @property
-    def positions(self) -> np.ndarray:
-        """(N, 3) positions of the sensor in the world [m]."""
-        return self.X_WS[:, :3, 3]
-
-    @property
-    def drive_map(self) -> DriveMap:
-        """The map, with the names of the drive, its world and its map."""
-        return DriveMap(self.name, self.coarse, self.positions, self.placed)
-
-
-@dataclass(frozen=True)
-class KeptScans:
-    """A drive with only the scans of its places and queries.
-
-    Attributes:
-        name: name of the drive.
-        X_WS: (N, 4, 4) poses of the sensor at all frames.
-        instances: instance id of a structure -> its name and class; None if
-            unknown.
-        scans: frame -> structured array (M,) with coordinates and instance ids
-            of the points within range.
-    """
-
-    name: str
-    X_WS: np.ndarray
-    instances: Mapping[int, Mapping] | None
-    scans: dict[int, np.ndarray] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        """Returns the number of frames of the drive."""
-        return len(self.X_WS)
-
-    def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Stores a scan in `scans`.
-
-        Args:
-            frame: number of the frame.
-            scan: structured array (M,) in the sensor's frame.
-            max_range: limit of the coordinates in the frame of the rotated
-                sensor [m]. A point is stored if some rotation of the sensor can
-                bring all its coordinates within this limit.
-        """
-        # A corner of the cube may lie on an axis of a rotated sensor.
-        max_range *= math.sqrt(3.0)
-        names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
-        kept = within_range(xyz(scan), max_range)
-        # A view would hold all fields.
-        self.scans[frame] = repack_fields(scan[names][kept])
-
-    def scan(self, index: int) -> np.ndarray:
-        """Returns the scan of a frame, which must have been kept."""
-        return self.scans[index]
-
-
-@dataclass(frozen=True)
-class ExtractedFeatures:
-    """The results of reading a recording once: map, places and queries.
-
-    Attributes:
-        placed: names of the drive, its world frame and its map.
-        described: key of a method -> its descriptors of the places and
-            queries; empty if the drive has neither.
-        scans: scans of places and queries; None if they are not kept. If there
-            is a map, this is a `KeptScans` with the recorded scans. Otherwise
-            it is a list of arrays (N, 3) float32, in which queries are changed
-            as the protocol says: rotated, tilted or without a sector.
-        drive: the drive with its map; None without a map.
-        fine: (K, 3) cloud for pictures in W [m]; None without a map.
-    """
-
-    placed: DriveNames
-    described: dict[str, DriveDescriptors]
-    scans: KeptScans | list[np.ndarray] | None
-    drive: DriveSummary | None = None
-    fine: np.ndarray | None = None
-
-
-def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key in `ExtractedFeatures.described` for a second protocol.
-
-    Descriptors by the study's own protocol have the key of the method. Use this
-    function for descriptors by any other protocol.
-
-    Args:
-        method: key of the method.
-        protocol: the second protocol, such as that of published results.
-    """
-    return f"{method},{protocol.name}"
 
 
 def extract_features(

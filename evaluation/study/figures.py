@@ -15,23 +15,17 @@ from evaluation.change.drive_change import (
 )
 from evaluation.recognition.metrics import MODES
 from evaluation.report import map_figures
-from evaluation.report.page_data import (
-    Illustration,
-    PageDrive,
-    camera_images,
-    make_drive,
-)
-from evaluation.results.drawing import PIXELS
-from evaluation.study.collection import MapDrives, Recordings
-from evaluation.study.feature_extraction import DriveSummary
+from evaluation.report.camera_images import nearest_images
+from evaluation.report.illustrations import Illustration
+from evaluation.report.page_data import PageDrive, make_page_drive
+from evaluation.results.figure_files import PIXELS
+from evaluation.study.extraction_jobs import ExtractionJobs
+from evaluation.study.features import DriveSummary
+from evaluation.study.map_drives import MapDrives, Recordings
 from evaluation.study.parts import MakePart, Part
-from evaluation.study.recorded import ExtractionJobs
-from evaluation.study.sources import (
-    DriveSource,
-    RecordingSource,
-)
+from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import job_name
+from evaluation.study.tasks.jobs import job_name
 
 # Format of pictures on the page.
 _PAGE_KIND = PIXELS[-1]
@@ -72,8 +66,8 @@ def draw_city(
         images = None
         if isinstance(source, RecordingSource):
             stamps_ns = drive.stamps_ns[drive.frames]
-            images = camera_images(source(), stamps_ns, reporter.note)
-        drives[drive.name] = make_drive(
+            images = nearest_images(source(), stamps_ns, reporter.note)
+        drives[drive.name] = make_page_drive(
             drive.name, view, drive.X_WS, drive.frames, drive.thumbnails, images
         )
     doing("drawing the routes")

@@ -4,7 +4,7 @@ import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.drives.drive_views import MovedDrive
-from evaluation.drives.sampling import gather
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
@@ -47,7 +47,7 @@ def measure_method_costs(
         number = protocol.scans(method)
         last = max(len(drive) - number, 0)
         clouds = [
-            gather(
+            cloud_at(
                 drive,
                 frame,
                 number,

@@ -18,15 +18,9 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
 from evaluation.study.parts import Part
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import (
-    Held,
-    Jobs,
-    NamedDrive,
-    Pair,
-    Result,
-    Task,
-    job_name,
-)
+from evaluation.study.tasks.jobs import Jobs, job_name
+from evaluation.study.tasks.pair import Held, NamedDrive, Pair, Result
+from evaluation.study.tasks.task import Task
 
 
 @dataclass(frozen=True, eq=False)

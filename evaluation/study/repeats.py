@@ -9,10 +9,11 @@ from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.feature_extraction import described_key
-from evaluation.study.measurements import DescribedSource
+from evaluation.study.features import described_key
+from evaluation.study.place_measurements import DescribedSource
 from evaluation.study.study_files import StudyFiles
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair
+from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.pair import NamedDrive, Pair
 
 
 @dataclass(frozen=True)

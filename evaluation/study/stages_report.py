@@ -12,22 +12,25 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.report import page, result_tables
+from evaluation.report.charts import draw_charts
+from evaluation.report.contents import Report
+from evaluation.report.page import write_report
 from evaluation.report.reference import NO_REFERENCE, Reference
+from evaluation.report.tables.differences import method_differences
 from evaluation.results.table import Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.city_report import CityReport
-from evaluation.study.collection import (
+from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.map_drives import (
     MapDrives,
     RecordingInfo,
     Recordings,
     drives_by_map,
-    find_recordings,
     nothing_to_compare,
 )
-from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.method_costs import measure_method_costs
 from evaluation.study.parts import MakePart
+from evaluation.study.recording_search import find_recordings
 from evaluation.study.removed_descriptors import (
     remove_descriptors,
     renew_removed_descriptors,
@@ -227,7 +230,7 @@ class StagesReport:
         doing("writing the report")
         folder = self.files.figures
         make_folder(folder)
-        report = page.Report(pages=pages or {}, reference=self.reference)
+        report = Report(pages=pages or {}, reference=self.reference)
         report.made_by = [
             f"cns-drake {__version__}",
             *(one.key for one in self.methods if one.settings),
@@ -248,22 +251,18 @@ class StagesReport:
             report.notes = nothing_to_compare(self.cities)
         for note in report.notes:
             on_note(note)
-        report.differences = result_tables.method_differences(
-            report.recognitions
-        )
-        for illustration in page.chart_illustrations(report, folder):
+        report.differences = method_differences(report.recognitions)
+        for illustration in draw_charts(report, folder):
             report.illustrations.insert(0, illustration)
         if self._costed_pair is not None:
             report.costs = self.files.part("costs", "costs").read()
-        written = page.write_report(
-            report, self.output, with_tables=with_tables
-        )
+        written = write_report(report, self.output, with_tables=with_tables)
         for one in self._plan.cities:
             remove_descriptors(one.jobs.values())
         return written
 
 
-def write_report(
+def report_on_recordings(
     recordings: Path,
     output: Path,
     cluster: Cluster,

@@ -13,11 +13,11 @@ import resource
 import time
 
 from evaluation.drives import open_drive
-from evaluation.drives.sampling import gather
+from evaluation.drives.scan_clouds import cloud_at
+from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.voxel_maps import map_drive
 from evaluation.methods import make_method
 from evaluation.recognition.retrieval import retrieve
-from evaluation.study.feature_extraction import MappedDrive
 
 
 def measure(label: str, work: Callable, number: int = 1):
@@ -54,7 +54,7 @@ def main() -> None:
     )
     print(f"{len(fine)} points for pictures")
     method = make_method("scan-context++", {})
-    clouds = [gather(drive, i, 1, 100.0) for i in range(0, number, 20)]
+    clouds = [cloud_at(drive, i, 1, 100.0) for i in range(0, number, 20)]
     places = measure(
         "describe places",
         lambda: [method.describe_place(cloud) for cloud in clouds],

@@ -21,13 +21,8 @@ from cns_drake.studies.study import TASKS
 from evaluation.localisation import results, tracking
 from evaluation.recognition import faults, place_numbers, place_outcome
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.table import (
-    FROZEN_REDRAW,
-    Answers,
-    QueryRows,
-    Results,
-    Row,
-)
+from evaluation.results.keys import FROZEN_REDRAW
+from evaluation.results.table import Answers, QueryRows, Results, Row
 from evaluation.study.tasks import map_scores
 
 PAGE = documents.read("docs/studies.md")

@@ -14,12 +14,14 @@ from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
+from evaluation.report.contents import Report
+from evaluation.report.illustrations import Illustration
 from evaluation.report.map_figures import top_view
-from evaluation.report.page import Report
-from evaluation.report.page_data import Illustration, make_drive
+from evaluation.report.page_data import make_page_drive
 from evaluation.report.reference import Finding, Judgement, Reference
-from evaluation.report.result_tables import DriveTrack
-from evaluation.results.table import LAST, OWN, STAGE, Results, Row, made_by
+from evaluation.report.tables.queries import DriveTrack
+from evaluation.results.keys import LAST, OWN, STAGE, made_by
+from evaluation.results.table import Results, Row
 
 PLACES = 5.0 * np.arange(10)
 QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
@@ -149,7 +151,7 @@ def _drive(name, xs, y, yaw):
     scans = [thumbnail(wall, 1.6, i) for i in range(len(xs))]
     X_WS = _poses(xs, y, yaw)
     view = top_view(ground, X_WS[:, :3, 3])
-    return make_drive(name, view, X_WS, range(len(xs)), scans)
+    return make_page_drive(name, view, X_WS, range(len(xs)), scans)
 
 
 def make_result(method, best, back=False):

@@ -14,7 +14,8 @@ from cns_drake.base.progress import track
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.exact_overlap import VisibleSurfaces, sights_of
 from cns_drake.studies.training.sampled_city import SampledCity
-from evaluation.drives.sampling import gather, sample_frames
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.polar_images import polar_image
 
 # Distance between two scans [m].
@@ -61,7 +62,7 @@ def scan_city(
             for frame in track(
                 frames, f"simulating {scenario.name}", len(frames), "scans"
             ):
-                points = gather(drive, int(frame), 1, _MAX_RANGE)
+                points = cloud_at(drive, int(frame), 1, _MAX_RANGE)
                 images.append(polar_image(points, height))
                 xy.append(drive.X_WS[frame, :2, 3])
                 numbers.append(number)

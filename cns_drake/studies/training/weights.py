@@ -181,7 +181,7 @@ def _draw_curve(curve: np.ndarray, stem: Path) -> None:
     """Draws the loss, and the share of right answers, over the steps."""
     from matplotlib.figure import Figure
 
-    from evaluation.results.drawing import save
+    from evaluation.results.figure_files import save_figure
 
     size = max(1, len(curve) // 40)
     kept = curve[: len(curve) // size * size].reshape(-1, size, 2).mean(axis=1)
@@ -196,4 +196,4 @@ def _draw_curve(curve: np.ndarray, stem: Path) -> None:
         ylabel="right top-ranked places in a batch",
         ylim=(0.0, 1.0),
     )
-    save(figure, stem, ("png",))
+    save_figure(figure, stem, ("png",))

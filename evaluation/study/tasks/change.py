@@ -6,9 +6,11 @@ from typing import Any, ClassVar
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeReport, change_between
-from evaluation.recognition.result_number import Number
-from evaluation.study.feature_extraction import DriveSummary
-from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
+from evaluation.recognition.place_outcome import Number
+from evaluation.study.features import DriveSummary
+from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Task, check_positive
 
 
 class ChangeTask(Task):
@@ -24,7 +26,7 @@ class ChangeTask(Task):
 
     def check(self, name: str, value: Any, where: str) -> None:
         if value is not None:
-            positive(value, where)
+            check_positive(value, where)
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         if pair.closes_loops or pair.is_composed:

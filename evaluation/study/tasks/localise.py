@@ -32,15 +32,9 @@ from evaluation.study.sources import (
     DriveSource,
     JoinedSource,
 )
-from evaluation.study.tasks.task import (
-    OPENING_COST,
-    Answered,
-    Jobs,
-    Pair,
-    Result,
-    Task,
-    positive,
-)
+from evaluation.study.tasks.jobs import OPENING_COST, Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Answered, Task, check_positive
 
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
@@ -79,7 +73,7 @@ class LocaliseTask(Task):
         if name in ("seed", "odometry_drift", "estimator"):
             _check(name, value, where)
         elif name == "spacing":
-            positive(value, where)
+            check_positive(value, where)
         elif name == "methods":
             for one in value:
                 known = str(one) in METHODS

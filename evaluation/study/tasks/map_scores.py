@@ -11,8 +11,10 @@ from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_labels, read_pair, read_truth
 from evaluation.map_update.structures import class_names
-from evaluation.recognition.result_number import Number
-from evaluation.study.tasks.task import Jobs, Pair, Result, Task, positive
+from evaluation.recognition.place_outcome import Number
+from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Task, check_positive
 
 _SCORES = (
     "miou",
@@ -56,7 +58,7 @@ class MapTask(Task):
 
     def check(self, name: str, value: Any, where: str) -> None:
         if name == "spacing":
-            positive(value, where)
+            check_positive(value, where)
             return
         known = (TRUTH, *BASELINES)
         for one in value:

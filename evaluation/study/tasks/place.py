@@ -14,21 +14,16 @@ from evaluation.recognition.place_numbers import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.result_number import Number
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.measurements import (
+from evaluation.study.databases import searched_database
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.place_measurements import (
     measure_method,
     measure_places,
     shown_overlaps,
-    with_distractors,
 )
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.tasks.task import (
-    Answered,
-    Jobs,
-    Pair,
-    Result,
-    Task,
-    num_described,
-)
+from evaluation.study.tasks.jobs import Jobs, num_described
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Answered, Task
 
 # Expected time to start a job [s].
 _STARTING_COST = 2.0
@@ -240,7 +235,7 @@ def measure_costs(
         method = choice.make()
         others = [parts[k] for parts in distractors]
         near = [parts[k] for parts in beside]
-        searched = with_distractors(
+        searched = searched_database(
             database[k],
             others,
             num_distractors,

@@ -21,7 +21,8 @@ from cns_drake.studies.recording import Record
 from cns_drake.studies.reproduction import control_drives, recording_info
 from evaluation.methods import registry
 from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study.collection import drives_by_map, find_recordings
+from evaluation.study.map_drives import drives_by_map
+from evaluation.study.recording_search import find_recordings
 
 pytestmark = pytest.mark.slow
 

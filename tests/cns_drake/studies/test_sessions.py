@@ -16,7 +16,8 @@ from cns_drake.studies.study import Study, run_study
 from evaluation.methods.solid import SolidMethod
 from evaluation.results.table import Results
 from evaluation.study import engine
-from evaluation.study.tasks.task import OPENING_COST, USUAL_LENGTH
+from evaluation.study.tasks.jobs import OPENING_COST
+from evaluation.study.tasks.pair import USUAL_LENGTH
 
 
 @pytest.fixture(scope="module")

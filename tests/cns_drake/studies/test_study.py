@@ -181,7 +181,7 @@ def test_the_numbers_are_those_of_the_single_commands(
         (row,) = [
             row
             for row in results.rows
-            if row.metric == "r1" and row.but() == one.but()
+            if row.metric == "r1" and row.identity == one.identity
         ]
         assert np.mean(one.columns["correct"]) == pytest.approx(
             row.value * row.n / len(one.columns["correct"])

@@ -16,7 +16,8 @@ from evaluation.alignment.trajectory_errors import (
     trajectory_errors,
 )
 from evaluation.drives import open_drive
-from evaluation.drives.text_tables import parse_seconds, read_quaternions
+from evaluation.drives.text_tables import parse_seconds
+from evaluation.drives.trajectories import read_quaternions
 
 STEP = 2.5
 # The first pose more than 100 m of path behind another.

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.drives.sampling import cropped
+from evaluation.drives.scan_clouds import cropped
 
 
 def random_scan(number, seed=3):

@@ -9,11 +9,10 @@ from cns_drake.base.errors import InputError
 from evaluation.drives.text_tables import (
     parse_seconds,
     parse_stamps_ns,
-    read_angles,
     read_numbers,
-    read_quaternions,
     read_stamped_rows,
 )
+from evaluation.drives.trajectories import read_angles, read_quaternions
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from evaluation.drives import open_drive
+from evaluation.maps.mapped_drive import MappedDrive
 from evaluation.maps.voxel_maps import CELL_SIZE, map_drive
-from evaluation.study.feature_extraction import MappedDrive
 
 
 @pytest.fixture

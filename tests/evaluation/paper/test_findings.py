@@ -9,7 +9,7 @@ import pytest
 from evaluation.paper.findings import findings, paper_trend, trend
 from evaluation.paper.paper_values import paper
 from evaluation.recognition.protocol import PAPER_PROTOCOL
-from evaluation.report.result_tables import recognition_table
+from evaluation.report.tables.recognition import recognition_table
 
 MODES = ("all", "filtered")
 

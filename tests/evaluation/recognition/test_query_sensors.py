@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import make_pose, transform
 from evaluation.drives import open_drive
-from evaluation.drives.sampling import QuerySensor, gather
+from evaluation.drives.query_sensor import QuerySensor
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods import (
     Method,
     MethodConfig,
@@ -120,7 +121,7 @@ def test_places_are_described_as_ever(drives):
             one.places.frames, one.places.descriptors, strict=True
         ):
             np.testing.assert_array_equal(
-                cloud, gather(drives[0], int(frame), 1, 100.0)
+                cloud, cloud_at(drives[0], int(frame), 1, 100.0)
             )
         changed = protocol.turn_queries
         assert changed is not np.array_equal(
@@ -149,10 +150,10 @@ def test_points_are_cropped_where_the_turned_sensor_has_them(tmp_path):
     for yaw, kept in ((0.0, 2), (np.pi / 4, 1), (2.0 * np.pi, 2)):
         X_SQ = np.eye(4)
         X_SQ[:3, :3] = Rotation.from_euler("z", yaw).as_matrix()
-        cloud = gather(drive, 0, 1, 14.1, sensor=QuerySensor(X_SQ))
+        cloud = cloud_at(drive, 0, 1, 14.1, sensor=QuerySensor(X_SQ))
         assert len(cloud) == kept
     # After a whole turn all is as before.
-    np.testing.assert_allclose(cloud, gather(drive, 0, 1, 14.1), atol=1e-12)
+    np.testing.assert_allclose(cloud, cloud_at(drive, 0, 1, 14.1), atol=1e-12)
 
 
 def test_a_draw_depends_on_seed_and_frame_alone():

@@ -7,7 +7,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
-from evaluation.drives.sampling import gather, sample_frames, within_range
+from evaluation.drives.sampling import sample_frames
+from evaluation.drives.scan_clouds import cloud_at, within_range
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, joined_scans
@@ -170,7 +171,7 @@ def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
         (1, 4, 2, 3),
         (4, 6, 3, 4),
     ):
-        cloud = gather(drive, frame, number, 100.0, (), before)
+        cloud = cloud_at(drive, frame, number, 100.0, (), before)
         assert len(cloud) == there
         expected = (post - X_WBs[frame][:3, 3]) @ X_WBs[frame][:3, :3]
         expected -= [0.0, 0.0, 1.6]

@@ -15,7 +15,7 @@ from evaluation.recognition.bootstrap import (
 )
 from evaluation.recognition.query_outcomes import judge
 from evaluation.recognition.significance import compared_by_auc, holm
-from evaluation.report.result_tables import method_differences
+from evaluation.report.tables.differences import method_differences
 
 
 def auc_difference(first, second, times=1, drives=None):

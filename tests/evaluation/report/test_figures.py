@@ -12,7 +12,8 @@ from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.methods import shipped_methods
 from evaluation.report import curve_figures
 from evaluation.report.map_figures import judge_points, top_view, voxel_of_each
-from evaluation.results.drawing import PIXELS, name_lines, save
+from evaluation.results.figure_files import PIXELS, save_figure
+from evaluation.results.figure_text import name_lines
 
 
 def test_change_picture_has_the_colours_of_the_metric():
@@ -74,7 +75,7 @@ def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     figure = Figure(figsize=(2, 1))
     handle = Patch(color="red", label="gone")
     legend = figure.legend(handles=[handle], loc="lower center")
-    save(figure, tmp_path / "figure", PIXELS)
+    save_figure(figure, tmp_path / "figure", PIXELS)
     printed = imread(tmp_path / "figure.png")[..., :3]
     on_page = imread(tmp_path / "figure.webp")[..., :3] / 255.0
     red = [1.0, 0.0, 0.0]
@@ -89,7 +90,7 @@ def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
 def test_names_stand_beside_the_curves(tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr(
-        curve_figures, "save", lambda figure, stem: drawn.append(figure)
+        curve_figures, "save_figure", lambda figure, stem: drawn.append(figure)
     )
     # Curves that all end at the same place, and one above.
     results = [make_result(name, [0, 1, 4, 6, 3]) for name in shipped_methods()]

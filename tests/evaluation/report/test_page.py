@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
-from evaluation.report.conclusions import further_columns, ranked_methods
-from evaluation.report.page import route_picture, write_page
+from evaluation.report.page import write_page
 from evaluation.report.page_data import browser_data
-from evaluation.report.result_tables import (
-    MethodDifference,
-    recognition_table,
-)
-from evaluation.results.table import LAST, OWN, STAGE, Results, Row
+from evaluation.report.ranking import further_columns, ranked_methods
+from evaluation.report.route_pictures import route_picture
+from evaluation.report.tables.differences import MethodDifference
+from evaluation.report.tables.recognition import recognition_table
+from evaluation.results.keys import LAST, OWN, STAGE
+from evaluation.results.table import Results, Row
 
 PAIR = ("metropolis", "01", "04")
 PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}

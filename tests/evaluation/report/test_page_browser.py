@@ -10,8 +10,8 @@ import pytest
 
 from evaluation.methods import shipped_methods
 from evaluation.paper.paper_reference import paper_reference
+from evaluation.report.camera_images import CameraImages
 from evaluation.report.page import write_page
-from evaluation.report.page_data import CameraImages
 
 pytestmark = [
     pytest.mark.slow,

@@ -9,12 +9,9 @@ import numpy as np
 from PIL import Image
 import pytest
 
+from evaluation.report.camera_images import CameraImages, nearest_images
 from evaluation.report.page import write_page
-from evaluation.report.page_data import (
-    CameraImages,
-    browser_data,
-    camera_images,
-)
+from evaluation.report.page_data import browser_data
 
 NAMES = "metropolis_01", "metropolis_04"
 SAID = "has room for one of {} camera images"
@@ -57,7 +54,7 @@ def shown(content):
 def test_nearest_images_are_taken_and_reduced():
     files = [picture(800, 400, 10 * k) for k in range(4)]
     files[3] = picture(60, 90, 30, "PNG")
-    found = camera_images(
+    found = nearest_images(
         # 149 is nearer to 100, 151 to 200; no frame is near 300.
         Camera([100, 200, 300, 400], files),
         np.array([20, 149, 151, 399, 900]),
@@ -77,14 +74,14 @@ def test_nearest_images_are_taken_and_reduced():
 def test_damaged_images_are_left_out_and_told(damaged):
     camera = Camera([1, 2], [damaged, picture(8, 8)])
     notes = []
-    found = camera_images(camera, np.array([1, 2]), notes.append)
+    found = nearest_images(camera, np.array([1, 2]), notes.append)
     assert found.times_ns.tolist() == [2]
     assert notes == ["seen: 1 camera images cannot be decoded"]
-    assert camera_images(camera, np.array([1]), notes.append) is None
+    assert nearest_images(camera, np.array([1]), notes.append) is None
 
 
 def test_no_camera():
-    assert camera_images(Camera([], []), np.array([1]), pytest.fail) is None
+    assert nearest_images(Camera([], []), np.array([1]), pytest.fail) is None
 
 
 def test_each_scan_shows_the_nearest_image(tmp_path):

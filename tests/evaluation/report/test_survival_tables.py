@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evaluation.report.conclusions import (
+from evaluation.report.contents import Report
+from evaluation.report.page import write_page
+from evaluation.report.tables.survival import (
     survival_numbers,
     survival_summary,
     survival_table,
     survivals,
 )
-from evaluation.report.page import Report, write_page
 from evaluation.results.table import Row
 
 STAGES = {f"town_{number:02d}": f"{number:02d}" for number in range(4)}

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.results import charts
 from evaluation.results import page as page_module
-from evaluation.results.drawing import save
+from evaluation.results.charts.chart import NARROW, ROW, WIDE
+from evaluation.results.charts.kinds import draw_chart
+from evaluation.results.charts.words import value_words
+from evaluation.results.figure_files import save_figure
 from evaluation.results.page import write_page
+from evaluation.results.styles import method_styles
 from evaluation.results.table import Results, Row
 
 YEARS = "database.years"
@@ -78,7 +81,7 @@ def shown(message):
 
 
 def test_lines_have_means_and_bands():
-    drawn = charts.draw(
+    drawn = draw_chart(
         {"kind": "lines", "over": YEARS, "metric": "auc"}, aged()
     )
     (axes,) = drawn.figure.axes
@@ -103,14 +106,14 @@ def test_a_wide_range_is_logarithmic():
         for number in (0, 100, 10_000)
     ]
     chart = {"kind": "lines", "over": "database.distractors", "metric": "auc"}
-    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
     assert axes.get_xscale() == "symlog"
     assert [tick.get_text() for tick in axes.get_xticklabels()] == [
         "0",
         "100",
         "10000",
     ]
-    (axes,) = charts.draw(
+    (axes,) = draw_chart(
         {"kind": "lines", "over": YEARS, "metric": "auc"}, aged()
     ).figure.axes
     assert axes.get_xscale() == "linear"
@@ -123,7 +126,7 @@ def test_a_matrix_has_strips_and_the_last_number():
         "strips": "level",
         "metric": "kept",
     }
-    drawn = charts.draw(chart, caused())
+    drawn = draw_chart(chart, caused())
     (axes,) = drawn.figure.axes
     # Three methods, one strip without a cause and three with one.
     assert len(axes.patches) == 3 * (1 + 3)
@@ -154,15 +157,15 @@ def test_long_settings_leave_room_for_the_matrix(tmp_path, values, shown):
         for cause in ("none", "age")
     )
     chart = {"kind": "matrix", "over": "cause", "metric": "r1"}
-    drawn = charts.draw(chart, results, alone=True)
+    drawn = draw_chart(chart, results, alone=True)
     (axes,) = drawn.figure.axes
     names = [one.get_text() for one in axes.get_xticklabels()]
     assert shown in [name.replace("\n", " ") for name in names]
     assert max(len(line) for name in names for line in name.split("\n")) <= 32
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        save(drawn.figure, tmp_path / "chart", ("png",))
-    assert axes.get_window_extent().height > 2 * charts._ROW
+        save_figure(drawn.figure, tmp_path / "chart", ("png",))
+    assert axes.get_window_extent().height > 2 * ROW
 
 
 @pytest.mark.parametrize(
@@ -186,7 +189,7 @@ def test_long_settings_leave_room_for_the_matrix(tmp_path, values, shown):
     ],
 )
 def test_axes_of_shares_start_at_0(chart, results, starts):
-    (axes,) = charts.draw(chart, results).figure.axes
+    (axes,) = draw_chart(chart, results).figure.axes
     for name, limits in (("x", axes.get_xlim()), ("y", axes.get_ylim())):
         if name in starts:
             # Markers at 0 are whole.
@@ -199,7 +202,7 @@ def test_axes_of_differences_keep_their_range():
         for year, value in ((0, -0.5), (10, -0.4))
     ]
     chart = {"kind": "lines", "over": YEARS, "metric": "difference"}
-    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
     assert axes.get_ylim()[1] < -0.3
 
 
@@ -219,7 +222,7 @@ def test_a_loss_that_is_certain_is_bold():
 
     def weights(metric):
         chart = {"kind": "matrix", "over": "cause", "metric": metric}
-        figure = charts.draw(chart, Results.of(rows)).figure
+        figure = draw_chart(chart, Results.of(rows)).figure
         caption = " ".join(figure.get_supxlabel().split())
         (axes,) = figure.axes
         return caption, [text.get_fontweight() for text in axes.texts]
@@ -245,7 +248,7 @@ def test_a_loss_that_is_certain_is_bold():
     ],
 )
 def test_causes_have_the_words_of_the_field(value, factor, text):
-    assert charts.value_words(value, factor) == text
+    assert value_words(value, factor) == text
 
 
 def test_a_dumbbell_joins_both_ends():
@@ -256,7 +259,7 @@ def test_a_dumbbell_joins_both_ends():
         for stage, value in (("last", before), ("own", after))
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
-    drawn = charts.draw(chart, Results.of(rows))
+    drawn = draw_chart(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
     bars = [line for line in axes.get_lines() if len(line.get_xdata()) == 2]
     found = [list(bar.get_xdata()) for bar in bars]
@@ -285,13 +288,13 @@ def test_texts_and_charts_have_one_definition_of_what_is_kept():
         for stage, value in zip(("last", "own"), ends, strict=True)
     ]
     chart = {"kind": "dumbbell", "over": "both.stage", "metric": "auc"}
-    message = charts.draw(chart, Results.of(rows)).message
+    message = draw_chart(chart, Results.of(rows)).message
     assert shown(message).endswith("from 90 % (RING++) to 100 % (SOLiD)")
 
 
 @pytest.mark.parametrize("number", [1, 4, 5, 8])
 def test_a_scatter_of_points_on_a_line(number):
-    drawn = charts.draw(
+    drawn = draw_chart(
         {"kind": "scatter", "x": "tcr_sym", "y": "auc"}, scattered(number)
     )
     (axes,) = drawn.figure.axes
@@ -314,7 +317,7 @@ def test_a_scatter_of_points_on_a_line(number):
 def test_other_keys_select_rows():
     rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", gate=True)]
     chart = {"kind": "lines", "over": YEARS, "metric": "auc", "seed": 2}
-    drawn = charts.draw({**chart, "method": ["mine"]}, Results.of(rows))
+    drawn = draw_chart({**chart, "method": ["mine"]}, Results.of(rows))
     (axes,) = drawn.figure.axes
     (line,) = axes.get_lines()
     np.testing.assert_allclose(line.get_ydata(), [0.72, 0.62, 0.42])
@@ -327,7 +330,7 @@ def test_maps_may_be_the_lines_of_a_matrix():
         for name in ("free-space", "distance")
     ]
     chart = {"kind": "matrix", "over": "map", "metric": "miou"}
-    drawn = charts.draw(chart, Results.of(rows))
+    drawn = draw_chart(chart, Results.of(rows))
     (axes,) = drawn.figure.axes
     assert [t.get_text() for t in axes.get_yticklabels()] == ["x", "y"]
     assert drawn.message == ("Least mean IoU: 0.25, in 2 of 4 cells")
@@ -339,7 +342,7 @@ def test_times_are_on_a_logarithmic_axis():
         for year, value in ((0, 1.0), (5, 100.0))
     ]
     chart = {"kind": "lines", "over": YEARS, "metric": "query_time"}
-    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
     assert axes.get_yscale() == "log"
 
 
@@ -355,7 +358,7 @@ def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
         for year in (0, 5)
     ]
     chart = {"kind": "lines", "over": YEARS, "metric": "kept"}
-    (axes,) = charts.draw(chart, Results.of(rows)).figure.axes
+    (axes,) = draw_chart(chart, Results.of(rows)).figure.axes
     (line,) = axes.get_lines()
     np.testing.assert_allclose(line.get_ydata(), share)
 
@@ -393,10 +396,10 @@ def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
 )
 def test_faults_of_a_chart_are_named(chart, words):
     with pytest.raises(InputError, match=re.escape(words)):
-        charts.draw(chart, aged())
+        draw_chart(chart, aged())
 
 
-@pytest.mark.parametrize("width", [charts.WIDE, charts.NARROW])
+@pytest.mark.parametrize("width", [WIDE, NARROW])
 @pytest.mark.parametrize(
     ("chart", "results"),
     [
@@ -407,7 +410,7 @@ def test_faults_of_a_chart_are_named(chart, words):
     ],
 )
 def test_all_letters_can_be_read(chart, results, width):
-    figure = charts.draw(chart, results, width).figure
+    figure = draw_chart(chart, results, width).figure
     FigureCanvasAgg(figure).draw()
     assert figure.get_figwidth() * 96 == pytest.approx(width)
     # Nothing that is drawn is cut off. Letters have 12 px, also on a phone of
@@ -415,7 +418,7 @@ def test_all_letters_can_be_read(chart, results, width):
     box = figure.get_tightbbox()
     assert box.x0 >= -0.01
     assert box.x1 <= figure.get_figwidth() + 0.01
-    shown = 1.0 if width == charts.WIDE else 328.0 / width
+    shown = 1.0 if width == WIDE else 328.0 / width
     sizes = [
         text.get_fontsize() * 96.0 / 72.0 * shown
         for text in figure.findobj(Text)
@@ -473,7 +476,7 @@ def test_a_legend_covers_nothing(keys, width):
         for year in (0, 10)
         for town in ("a", "b", "c")
     ]
-    figure = charts.draw(keys, Results.of(rows), width, alone=True).figure
+    figure = draw_chart(keys, Results.of(rows), width, alone=True).figure
     FigureCanvasAgg(figure).draw()
     (legend,) = figure.legends
     box = legend.get_window_extent()
@@ -504,7 +507,9 @@ def test_no_chart_shows_what_cannot_be(tmp_path, chart, results, value):
     results = Results.of(rows)
 
     def draw_and_save():
-        save(charts.draw(chart, results).figure, tmp_path / "chart", ("svg",))
+        save_figure(
+            draw_chart(chart, results).figure, tmp_path / "chart", ("svg",)
+        )
 
     if value == 1.0:
         draw_and_save()
@@ -515,17 +520,17 @@ def test_no_chart_shows_what_cannot_be(tmp_path, chart, results, value):
 
 
 def test_values_of_factors_are_words():
-    assert charts.value_words("[0,0,2.8]") == "0, 0, 2.8"
-    assert charts.value_words("parked_cars") == "parked cars"
-    assert charts.value_words(0.30) == "0.3"
-    assert charts.value_words("own", "both.stage") == "with the change"
-    assert charts.value_words("own", "query.kind") == "own"
+    assert value_words("[0,0,2.8]") == "0, 0, 2.8"
+    assert value_words("parked_cars") == "parked cars"
+    assert value_words(0.30) == "0.3"
+    assert value_words("own", "both.stage") == "with the change"
+    assert value_words("own", "query.kind") == "own"
 
 
 def test_a_picture_for_print_has_its_legend(tmp_path):
     keys = {"kind": "lines", "over": YEARS, "metric": "auc"}
-    figure = charts.draw(keys, aged(), alone=True).figure
-    save(figure, tmp_path / "chart", ("pdf", "png"))
+    figure = draw_chart(keys, aged(), alone=True).figure
+    save_figure(figure, tmp_path / "chart", ("pdf", "png"))
     assert figure.legends[0].get_visible()
 
 
@@ -547,13 +552,13 @@ def test_a_picture_for_print_has_its_legend(tmp_path):
 def test_one_method_is_not_both_best_and_worst(chart, results, message):
     first = PARTS["solid"]
     wanted = message.format(first=first, last=first - 0.3)
-    assert shown(charts.draw(chart, results).message) == wanted
+    assert shown(draw_chart(chart, results).message) == wanted
 
 
 def test_a_page_shows_the_markers_of_its_charts():
     """The legend of the page has the outlines of matplotlib's markers."""
     names = ["btc", "scan-context++", "mine"]
-    styles = charts.styles(names)
+    styles = method_styles(names)
     corners = [
         np.array(
             [c.split(",") for c in page_module._corners(marker).split()], float

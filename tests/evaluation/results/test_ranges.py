@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.results.drawing import save
+from evaluation.results.figure_files import save_figure
 from evaluation.results.ranges import check_all, checked, range_of
 from evaluation.results.table import Results, Row
 from evaluation.results.table_forms import Cell, Table
@@ -129,8 +129,8 @@ def test_a_figure_is_not_saved_with_it(tmp_path, draw, of_figure):
         axes.set_xlabel("years")
         (figure.supylabel if of_figure else axes.set_ylabel)("AUC")
         if fits:
-            save(figure, tmp_path / "good", ("svg",))
+            save_figure(figure, tmp_path / "good", ("svg",))
             continue
         with pytest.raises(InputError, match=r"AUC: 1\.5 cannot be"):
-            save(figure, tmp_path / "bad", ("svg",))
+            save_figure(figure, tmp_path / "bad", ("svg",))
     assert [one.name for one in tmp_path.iterdir()] == ["good.svg"]

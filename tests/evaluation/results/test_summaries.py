@@ -9,6 +9,7 @@ from scipy.stats import spearmanr
 
 from evaluation.recognition.bootstrap import Interval
 from evaluation.results import summaries
+from evaluation.results.ranking import rank_methods
 from evaluation.results.table import Answers, QueryRows, Results, Row
 
 YEARS = "database.years"
@@ -238,7 +239,7 @@ def test_a_ranking_counts_what_all_methods_have():
             ("b", "y", 1, math.nan),
         )
     ]
-    found, samples = summaries.ranking(rows)
+    found, samples = rank_methods(rows)
     assert [one.method for one in found] == ["a", "b"]
     assert [one.value for one in found] == pytest.approx([0.6, 0.5])
     # Maps are drawn: both, or one of them twice.
@@ -257,7 +258,7 @@ def test_the_interval_of_a_mean_over_maps(metric):
         for snow, more in ((0, -0.1), (1, 0.1))
         for town, value in means.items()
     ]
-    (found,), _ = summaries.ranking(rows)
+    (found,), _ = rank_methods(rows)
     values = list(means.values())
     expected = scipy.stats.t.interval(
         0.95, 3, np.mean(values), scipy.stats.sem(values)
@@ -268,7 +269,7 @@ def test_the_interval_of_a_mean_over_maps(metric):
         Row(**key({SNOW: snow}), metric=metric, value=value)
         for snow, value in enumerate((0.1, 0.5, 0.9, 0.9))
     ]
-    (found,), _ = summaries.ranking(some)
+    (found,), _ = rank_methods(some)
     values = [one.value for one in some]
     _, high = scipy.stats.t.interval(
         0.95, 3, np.mean(values), scipy.stats.sem(values)
@@ -277,15 +278,15 @@ def test_the_interval_of_a_mean_over_maps(metric):
     assert found.interval.high == pytest.approx(
         1.0 if metric == "auc" else high
     )
-    (found,), _ = summaries.ranking(some[:3])
+    (found,), _ = rank_methods(some[:3])
     assert math.isnan(found.interval.high)
 
 
 def test_a_ranking_of_one_condition_has_its_intervals():
     one = Row(**key({}), metric="auc", value=0.5, low=0.4, high=0.7)
-    found, _ = summaries.ranking([one])
+    found, _ = rank_methods([one])
     assert found[0].interval == Interval(0.4, 0.7)
-    assert summaries.ranking([one, row(0.1, {SNOW: 1}, method="b")])[0] == []
+    assert rank_methods([one, row(0.1, {SNOW: 1}, method="b")])[0] == []
 
 
 MAINTAIN = "database.maintain"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.results.table import Answers, Key, QueryRows, Results, Row
+from evaluation.results.keys import Key
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 FACTOR = "query.transient.snow"
 HEADER = (
@@ -281,8 +282,8 @@ def test_what_identifies_a_condition():
     one = Key(**key(method="ring++", factors=round_crop))
     other = Key(**key(factors={"level": 2}))
     assert one.label == "ring++, crop round"
-    assert one.but("method") == other.but("method")
-    assert one.but() != Key(**key(method="ring++")).but()
+    assert one.without("method") == other.without("method")
+    assert one.identity != Key(**key(method="ring++")).identity
 
 
 def make_answers(**changes):
@@ -310,7 +311,7 @@ def test_queries_are_read_as_written(tmp_path):
     found = QueryRows.read(tmp_path)
     assert found.factors == (FACTOR,)
     for read, made in zip(found.answers, (one, other), strict=True):
-        assert read.but() == made.but()
+        assert read.identity == made.identity
         for name, column in made.columns.items():
             expected = np.where(column == math.inf, -1, column)
             assert read.columns[name].tolist()[:2] == expected.tolist()[:2]

@@ -18,7 +18,7 @@ from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.report.result_tables import fault_numbers, fault_table
+from evaluation.report.tables.faults import fault_numbers, fault_table
 from evaluation.study.fault_evidence import find_evidence
 
 HEIGHT = 1.6

@@ -13,7 +13,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from evaluation.change.drive_maps import read_map
 from evaluation.drives import Drive, open_drive
-from evaluation.drives.sampling import within_range
+from evaluation.drives.scan_clouds import within_range
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
@@ -21,8 +21,8 @@ from evaluation.study.feature_extraction import (
     FeatureExtraction,
     extract_features,
 )
-from evaluation.study.measurements import measure_method
 from evaluation.study.parts import MakePart, Part
+from evaluation.study.place_measurements import measure_method
 from evaluation.study.sources import RecordingSource
 from evaluation.study.study_files import FeatureFiles
 

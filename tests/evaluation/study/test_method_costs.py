@@ -9,7 +9,7 @@ import pytest
 
 from evaluation.methods import shipped_methods
 from evaluation.recognition import costs, search
-from evaluation.study.collection import find_recordings
+from evaluation.study.recording_search import find_recordings
 from evaluation.study.stages_report import StagesReport
 from evaluation.study.study_files import StudyFiles
 

@@ -32,7 +32,7 @@ def measured(rows):
     one pair takes that of the world frame.
     """
     return {
-        (*row.but("experiment", "map", "seed", "both.stage"), row.metric): (
+        (*row.without("experiment", "map", "seed", "both.stage"), row.metric): (
             row.value,
             row.low,
             row.high,

@@ -12,11 +12,11 @@ from evaluation.drives import open_drive
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study import measurements
+from evaluation.study import place_measurements
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.measurements import measure_places
 from evaluation.study.parts import MakePart, Part
+from evaluation.study.place_measurements import measure_places
 from evaluation.study.sources import RecordingSource
 from evaluation.study.study_files import FeatureFiles
 
@@ -184,7 +184,7 @@ def test_another_database_is_another_pair(folder, tmp_path):
 def test_methods_that_would_take_very_long_are_left_out(
     folder, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(measurements, "_LONGEST_MS", 0.0)
+    monkeypatch.setattr(place_measurements, "_LONGEST_MS", 0.0)
     notes = []
     reporter = Reporter(
         lambda kind, *values: kind == "note" and notes.extend(values)
@@ -194,7 +194,7 @@ def test_methods_that_would_take_very_long_are_left_out(
     step.run(reporter)
     assert len(step.part.read()) == 2 * len(METHODS)
     assert not notes
-    monkeypatch.setattr(measurements, "_MANY", 3)
+    monkeypatch.setattr(place_measurements, "_MANY", 3)
     step = pair(folder, tmp_path / "many.data")
     step.run(reporter)
     assert step.part.read() == []

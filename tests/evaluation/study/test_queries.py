@@ -12,7 +12,7 @@ import pytest
 from evaluation import QueryRows, Results
 from evaluation.recognition.bootstrap import route_blocks
 from evaluation.recognition.precision_recall import pr_curve
-from evaluation.results.table import OWN, STAGE
+from evaluation.results.keys import OWN, STAGE
 from evaluation.study.chosen_methods import choose_methods
 
 pytestmark = pytest.mark.slow
@@ -251,8 +251,8 @@ def test_where_and_when(report):
 def test_a_report_is_read_as_a_study(report):
     """The answers have the keys of the results, and give the same AUC."""
     rows = Results.read(report).where({STAGE: OWN}, metric="auc").rows
-    results = {row.but(): row.value for row in rows}
-    found = {one.but(): one for one in QueryRows.read(report).answers}
+    results = {row.identity: row.value for row in rows}
+    found = {one.identity: one for one in QueryRows.read(report).answers}
     assert set(results) <= set(found)
     for key, value in results.items():
         assert pr_curve(found[key].outcomes).auc == pytest.approx(value)

@@ -25,8 +25,9 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.study import chosen_methods
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.collection import drives_by_map, find_recordings
-from evaluation.study.stages_report import StagesReport, write_report
+from evaluation.study.map_drives import drives_by_map
+from evaluation.study.recording_search import find_recordings
+from evaluation.study.stages_report import StagesReport, report_on_recordings
 
 pytestmark = pytest.mark.slow
 
@@ -167,7 +168,7 @@ def test_a_wrong_guess_makes_no_empty_report(tmp_path):
     for name in ("walk_dry", "night_wet"):
         drive(tmp_path / "in" / name, "01", "a", scenario=False)
     with pytest.raises(InputError, match=r"in: night: nothing to .*guessed"):
-        write_report(tmp_path / "in", tmp_path / "out", Cluster(1))
+        report_on_recordings(tmp_path / "in", tmp_path / "out", Cluster(1))
     assert not (tmp_path / "out").exists()
 
 
@@ -224,7 +225,7 @@ def test_columns_are_the_users_and_what_is_assumed_is_said(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="file"):
         # All notes come before the work, for which there is no folder.
-        write_report(
+        report_on_recordings(
             folder,
             tmp_path / "file",
             choose_cluster(1, None),
@@ -414,7 +415,7 @@ def test_differences_of_every_two_methods(report):
 def test_report_is_the_same_for_any_number_of_workers(
     recordings, report, tmp_path
 ):
-    write_report(
+    report_on_recordings(
         recordings,
         tmp_path,
         Cluster(num_workers=2),
@@ -468,7 +469,7 @@ def test_report_of_a_single_stage(tmp_path):
     for name in ("report.md", "report.html"):
         assert said in path.with_name(name).read_text()
     notes = []
-    write_report(
+    report_on_recordings(
         tmp_path / "in", tmp_path / "out", Cluster(1), on_note=notes.append
     )
     (note,) = notes
@@ -531,7 +532,7 @@ def test_drives_that_never_meet(tmp_path):
         scans = [make_scan(np.array([[5.0, 0.0, 1.0], [9.0, 2.0, 2.0]]))]
         write_recording(tmp_path / "in" / f"apart_{stage}", scans, [pose])
     notes = []
-    path = write_report(
+    path = report_on_recordings(
         tmp_path / "in",
         tmp_path / "out",
         Cluster(1),
@@ -606,7 +607,7 @@ def test_drives_of_a_stage_in_two_worlds_are_refused(tmp_path):
             attachments={"scenario.json": said},
         )
     with pytest.raises(InputError, match=r"^town_01_again: poses in frame"):
-        write_report(tmp_path / "in", tmp_path / "out", Cluster(1))
+        report_on_recordings(tmp_path / "in", tmp_path / "out", Cluster(1))
 
 
 @pytest.mark.usefixtures("unrendered_figures")
@@ -646,4 +647,4 @@ def test_scans_without_points_are_refused(tmp_path):
 def test_output_that_cannot_be_written(recordings, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):
-        write_report(recordings, tmp_path / "out", Cluster())
+        report_on_recordings(recordings, tmp_path / "out", Cluster())

@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.paper import reference_for
-from evaluation.study.collection import RecordingInfo, drives_by_map
+from evaluation.study.map_drives import RecordingInfo, drives_by_map
 from evaluation.study.stages_report import StagesReport
 
 

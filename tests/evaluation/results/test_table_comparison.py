@@ -12,20 +12,10 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.command_line.suggestions import suggest_comparison
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.results.comparing import (
-    _BASELINES,
-    compare,
-)
-from evaluation.results.table import (
-    LAST,
-    OWN,
-    STAGE,
-    Answers,
-    QueryRows,
-    Results,
-    Row,
-    made_by,
-)
+from evaluation.results.keys import LAST, OWN, STAGE, made_by
+from evaluation.results.metric_tables import _BASELINES
+from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table_comparison import compare_tables
 
 
 def key(method, town="town", **changes):
@@ -148,7 +138,7 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     best = {}
     changed = {"map": "suburbia", STAGE: OWN, "metric": "auc", "gate": False}
     for row in shipped(**changed):
-        condition = row.but("method")
+        condition = row.without("method")
         if condition not in best or best[condition].value < row.value:
             best[condition] = row
     rows = [
@@ -158,7 +148,7 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     ]
     path = tmp_path / "entrant.csv"
     Results.of(rows).write_csv(path)
-    found = compare([path])
+    found = compare_tables([path])
     assert found.conditions == 2
     names = [one.method for one in found.ranked]
     assert names[0] == "mine"
@@ -185,14 +175,14 @@ def test_controls_are_not_ranked(tmp_path):
     left = (
         "left out, as nothing changes in them (both.stage last): 1 conditions"
     )
-    found = compare([both, both / "results.csv"])
+    found = compare_tables([both, both / "results.csv"])
     assert [one.value for one in found.ranked] == [0.5, 0.4]
     assert left in found.notes
-    found = compare([both, own], rankings=True)
+    found = compare_tables([both, own], rankings=True)
     assert [one.value for one in found.ranked] == [0.5, 0.4, 0.5, 0.4]
     assert found.agreements[0].tau == pytest.approx(1.0)
     assert found.notes == [f"both: {left}"]
-    found = compare([last, both])
+    found = compare_tables([last, both])
     assert [one.value for one in found.ranked] == [1.0, 0.9]
 
 
@@ -202,7 +192,7 @@ def test_what_lacks_conditions_is_left_out_and_named(tmp_path):
         {"a": {"x": 0.5, "y": 0.4}, "b": {"x": 0.6}, "c": {"x": 0.1}},
     )
     two = write_table(tmp_path / "two", {"a": {"z": 0.2}, "b": {"z": 0.3}})
-    found = compare([one, two])
+    found = compare_tables([one, two])
     assert found.conditions == 2
     assert [(r.method, r.value) for r in found.ranked] == [
         ("x", pytest.approx(0.55)),
@@ -221,14 +211,14 @@ def test_differences_of_answers(tmp_path):
     two = write_table(
         tmp_path / "two", {"a": {"x": 0.5}, "b": {"x": 0.7}}, queries=True
     )
-    found = compare([one, two])
+    found = compare_tables([one, two])
     assert [r.method for r in found.ranked] == ["x (one)", "x (two)"]
     (difference,) = found.differences
     assert (difference.first, difference.second) == ("x (one)", "x (two)")
     assert difference.difference.value == pytest.approx(0.2)
     # It is 0.4 in a, with some deviation, and 0 in b, without any: the mean
     # has half of that deviation.
-    (alone,) = compare(
+    (alone,) = compare_tables(
         [
             write_table(tmp_path / "three", {"a": {"x": 0.9}}, queries=True),
             write_table(tmp_path / "four", {"a": {"x": 0.5}}, queries=True),
@@ -245,7 +235,7 @@ def test_differences_of_answers(tmp_path):
         tmp_path / "fewer", {"a": {"x": 0.5}, "b": {"x": 0.5}}, 8, queries=True
     )
     with pytest.raises(InputError, match="different queries"):
-        compare([one, fewer])
+        compare_tables([one, fewer])
 
 
 def written_times(folder, number, parts):
@@ -277,7 +267,7 @@ def test_conditions_of_a_drive_are_not_independent(tmp_path):
             folder = tmp_path / f"{name} {number}"
             folder.mkdir()
             pair.append(written_times(folder, number, parts))
-        found.append(compare(pair))
+        found.append(compare_tables(pair))
     once, again = found
     assert (once.conditions, again.conditions) == (1, 4)
     assert len(once.differences) == 6
@@ -311,7 +301,7 @@ def test_tau_of_mean_areas(tmp_path, queries):
         {"c": dict(zip(names, (0.6, 0.2, 0.4, 0.1), strict=True))},
         queries=queries,
     )
-    found = compare([simulated, real], rankings=True)
+    found = compare_tables([simulated, real], rankings=True)
     (one,) = found.agreements
     assert one.methods == tuple(names)
     # Each table stands beside the other, with its own means.
@@ -368,7 +358,7 @@ def test_maps_are_drawn_for_the_published_ranking(tmp_path):
     untied = [(one != 0).sum(axis=1) for one in signs]
     taus = (signs[0] @ signs[1].T) / np.sqrt(np.outer(*untied))
     assert taus[0, 0] == 1.0
-    (found,) = compare(paths, "r1", rankings=True).agreements
+    (found,) = compare_tables(paths, "r1", rankings=True).agreements
     assert found.tau == pytest.approx(1.0)
     assert found.interval.high == pytest.approx(1.0)
     # As published, and between exact quantiles around 2.5 %.
@@ -390,18 +380,18 @@ def test_tables_of_the_same_maps_are_drawn_alike(tmp_path):
         write_table(tmp_path / "asked", towns, 10, queries=True),
         write_table(tmp_path / "copy", towns),
     ]
-    (same,) = compare(paths, rankings=True).agreements
+    (same,) = compare_tables(paths, rankings=True).agreements
     assert same.interval.low == pytest.approx(1.0)
     elsewhere = {f"{town} elsewhere": values for town, values in towns.items()}
     paths[1] = write_table(tmp_path / "elsewhere", elsewhere)
-    (other,) = compare(paths, rankings=True).agreements
+    (other,) = compare_tables(paths, rankings=True).agreements
     assert other.interval.low == pytest.approx(-1.0)
 
 
 def test_opposite_rankings(tmp_path):
     up = {"a": {"x": 0.1, "y": 0.4, "z": 0.9}}
     down = {"a": {"x": 0.9, "y": 0.6, "z": 0.1}}
-    found = compare(
+    found = compare_tables(
         [
             write_table(tmp_path / "up", up, queries=True),
             write_table(tmp_path / "down", down, queries=True),
@@ -424,13 +414,13 @@ def test_rankings_are_of_one_protocol(tmp_path):
     both = tmp_path / "both.csv"
     Results.of(rows).write_csv(both)
     with pytest.raises(InputError, match="paper and own in one table"):
-        compare([fair, both], rankings=True)
+        compare_tables([fair, both], rankings=True)
     also_fair = tmp_path / "also.csv"
     Results.of([*rows, *Results.read(fair).rows]).write_csv(also_fair)
-    (one,) = compare([fair, also_fair], rankings=True).agreements
+    (one,) = compare_tables([fair, also_fair], rankings=True).agreements
     assert one.tau == pytest.approx(1.0)
     with pytest.raises(InputError, match=r"no row of auc .* protocol paper"):
-        compare([fair, both], protocol="paper", rankings=True)
+        compare_tables([fair, both], protocol="paper", rankings=True)
 
 
 def test_less_may_be_better(tmp_path):
@@ -441,7 +431,7 @@ def test_less_may_be_better(tmp_path):
     paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
     for path in paths:
         Results.of(rows).write_csv(path)
-    found = compare(paths, "translation_median")
+    found = compare_tables(paths, "translation_median")
     assert found.task == "localise"
     assert [r.method for r in found.ranked] == ["gicp", "icp"]
 
@@ -504,14 +494,14 @@ def test_queries_without_blocks_are_noted(tmp_path):
         write_table(tmp_path / name, {"town": {name: part}}, queries=True)
         for name, part in (("one", 0.9), ("other", 0.5))
     ]
-    assert len(compare(pair).differences) == 1
+    assert len(compare_tables(pair).differences) == 1
     for folder in pair:
         file = folder / "queries.csv"
         lines = [line.split(",") for line in file.read_text().splitlines()]
         block = lines[0].index("block")
         shorter = [line[:block] + line[block + 1 :] for line in lines]
         file.write_text("\n".join(map(",".join, shorter)))
-    notes = compare(pair).notes[:2]
+    notes = compare_tables(pair).notes[:2]
     files = [str(folder / "queries.csv") for folder in pair]
     assert [note.split(": ")[0] for note in notes] == files
     assert "column block" in notes[0]
@@ -525,7 +515,7 @@ def test_queries_of_earlier_reports_are_refused(tmp_path):
         "town,01,02,x,1,1,0.5,town_02,0\n"
     )
     with pytest.raises(InputError, match=r"queries.csv: a table of an ear"):
-        compare([folder])
+        compare_tables([folder])
 
 
 def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
@@ -544,14 +534,14 @@ def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
     one = write_table(tmp_path / "one", {"a": both}, **fair)
     two = write_table(tmp_path / "two", {"a": {"z": 0.9}}, **wide)
     with pytest.raises(InputError, match="protocol: fair in one, but own in t"):
-        compare([one, two])
+        compare_tables([one, two])
     three = write_table(tmp_path / "three", {"a": {"z": 0.9}}, **coarse)
     with pytest.raises(InputError, match=f"digest: {wide['protocol_digest']}"):
-        compare([two, three])
+        compare_tables([two, three])
     rows = [Results.read(path).rows for path in (one, two)]
     mixed = tmp_path / "mixed.csv"
     Results.of(itertools.chain(*rows)).write_csv(mixed)
-    found = compare([one, mixed])
+    found = compare_tables([one, mixed])
     assert [(r.method, r.value) for r in found.ranked] == [
         ("x", 0.5),
         ("y", 0.4),
@@ -588,9 +578,9 @@ def test_answers_that_contradict_their_results_are_refused(tmp_path, fault):
     with pytest.raises(
         InputError, match=r"queries.csv: contradicts .*: auc of x"
     ):
-        compare([folder, other])
+        compare_tables([folder, other])
     (folder / "queries.csv").unlink()
-    assert len(compare([folder, other]).ranked) == 2
+    assert len(compare_tables([folder, other]).ranked) == 2
 
 
 def test_other_numbers_of_queries_are_named(tmp_path):
@@ -600,10 +590,10 @@ def test_other_numbers_of_queries_are_named(tmp_path):
         rows = [replace(row, n=number) for row in Results.read(folder).rows]
         Results.of(rows).write_csv(folder / "results.csv")
         paths.append(folder)
-    notes = compare(paths).notes
+    notes = compare_tables(paths).notes
     assert "three: of how many queries is not known" in notes
     assert any("not the same queries: 12 (one), 141 (two)" in n for n in notes)
-    alike = compare(
+    alike = compare_tables(
         [paths[0], write_table(tmp_path / "four", {"a": {"z": 0.1}})]
     )
     assert not any("not the same queries" in note for note in alike.notes)
@@ -626,7 +616,7 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
     new = write_table(
         tmp_path / "new", {"a": {"z": 0.3}}, **made_by(FAIR_PROTOCOL)
     )
-    found = compare([folder, new])
+    found = compare_tables([folder, new])
     assert len(found.ranked) == 3
     assert any(
         "old: rows do not say how they were made" in n for n in found.notes

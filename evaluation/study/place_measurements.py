@@ -1,22 +1,22 @@
-"""Measures methods on one recording or on two."""
+"""Measures place recognition between two drives."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 import math
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
 from evaluation.drives import check_same_world
-from evaluation.drives.sampling import gather
+from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.method import Method
 from evaluation.recognition.costs import query_ms
 from evaluation.recognition.describing import Role
-from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
-from evaluation.recognition.kept_places import KEEP_ALL, kept_places
+from evaluation.recognition.descriptors import DriveDescriptors
+from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -24,37 +24,19 @@ from evaluation.recognition.retrieval import (
     compare_with_gates,
     matches_within_radius,
 )
-from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.databases import Searched, searched_database
 from evaluation.study.feature_extraction import describe_recording
 from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
-
-
-class Searched(NamedTuple):
-    """A database that is searched: places of one drive or of several.
-
-    Attributes:
-        described: the described places.
-        drives: name of each place's drive.
-        num_here: number of places in the query's own world; they come first.
-        rows: (num_here,) index of each place in the query's own world, among
-            all places of the drives through this world.
-    """
-
-    described: DriveDescriptors
-    drives: list[str]
-    num_here: int
-    rows: np.ndarray
-
 
 # The source of a drive, or the parts of its scans and of its descriptors by
 # each method.
 DescribedSource: TypeAlias = "DriveSource | tuple[Part, ...]"
 
-# Longest time for all queries at a size.
+# A method that takes longer for all queries is left out [ms].
 _LONGEST_MS = 3.6e6
-# Places that no method is known to take so long for.
+# With at most this number of places, no method is expected to take so long.
 _MANY = 5000
 
 
@@ -94,7 +76,7 @@ def shown_overlaps(
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
         ]
-    searched = with_distractors(
+    searched = searched_database(
         described[0],
         (),
         0,
@@ -127,7 +109,7 @@ def shown_overlaps(
             first += len(kept)
         else:
             chosen = [
-                gather(kept, frame, 1, protocol.max_range).astype(np.float32)
+                cloud_at(kept, frame, 1, protocol.max_range).astype(np.float32)
                 for frame in database.places.frames[of].tolist()
             ]
         for radius in radii:
@@ -179,10 +161,10 @@ def measure_method(
     placed, (placed_query, asked) = database.read()[0], query.read()
     check_same_world(placed, placed_query, across_maps=True)
     shown = {} if overlaps is None else overlaps.read()
-    return _compare(
+    return _method_outcomes(
         choice,
         method,
-        with_distractors(
+        searched_database(
             database,
             distractors,
             num_distractors,
@@ -238,10 +220,10 @@ def measure_places(
         leaves_out_slow: whether to leave out a method that would take more than
             an hour for all queries.
     """
-    place_scans, places = _describe(
+    place_scans, places = _scans_and_descriptors(
         database, "places", methods, protocol, reporter
     )
-    query_scans, queries = _describe(
+    query_scans, queries = _scans_and_descriptors(
         query, "queries", methods, protocol, reporter
     )
     overlaps: dict[float, np.ndarray] = {}
@@ -251,10 +233,10 @@ def measure_places(
     ):
         method = choice.make()
         mapped, asked = places(k), queries(k)
-        outcomes += _compare(
+        outcomes += _method_outcomes(
             choice,
             method,
-            with_distractors(
+            searched_database(
                 mapped,
                 [parts[k] for parts in distractors],
                 num_distractors,
@@ -263,7 +245,14 @@ def measure_places(
             asked,
             protocol,
             radii,
-            partial(_shown, overlaps, place_scans, query_scans, mapped, asked),
+            partial(
+                _overlaps_of_matches,
+                overlaps,
+                place_scans,
+                query_scans,
+                mapped,
+                asked,
+            ),
             reporter,
             truth,
             leaves_out_slow=leaves_out_slow,
@@ -271,7 +260,7 @@ def measure_places(
     return outcomes
 
 
-def _shown(
+def _overlaps_of_matches(
     overlaps: dict[float, np.ndarray],
     place_scans: list[np.ndarray],
     query_scans: list[np.ndarray],
@@ -307,7 +296,7 @@ def _shown(
     return overlaps[radius]
 
 
-def _compare(
+def _method_outcomes(
     choice: MethodChoice,
     method: Method,
     database: Searched,
@@ -390,7 +379,7 @@ def _takes_long(
     return one_ms * len(query.queries.frames) > _LONGEST_MS
 
 
-def _describe(
+def _scans_and_descriptors(
     drive: DescribedSource,
     role: Role,
     methods: tuple[MethodChoice, ...],
@@ -409,75 +398,3 @@ def _describe(
     found = describe_recording(drive(), {role}, asked, protocol)
     assert isinstance(found.scans, list)
     return found.scans, lambda k: found.described.pop(methods[k].key)
-
-
-def with_distractors(
-    database: DriveDescriptors | Part,
-    distractors: Sequence[Part],
-    num_others: int,
-    beside: Sequence[Part] = (),
-    keep: str | int = KEEP_ALL,
-    cell: float = math.inf,
-    *,
-    divides: bool = False,
-) -> Searched:
-    """Returns a database to which places of other drives are added.
-
-    The drives through other cities are moved so far away that none of their
-    places is a match. The first `num_others` places of these drives are
-    appended, or all places if there are fewer.
-
-    Args:
-        database: a drive with a method's descriptors of its places, or the file
-            that contains this drive.
-        distractors: for each drive through another city, the file with the
-            same method's descriptors of its places.
-        num_others: number of places to append.
-        beside: files with the same method's descriptors of further drives in
-            the same world, from older to newer. All of their places come before
-            the places of other cities.
-        keep: which places in this world are kept, see `kept_places`.
-        cell: side of the cells by which places are kept [m].
-        divides: whether descriptors are read while they are searched, if they
-            are too large for the memory; see `Method.divides`.
-    """
-    parts = [database, *beside, *distractors]
-    store = StoredDrives(
-        [partial(_described_in, one) for one in parts],
-        [one.size() if isinstance(one, Part) else 0 for one in parts],
-        MOST_BYTES if divides else math.inf,
-    )
-    num_near = 1 + len(beside)
-    near = [store.undescribed(k) for k in range(num_near)]
-    here = joined_scans(near, [0] * num_near)
-    lengths = [len(one.frames) for one in near]
-    drive_of = np.repeat(np.arange(num_near), lengths)
-    own_row = np.concatenate([np.arange(length) for length in lengths])
-    rows = np.flatnonzero(kept_places(here.p_WSs, drive_of, keep, cell))
-    every = [here if len(rows) == len(drive_of) else here.chosen(rows)]
-    stored = [drive_of[rows]]
-    stored_rows = [own_row[rows]]
-    most = len(rows) + num_others
-    for k in range(num_near, len(parts)):
-        if sum(map(len, stored)) >= most:
-            break
-        every.append(store.undescribed(k))
-        stored_rows.append(np.arange(len(every[-1].frames)))
-        stored.append(np.full(len(stored_rows[-1]), k))
-    places = joined_scans(every, range(len(every)), most)
-    of = np.concatenate(stored)[:most]
-    return Searched(
-        DriveDescriptors(
-            store.name(0),
-            store.described(places, of, np.concatenate(stored_rows)[:most]),
-            here.chosen(np.arange(0)),
-        ),
-        [store.name(k) for k in of.tolist()],
-        len(rows),
-        rows,
-    )
-
-
-def _described_in(source: DriveDescriptors | Part) -> DriveDescriptors:
-    """Returns a drive with a method's descriptors, which a file may hold."""
-    return source.read()[1] if isinstance(source, Part) else source

@@ -3,8 +3,8 @@
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.study import collection
-from evaluation.study.collection import find_recordings
+from evaluation.study import recording_search
+from evaluation.study.recording_search import find_recordings
 
 
 def write_cns(folder, stage):
@@ -19,7 +19,9 @@ def test_drives_are_found_three_levels_down(tmp_path, monkeypatch):
     (tmp_path / "Town/notes.txt").write_text("")
     seen = []
     monkeypatch.setattr(
-        collection, "_place", lambda path, *rest: seen.append(path)
+        recording_search,
+        "_recording_info",
+        lambda path, *rest: seen.append(path),
     )
     with pytest.raises(InputError, match="map and stage are unknown"):
         find_recordings(tmp_path)
@@ -29,7 +31,7 @@ def test_drives_are_found_three_levels_down(tmp_path, monkeypatch):
 @pytest.mark.parametrize("levels", [2, 3])
 def test_a_search_has_an_end(tmp_path, monkeypatch, levels):
     """A whole disk is not searched; so many files cost nothing."""
-    monkeypatch.setattr(collection, "_MOST_FOLDERS", 5)
+    monkeypatch.setattr(recording_search, "_MOST_FOLDERS", 5)
     inner = tmp_path.joinpath(*"abc"[: levels - 1])
     for k in range(5 - (levels - 2)):
         (inner / f"{k}").mkdir(parents=True)

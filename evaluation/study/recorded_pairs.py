@@ -1,35 +1,19 @@
-"""Pairs of recordings, which a study compares as they were recorded.
-
-Each recording is read only once for a study.
-"""
+"""Pairs of recordings, which a study compares as they were recorded."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.running import Job
 from cns_drake.base.listing import natural_key
 from cns_drake.base.repetitions import repeated
-from evaluation.recognition.describing import Role
 from evaluation.recognition.kept_places import KEEP_ALL
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
-from evaluation.results.table import OWN
-from evaluation.study.collection import MapDrives, RecordingInfo
-from evaluation.study.feature_extraction import (
-    FeatureExtraction,
-    Further,
-)
-from evaluation.study.measurements import DescribedSource
-from evaluation.study.study_files import FeatureFiles
-from evaluation.study.tasks.task import Jobs, NamedDrive, Pair, Result
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.keys import OWN
+from evaluation.study.map_drives import MapDrives, RecordingInfo
+from evaluation.study.tasks.pair import Pair
 
-# Expected seconds: for the maps of a drive of 3000 scans, and for its places or
-# queries.
-_MAP_COST = 19.0
-_ROLE_COST = 10.0
 # Clocks of recordings that begin at 0 say nothing about their order: the first
 # stamps of others are years after 1970 [ns].
 _DATED_NS = 10**17
@@ -57,7 +41,7 @@ class RecordedCondition(NamedTuple):
     keep: str | int = KEEP_ALL
 
 
-def recorded_comparisons(
+def recorded_pairs(
     city: MapDrives,
     conditions: Iterable[RecordedCondition],
     seed: int,
@@ -66,7 +50,7 @@ def recorded_comparisons(
     both_ways: bool = False,
     with_itself: bool = False,
 ) -> Iterator[Pair]:
-    """Yields the comparisons of a map's recordings in all conditions.
+    """Yields the pairs of a map's recordings in all conditions.
 
     Args:
         city: the recordings.
@@ -83,7 +67,7 @@ def recorded_comparisons(
     composed = [one for one in conditions if one.sessions]
     if composed:
         conditions = [one for one in conditions if not one.sessions]
-        yield from _of_sessions(city, composed, seed)
+        yield from _session_pairs(city, composed, seed)
     for pair in pairs if conditions else ():
         control = city.unchanged_pair(*pair)
         for condition in conditions:
@@ -159,7 +143,7 @@ def chosen_sessions(
     )
 
 
-def _of_sessions(
+def _session_pairs(
     city: MapDrives, conditions: Iterable[RecordedCondition], seed: int
 ) -> Iterator[Pair]:
     """Yields the pairs of databases of several recordings and the query."""
@@ -188,92 +172,4 @@ def _of_sessions(
             protocol=one.protocol,
             beside=tuple(drives[1:]),
             keep=one.keep,
-        )
-
-
-@dataclass
-class ExtractionJobs(Jobs):
-    """Jobs of a study that read each drive once.
-
-    One job extracts the features of a drive: it maps the drive, describes its
-    places and its queries by all methods, and keeps their scans. If pairs use
-    several protocols, this job serves only the first protocol.
-
-    Attributes:
-        with_map: whether a map is made.
-        further: drive -> descriptors by a second protocol.
-    """
-
-    with_map: bool = True
-    further: Mapping[str, tuple[Further, ...]] = field(default_factory=dict)
-    # Drive -> its roles. They are known before the first job is added.
-    _roles: dict[str, set[Role]] = field(default_factory=dict)
-    _protocol: RetrievalProtocol | None = None
-
-    def expect(self, pair: Pair) -> None:
-        super().expect(pair)
-        if self._protocol is None:
-            self._protocol = pair.protocol
-        further: list[tuple[NamedDrive, Role]]
-        further = [(drive, "places") for drive in pair.beside]
-        for drive, role in (*pair.roles, *further):
-            if self._is_extracted(pair.protocol):
-                self._roles.setdefault(drive.name, set()).add(role)
-
-    def described(
-        self,
-        drive: NamedDrive,
-        role: Role,
-        protocol: RetrievalProtocol,
-        needs: list[str],
-        *,
-        kept: bool = False,
-    ) -> DescribedSource:
-        if not self._is_extracted(protocol):
-            return super().described(drive, role, protocol, needs, kept=kept)
-        files = self.features(drive, needs)
-        return (
-            files.scans,
-            *(files.described(one.key) for one in self.methods),
-        )
-
-    def mapped(
-        self, drive: NamedDrive, spacing: float | None, needs: list[str]
-    ) -> Result:
-        if spacing is not None:
-            return super().mapped(drive, spacing, needs)
-        return self.features(drive, needs).drive
-
-    def features(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
-        """Returns the files of a drive's features, and adds their job.
-
-        Args:
-            drive: the drive.
-            needs: list to which the name of the job is appended.
-        """
-        name = f"features of {drive.name}"
-        needs.append(name)
-        files = self.files.features(drive.name)
-        if name not in self.jobs:
-            roles = frozenset(self._roles.get(drive.name, ()))
-            step = FeatureExtraction(
-                drive.source,
-                roles,
-                self.methods,
-                self._protocol or FAIR_PROTOCOL,
-                files,
-                with_scans=bool(roles),
-                with_map=self.with_map,
-                further=self.further.get(drive.name, ()),
-                removes_descriptors=True,
-            )
-            cost = self.with_map * _MAP_COST + _ROLE_COST * len(roles)
-            self.jobs[name] = Job(name, step, drive.needs, cost)
-        return files
-
-    def _is_extracted(self, protocol: RetrievalProtocol) -> bool:
-        """Returns whether these jobs describe drives by a protocol."""
-        assert self._protocol is not None
-        return (
-            protocol.descriptor_options() == self._protocol.descriptor_options()
         )

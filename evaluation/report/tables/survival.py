@@ -1,4 +1,4 @@
-"""Conclusions from the table of results: ranking, and retained results.
+"""Tables of what methods retain under a change of the city.
 
 A method's retained result is its result under structural change, divided by its
 result without change. Each pair of drives can have a control: the same two
@@ -6,123 +6,25 @@ routes, both driven in one stage of the city. A loss from the control to the
 pair is therefore due only to the change, and not to the routes.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 import math
 from typing import NamedTuple
 
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.result_tables import MethodDifference
-from evaluation.results import table_forms as tables
-from evaluation.results.headlines import KEPT, by_significance, listed, survival
-from evaluation.results.summaries import Ranked, ranking
-from evaluation.results.table import OWN, STAGE, Results, Row
+from evaluation.results.headlines import KEPT, survival
+from evaluation.results.keys import OWN, STAGE
+from evaluation.results.table import Row
+from evaluation.results.table_forms import (
+    CAPTIONS,
+    MISSING,
+    Columns,
+    Table,
+    by_pair,
+    by_pair_and_method,
+    keyed,
+    title,
+)
 
 NO_CONTROL = "no control"
-# A result, and that of its control, if there is one.
-Controlled = tuple[PlaceOutcome, PlaceOutcome | None]
-
-
-def ranked_methods(
-    results: Results, differences: Iterable[MethodDifference] = ()
-) -> tuple[list[Ranked], str]:
-    """Returns the methods ranked by mean AUC, and a sentence on the ranking.
-
-    The means are over the pairs of drives with results of all methods, without
-    the controls, in which the city does not change. If there is no such pair,
-    no method is returned, and the sentence says so. The sentence also says
-    which methods differ significantly from the first method, by the tests of
-    `differences`.
-    """
-    rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
-    ranked, _ = ranking(rows)
-    measured = Counter(
-        row.but("method") for row in rows if not math.isnan(row.value)
-    )
-    num_pairs = sum(n == len(ranked) for n in measured.values())
-    of_pair: dict[object, dict[tuple[str, str], float]] = {}
-    for one in differences:
-        key = one.result.method, one.other.method
-        of_pair.setdefault(one.result.pair, {})[key] = one.p_value
-    return ranked, _ranking_sentence(ranked, num_pairs, of_pair.values())
-
-
-def further_columns(results: Results) -> dict[str, dict[str, Ranked]]:
-    """Returns further columns of the ranking: column -> method -> mean.
-
-    The columns are shares of the queries with a match: R@1; near misses, which
-    are wrong top-ranked places within twice the radius of a match; and the pose
-    success. The means are over the pairs of drives with results of all methods.
-    """
-    rows = results.where({STAGE: OWN})
-    matched = {
-        row.but(): row.value for row in rows.where(metric="with_match").rows
-    }
-    columns = {
-        "R@1": rows.where(metric="r1").rows,
-        "near miss": [
-            replace(
-                row,
-                metric="near_miss",
-                value=row.value / max(matched[row.but()], 1.0),
-                low=math.nan,
-                high=math.nan,
-            )
-            for row in rows.where(metric="too_far").rows
-        ],
-        "pose success": rows.where(metric="pose_success").rows,
-    }
-    return {
-        name: {one.method: one for one in ranking(some)[0]}
-        for name, some in columns.items()
-    }
-
-
-def _ranking_sentence(
-    ranked: Sequence[Ranked],
-    num_pairs: int,
-    p_values: Iterable[Mapping[tuple[str, str], float]],
-) -> str:
-    if not ranked:
-        return "No pair of drives has an AUC of every method to rank."
-    over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
-    best, *others = [
-        (tables.title(one.method), f"{one.value:.3f}") for one in ranked
-    ]
-    if not others:
-        return f"{best[0]} has a mean AUC of {best[1]} over {over}."
-    ties = [name for name, value in others if value == best[1]]
-    if ties:
-        names = listed([best[0], *ties])
-        return f"{names} tie at a mean AUC of {best[1]} ({over})."
-    text = (
-        f"{best[0]} has the greatest mean AUC of {len(ranked)} methods,"
-        f" {best[1]} over {over}"
-    )
-    # The pairs on which tests tell the first method from another one.
-    apart = Counter(
-        name
-        for of_pair in p_values
-        for name in by_significance(ranked[0].method, of_pair)[0]
-    )
-    never = [f"{name} ({auc})" for name, auc in others if not apart[name]]
-    partly = [
-        f"{name} ({apart[name]} of {num_pairs})"
-        for name, _ in others
-        if 0 < apart[name] < num_pairs
-    ]
-    if not never and not partly:
-        return f"{text}; its lead over all others is significant on each pair."
-    if not never:
-        return (
-            f"{text}; its lead over {listed(partly)} is significant on some"
-            " pairs only."
-        )
-    text += f"; its lead over {listed(never)} is significant on no pair"
-    if partly:
-        text += f", and over {listed(partly)} on some pairs only"
-    return f"{text}."
 
 
 class Survival(NamedTuple):
@@ -179,14 +81,14 @@ def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
             pair = row.map, stages[row.database], stages[row.query]
             sides = found.setdefault((pair, row.method), ({}, {}))
             sides[row[STAGE] == OWN][row.metric] = row
-    return tables.by_pair_and_method(
+    return by_pair_and_method(
         [Survival(*key, *sides) for key, sides in found.items()]
     )
 
 
 def percent(share: float) -> str:
     """Returns a share as text in per cent."""
-    return tables.MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
+    return MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
 
 
 def interval_text(kept: Row) -> str:
@@ -199,7 +101,7 @@ def interval_text(kept: Row) -> str:
     return f"({100.0 * kept.low:.0f}–{100.0 * kept.high:.0f})"
 
 
-def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
+def survival_numbers(survivals: Sequence[Survival]) -> Table:
     """Returns the table `survival.csv`.
 
     For each method, the table contains results without and with change of the
@@ -221,30 +123,30 @@ def survival_numbers(survivals: Sequence[Survival]) -> tables.Table:
         "auc_strict_unchanged": ("before", "auc_strict"),
         "auc_strict_changed": ("after", "auc_strict"),
     }
-    return tables.Table.of(
+    return Table.of(
         survivals,
         {
             "map": lambda s: s.pair[0],
             "db": lambda s: s.pair[1],
             "query": lambda s: s.pair[2],
             "method": lambda s: s.method,
-            **tables.keyed(numbers, lambda s, place: s.number(*place)),
+            **keyed(numbers, lambda s, place: s.number(*place)),
             "protocol": lambda s: s.after["auc"].protocol,
         },
     )
 
 
-def survival_table(survivals: Sequence[Survival]) -> tables.Table:
+def survival_table(survivals: Sequence[Survival]) -> Table:
     """Returns a table, for print, of how much of its AUC each method retains.
 
     The retained AUC is the AUC with change, divided by the AUC without change.
     """
-    return tables.Table.of(
+    return Table.of(
         survivals,
         {
             "map": lambda s: s.pair[0],
             "DB → query": lambda s: " → ".join(s.pair[1:]),
-            "method": lambda s: tables.title(s.method),
+            "method": lambda s: title(s.method),
             **_metric_columns("AUC", "auc", "kept"),
             **_metric_columns("AUC strict", "auc_strict"),
             **_metric_columns("R@1", "r1", "kept_r1"),
@@ -252,13 +154,13 @@ def survival_table(survivals: Sequence[Survival]) -> tables.Table:
                 "after", "recall_at_full_precision"
             ),
         },
-        tables.CAPTIONS["survival"],
+        CAPTIONS["survival"],
     )
 
 
 def _metric_columns(
     group: str, metric: str, kept: str | None = None
-) -> tables.Columns[Survival]:
+) -> Columns[Survival]:
     """Returns columns: a metric without change, with change, and retained."""
 
     def share(one: Survival) -> str | None:
@@ -278,9 +180,9 @@ def _metric_columns(
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
     """Returns sentences on how much methods retain, and on which survive."""
-    groups = tables.by_pair(survivals)
+    groups = by_pair(survivals)
     known = [one for one in survivals if one.before]
-    without = len(groups) - len(tables.by_pair(known))
+    without = len(groups) - len(by_pair(known))
     text = survival([one.after[KEPT] for one in known if KEPT in one.after])
     parts = [text] if text else []
     if without:

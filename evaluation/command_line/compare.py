@@ -1,0 +1,98 @@
+"""The command `compare`."""
+
+from __future__ import annotations
+
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base.terminal import number
+from evaluation.command_line import options
+
+if TYPE_CHECKING:
+    from evaluation.recognition.metrics import Interval
+
+
+@commands.former_options({"--gate": "--verified"})
+def compare(
+    tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
+    metric: str = "auc",
+    protocol: Annotated[
+        str | None, typer.Option(metavar="fair|paper|recorded|own")
+    ] = None,
+    verified: Annotated[bool, typer.Option("--verified")] = False,
+    rankings: Annotated[bool, typer.Option("--rankings")] = False,
+    json: shared_options.Json = False,
+) -> None:
+    """Rank the methods in tables of results.
+
+    RESULTS are files like results.csv, or folders that contain such a file. The
+    command ranks the methods in these tables and in the shipped tables by their
+    means over the conditions that all tables share.
+
+    From four maps on, each mean has a 95 % t interval over maps. With one map,
+    the interval is over conditions, if there are at least four conditions. If
+    each table has a queries.csv next to it, the command also prints the
+    difference in AUC between any two methods, with a p-value that is corrected
+    for the number of differences by Holm's method. With --rankings, the command
+    prints Kendall's tau between the rankings of any two tables.
+
+    Args:
+        tables: Tables of results to compare, or folders with a results.csv.
+        metric: Metric by which the methods are ranked: auc, r1 or another
+            metric in the tables. An unknown name makes the command list all
+            metrics.
+        protocol: Protocol of the results to compare; own stands for results
+            that were measured with changed options. By default results of all
+            protocols are used, each compared only with results of the same
+            protocol.
+        verified: Rank the results that were measured with geometric
+            verification. By default, the results without geometric verification
+            are ranked.
+        rankings: Compare only how the tables rank the methods. Each table is
+            ranked over its own conditions, so that tables with different
+            conditions can be compared, such as simulated and real drives.
+    """
+    from evaluation.results.table_comparison import compare_tables
+
+    found = compare_tables(
+        tables, metric, protocol, gate=verified, rankings=rankings
+    )
+    for note in found.notes:
+        terminal.note(note)
+    rows = [
+        (one.method, f"{number(one.value)}{_spaced_interval(one.interval)}")
+        for one in found.ranked
+    ]
+    if rows:
+        where = f"mean of {found.conditions or 'its own'} conditions"
+        known = any(_spaced_interval(one.interval) for one in found.ranked)
+        level = "  [95 %]" if known else ""
+        rows.insert(0, ("method", f"{metric}, {where}{level}"))
+    for one in found.differences:
+        interval = options.interval_text(one.difference.interval)
+        rows.append(
+            (
+                f"{one.first} - {one.second}",
+                f"{number(one.difference.value)}  {interval}"
+                f"  p {number(one.p_value)}",
+            )
+        )
+    for alike in found.agreements:
+        rows.append(
+            (
+                f"Kendall's tau, {alike.first} and {alike.second}",
+                f"{number(alike.tau)}  {options.interval_text(alike.interval)}",
+            )
+        )
+    terminal.show(found.to_json(), rows, json=json)
+
+
+def _spaced_interval(interval: Interval) -> str:
+    """Returns an interval after two spaces; "" if it is unknown."""
+    if isnan(interval.low):
+        return ""
+    return f"  {options.interval_text(interval)}"

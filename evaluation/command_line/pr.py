@@ -1,0 +1,356 @@
+"""The command `pr`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base.terminal import number
+from evaluation.command_line import options
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol_options import with_protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from evaluation.drives import Drive
+    from evaluation.methods.method import Method
+    from evaluation.recognition.metrics import Mode
+    from evaluation.recognition.place_outcome import PlaceOutcome
+    from evaluation.study.chosen_methods import MethodChoice
+
+
+# Parameters that have an effect together with `--scores`.
+_WITH_SCORES = (
+    "database",
+    "query",
+    "method",
+    "parameter",
+    "sensor_height",
+    "gate",
+    "radius",
+    "columns",
+)
+
+
+@with_protocol
+def pr(
+    context: typer.Context,
+    database: Annotated[Path, typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: options.MethodName,
+    mode: Literal["all", "filtered"] = "all",
+    parameter: shared_options.MethodSettings = None,
+    sensor_height: options.SensorHeight = 1.6,
+    align: options.Align = "auto",
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
+    across_maps: Annotated[bool, typer.Option("--across-maps")] = False,
+    truth: Annotated[
+        str, typer.Option(metavar="radius|overlap:PART")
+    ] = "radius",
+    overlaps: Annotated[Path | None, typer.Option(metavar="FILE.csv")] = None,
+    exact_overlaps: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv")
+    ] = None,
+    turn_queries: Annotated[
+        bool | None, typer.Option("--turn-queries/--no-turn-queries")
+    ] = None,
+    tilt_queries: Annotated[float | None, typer.Option(metavar="DEG")] = None,
+    hide_sector: Annotated[float, typer.Option(metavar="DEG")] = 0.0,
+    seed: int = 0,
+    output: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    scores: Annotated[Path | None, typer.Option(metavar="FILE.csv")] = None,
+    json: shared_options.Json = False,
+    *,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Measure place recognition between two drives.
+
+    The command measures how well a method finds the place of each scan along
+    QUERY among the places of DATABASE. QUERY and DATABASE are recorded drives
+    (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI odometry, CNS). Drives in
+    different world frames are aligned first.
+
+    Args:
+        database: Recorded drive that provides the known places.
+        query: Recorded drive that provides the scans to recognise.
+        mode: Which queries count: all queries (all), or only queries that have
+            a match in the database (filtered).
+        across_maps: Allow two drives through maps of different names, such as
+            two cities generated along the same streets.
+        truth: What makes a place a match of a query. With radius, a match lies
+            within --radius of the query. With overlap:PART, such as
+            overlap:0.5, a match can lie at any distance, and the scan of the
+            match shows at least PART of what the query's scan shows.
+        overlaps: CSV file to write: the overlap of each query with each place.
+            Needs --truth overlap:PART.
+        exact_overlaps: File with exact overlaps, from cns-drake export --format
+            overlap-table. Without such a file, overlaps are estimated from the
+            scans. Needs --truth overlap:PART.
+        turn_queries: Whether to rotate each query by a random yaw, as if the
+            car had another heading. By default as --protocol says.
+        tilt_queries: Greatest angle of the random roll and pitch by which each
+            query is tilted [deg]. By default as --protocol says.
+        hide_sector: Angular width of the sector, in a random direction, in
+            which the points of each query are removed [deg], as if a truck
+            beside the car occluded them.
+        seed: Seed of the random yaws, tilts and occluded sectors of the
+            queries.
+        output: Folder for the tables results.csv and queries.csv, which have
+            the columns of a study's tables; created if it does not exist.
+        scores: CSV file for the score of each pair of a query and a place. Use
+            this option for scans without poses: DATABASE and QUERY are then
+            folders with .bin, .pcd, .npy or .ply files, and no results are
+            computed. Every query is compared with every place, even if the
+            method usually skips some places to save time. The score of a place
+            that the method rejects is empty.
+    """
+    if scores is not None:
+        commands.check_only_with(context, "scores", _WITH_SCORES)
+        choice = _choice_of(method, parameter).at_height(sensor_height)
+        _write_scores(choice.make(), database, query, scores, protocol, columns)
+        return
+    from cns_drake.base import files
+    from evaluation.drives import check_same_world
+    from evaluation.drives.drive_views import CountedDrive
+    from evaluation.recognition import overlap_truth
+    from evaluation.recognition.place_outcome import check_has_match
+    from evaluation.study import one_pair
+    from evaluation.study.one_pair import OpenSource
+    from evaluation.study.tasks.place import PlaceTask, PoseTask
+
+    if turn_queries is not None:
+        protocol = replace(protocol, turn_queries=turn_queries)
+    if tilt_queries is not None:
+        protocol = replace(protocol, tilt_queries=tilt_queries)
+    protocol = replace(
+        protocol,
+        overlap=options.overlap_of(truth),
+        hide_sector=hide_sector,
+        seed=seed,
+    )
+    is_itself = database.resolve() == query.resolve()
+    _check_together(protocol, database, query, overlaps, exact_overlaps)
+    if output is not None:
+        files.make_folder(output)
+    given = _choice_of(method, parameter)
+    choice = given.at_height(sensor_height)
+    chosen = choice.make()
+    drives = options.aligned(
+        options.open_noted(database, query, lidar=lidar, columns=columns),
+        align,
+        across_maps=across_maps,
+    )
+    check_same_world(*drives, across_maps=across_maps)
+    places, queries = counted = [CountedDrive(one) for one in drives]
+    shares = _overlaps(places, queries, protocol, exact_overlaps)
+    pair = one_pair.pair_of(
+        OpenSource(places),
+        OpenSource(queries),
+        (places.name, queries.name),
+        protocol,
+        overlaps=shares,
+    )
+    engine = one_pair.measure_pairs(
+        "pr",
+        [pair],
+        [PlaceTask({}, "pr"), PoseTask({}, "pr")],
+        output,
+        # The height is in the protocol's digest.
+        [(choice, given.columns)],
+        terminal.note,
+    )
+    (outcome,) = (
+        replace(one, method=choice.name)
+        for one in engine.found(pair, PlaceTask.name)
+        if one.is_gated == protocol.gate
+    )
+    check_has_match(outcome)
+    for note in dict.fromkeys(
+        chosen.assumption(one.lidar_field) for one in counted
+    ):
+        if note is not None:
+            terminal.note(note)
+    for one in counted:
+        if one.num_ignored:
+            terminal.note(f"{one.name}: {one.num_ignored} {options.NOT_FINITE}")
+    if overlaps is not None:
+        assert shares is not None
+        overlap_truth.write_overlaps(
+            overlaps,
+            outcome.columns["query_frame"],
+            outcome.place_frames,
+            shares,
+        )
+        terminal.note(f"wrote {overlaps}")
+    if protocol.exclude_recent is None and is_itself:
+        terminal.note(
+            f"{query}: every scan finds itself (--exclude-recent leaves out "
+            "recent places)"
+        )
+    if output is not None:
+        options.write_tables(engine)
+    values = outcome.to_json(mode)
+    values["parameters"] = chosen.config.model_dump(mode="json")
+    terminal.show(values, _recognition_rows(outcome, mode), json=json)
+
+
+def _check_together(
+    protocol: RetrievalProtocol,
+    database: Path,
+    query: Path,
+    overlaps: Path | None,
+    exact_overlaps: Path | None,
+) -> None:
+    """Checks options that need others, and files, before the long work.
+
+    Raises:
+        InputError: an option needs another one, or a file cannot be used.
+    """
+    from cns_drake.base import complete_files, files
+    from cns_drake.base.errors import InputError
+
+    for option, file in (
+        ("--overlaps", overlaps),
+        ("--exact-overlaps", exact_overlaps),
+    ):
+        if file is not None and protocol.overlap is None:
+            raise InputError(f"{option}: add --truth overlap:PART")
+    is_itself = database.resolve() == query.resolve()
+    if protocol.exclude_recent is not None and not is_itself:
+        raise InputError(
+            f"--exclude-recent: it is for a drive against itself, but {query} "
+            f"is not {database}"
+        )
+    if overlaps is not None:
+        complete_files.check_writable(overlaps)
+    if exact_overlaps is not None:
+        files.check_regular(exact_overlaps)
+
+
+def _overlaps(
+    places: Drive,
+    queries: Drive,
+    protocol: RetrievalProtocol,
+    exact_overlaps: Path | None,
+) -> np.ndarray | None:
+    """Returns the overlap of each query with each place, if matches need it."""
+    from evaluation.recognition import overlap_truth
+
+    if exact_overlaps is not None:
+        frames = overlap_truth.compared_frames(places, queries, protocol)
+        return overlap_truth.read_overlaps(exact_overlaps, *frames)
+    if protocol.overlap is not None:
+        return overlap_truth.overlap_matrix(places, queries, protocol)
+    return None
+
+
+def _write_scores(
+    method: Method,
+    database: Path,
+    query: Path,
+    output: Path,
+    protocol: RetrievalProtocol,
+    columns: int | None,
+) -> None:
+    """Writes the scores of `pr --scores`, and shows the notes on them."""
+    from evaluation.recognition import scan_folders
+
+    num_ignored = scan_folders.write_scores(
+        method,
+        database,
+        query,
+        output,
+        gate_radius=protocol.gate_radius,
+        columns=columns,
+        on_note=terminal.note,
+    )
+    if num_ignored:
+        terminal.note(f"{num_ignored} {options.NOT_FINITE}")
+    terminal.note(f"wrote {output}")
+    if (note := method.assumption(None)) is not None:
+        terminal.note(note)
+
+
+def _choice_of(name: str, assignments: list[str] | None) -> MethodChoice:
+    """Returns a method with its settings."""
+    from evaluation.methods.own_files import load_method
+    from evaluation.study.chosen_methods import MethodChoice, method_settings
+
+    file = Path(name) if name.endswith(".py") else None
+    if file is not None:
+        # Errors name the file as the user does.
+        name, file = load_method(file).name, file.absolute()
+    settings = method_settings(assignments or [], [name])[name]
+    return MethodChoice(name, file, tuple(settings.items()))
+
+
+def _recognition_rows(
+    outcome: PlaceOutcome, mode: Mode
+) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the results of `pr`."""
+    from evaluation.recognition.pose_errors import (
+        SUCCESS_ROTATION_DEG,
+        SUCCESS_TRANSLATION,
+    )
+
+    metrics, pose = outcome.by_mode[mode], outcome.pose
+    outcomes = outcome.outcomes
+    with_match = metrics.num_with_match
+    yield "method", outcome.method
+    yield "database -> query", f"{outcome.database} -> {outcome.query}"
+    yield "mode", metrics.mode
+    yield "queries, with a match (N)", f"{metrics.num_queries}, {with_match}"
+    yield (
+        "R@1",
+        f"{number(metrics.recall_at_1)}"
+        f"  {options.interval_text(metrics.recall_at_1_interval)}"
+        f"  (TP {metrics.num_right} of N {with_match})",
+    )
+    for rank in (5, 10, 25):
+        yield f"R@{rank}", number(metrics.recall_at_n[rank - 1])
+    yield "R@1%", number(metrics.recall_at_1_percent)
+    yield (
+        "AUC",
+        f"{number(metrics.auc)}  {options.interval_text(metrics.auc_interval)}",
+    )
+    yield "AUC strict", f"{number(metrics.auc_strict)}  (recall = TP / N)"
+    f1 = number(metrics.f1_max)
+    curve = metrics.curve
+    if metrics.f1_max_index is not None:
+        index = metrics.f1_max_index
+        f1 += f"  (TP {curve.true_positives[index]}, T {curve.counted[index]})"
+    yield "F1max", f1
+    yield "recall at full precision", number(curve.recall_at_full_precision)
+    yield "mean reciprocal rank", number(outcomes.mean_reciprocal_rank)
+    if not isnan(outcomes.match_auroc):
+        yield "match AUROC", number(outcomes.match_auroc)
+    yield (
+        "AUC by radius",
+        ", ".join(
+            f"{radius:g} m {number(auc)}"
+            for radius, auc in outcome.auc_over_radius().items()
+        ),
+    )
+    if not isnan(pose.success):
+        yield (
+            "translation error, median, 90 %",
+            f"{number(pose.translation_median)} m,"
+            f" {number(pose.translation_90)} m"
+            f"  ({pose.num_accepted} accepted matches)",
+        )
+        yield (
+            "rotation error, median, 90 %",
+            f"{number(pose.rotation_median_deg)} deg,"
+            f" {number(pose.rotation_90_deg)} deg",
+        )
+        limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
+        yield f"within {limits}", f"{number(pose.success)}  (of N)"
+    yield "protocol", outcome.protocol.to_text()

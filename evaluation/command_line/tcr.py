@@ -1,0 +1,135 @@
+"""The command `tcr`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base.terminal import number
+from evaluation.command_line import options
+from evaluation.command_line.trajectories import compare_paths
+
+if TYPE_CHECKING:
+    from evaluation.change.drive_change import ChangeReport
+
+
+# Parameters that have an effect together with `--paths`.
+_WITH_PATHS = ("source", "target", "align", "lidar", "columns", "json")
+
+
+def tcr(
+    context: typer.Context,
+    source: Annotated[Path, typer.Argument(metavar="A")],
+    target: Annotated[Path, typer.Argument(metavar="B")],
+    control: Annotated[Path | None, typer.Option(metavar="C")] = None,
+    align: options.Align = "auto",
+    lidar: shared_options.LidarName = None,
+    columns: shared_options.Columns = None,
+    paths: Annotated[bool, typer.Option("--paths")] = False,
+    output: options.Tables = None,
+    json: shared_options.Json = False,
+) -> None:
+    """Measure how much changed between two drives or maps.
+
+    A and B are recorded drives (MCAP, MulRan, HeLiPR, NCLT, Boreas, KITTI
+    odometry, CNS) or maps (.pcd .ply .npy .bin). The main result, TCR_sym, is 0
+    if nothing changed and 1 if everything changed. The command also prints two
+    directed ratios: the share of A that is missing in B, and the share of B
+    that is missing in A. Drives in different world frames are aligned first.
+
+    Args:
+        source: Drive or map before the change.
+        target: Drive or map after the change.
+        control: Third drive, on A's route in B's stage or on B's route in A's
+            stage. With the control, the command also prints TCR_sym of two
+            drives in the same stage, which differ only in their routes.
+        paths: Compare the paths and speeds of the two drives, instead of
+            measuring change. Every 5 m along A, the command measures how B
+            differs from A in lateral offset, lane, heading and height. The
+            command also prints the speeds of each car, and the share of the
+            time during which the car stands. For comparison, it prints the same
+            numbers of two pairs of real drives: two drives of Boreas, 28 days
+            apart, and KAIST 01 and 02 of MulRan.
+    """
+    if paths:
+        commands.check_only_with(context, "paths", _WITH_PATHS)
+        first, second = options.open_noted(
+            source, target, lidar=lidar, columns=columns
+        )
+        compare_paths(first, second, align, json=json)
+        return
+    from cns_drake.base.files import make_folder
+    from evaluation.change import drive_change as change
+    from evaluation.change.drive_maps import maps_in_one_world
+    from evaluation.results.keys import LAST, OWN, STAGE
+    from evaluation.study import one_pair
+    from evaluation.study.tasks.change import ChangeTask
+
+    named = [path for path in (source, target, control) if path is not None]
+    maps, alignments = maps_in_one_world(named, align, lidar, columns)
+    before, after, *controls = maps
+    compared = [(before, after)] + [
+        (one, change.same_stage_partner(before, after, one)) for one in controls
+    ]
+    pairs = [
+        one_pair.pair_of_drive_maps(
+            both,
+            (before.name, after.name),
+            factors={STAGE: stage} if controls else {},
+            is_baseline=stage == LAST,
+            key=stage,
+        )
+        for both, stage in zip(compared, (OWN, LAST), strict=False)
+    ]
+    if output is not None:
+        make_folder(output)
+    engine = one_pair.measure_pairs(
+        "tcr", pairs, [ChangeTask({}, "tcr")], output
+    )
+    report, *beside = (engine.found(one, ChangeTask.name) for one in pairs)
+    for one in beside:
+        report = report.beside(one)
+    report = replace(
+        report,
+        spread=change.spread_over_grids(before, after, report.change),
+        alignment=alignments[0] if alignments else None,
+    )
+    for one in maps:
+        for note in one.notes:
+            terminal.note(note)
+        ignored = one.voxels.num_ignored
+        if ignored:
+            terminal.note(f"{one.name}: {ignored} {options.NOT_FINITE}")
+    for alignment in alignments:
+        terminal.note(alignment.to_text())
+    if output is not None:
+        options.write_tables(engine)
+    terminal.show(report.to_json(), _change_rows(report), json=json)
+
+
+def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the results of `tcr`."""
+    change = report.change
+    source, target = report.source, report.target
+    yield "pair", f"{source} <-> {target}"
+    yield "TCR_sym", number(change.symmetric)
+    yield "  on shifted grids", " to ".join(map(number, report.spread))
+    if change.undefined_because:
+        yield "  because", change.undefined_because
+    for names, side in (
+        (f"{source} -> {target}", change.source_to_target),
+        (f"{target} -> {source}", change.target_to_source),
+    ):
+        counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
+        yield f"TCR {names}", f"{number(side.ratio)}  {counts}"
+    if report.masked is not None:
+        yield "TCR_sym where both drove", number(report.masked.symmetric)
+    if report.control is not None and report.control_names is not None:
+        names = " <-> ".join(report.control_names)
+        value = number(report.control.symmetric)
+        yield "TCR_sym of only the routes", f"{value}  ({names})"

@@ -1,0 +1,32 @@
+"""A figure of a report, and where the page shows it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from evaluation.results.styles import Legend
+
+Section = Literal["survival", "change", "recognition", "figures", "print"]
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """A figure of the report.
+
+    Attributes:
+        stem: path of the figure without ending.
+        title: title of the figure.
+        page_kind: format of the figure on the page, "svg" or "webp".
+        section: section of the page that shows the figure; "print" for a figure
+            that the page does not show.
+        num_panels: number of panels side by side; a phone shows one at a time.
+        legend: the colours (red, green, blue), each with its meaning. The page
+            shows these colours below the figure.
+    """
+
+    stem: Path
+    title: str
+    page_kind: str
+    section: Section = "figures"
+    num_panels: int = 1
+    legend: Legend = ()

@@ -1,0 +1,112 @@
+"""A chart: its description, the rows that it shows, and its panels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evaluation.results.figure_text import escape_dollars
+from evaluation.results.headlines import greatest_auc
+from evaluation.results.ranges import range_of
+from evaluation.results.table import QueryRows, Results, Row
+
+# Width of a chart on a screen [px].
+WIDE = 860
+# Width of a chart on a phone [px].
+NARROW = 358
+# A pixel of a page [inches].
+PX = 1.0 / 96.0
+# Size of letters [pt]; more than 12 px, on a phone of 360 px as well.
+FONT = 10.0
+# Height of a row of values or names [px].
+ROW = 22.0
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What a chart shows.
+
+    Attributes:
+        keys: the fields of the chart's description, without its kind and
+            without those that select rows.
+        results: the whole table of results.
+        rows: the selected rows of the chart's metric.
+        styles: method as in the legend -> its colour, line style and marker.
+        width: width of the drawing [px].
+        queries: the answers from which the table was made; None if unknown.
+    """
+
+    keys: Mapping[str, str]
+    results: Results
+    rows: Sequence[Row]
+    styles: Mapping[str, tuple[str, str, str]]
+    width: int
+    queries: QueryRows | None
+
+    @property
+    def metric(self) -> str:
+        return self.keys.get("metric", self.keys.get("y", ""))
+
+    @property
+    def panel_rows(self) -> dict[str, list[Row]]:
+        """Title of each panel -> its rows.
+
+        There is one panel per map. If the chart itself compares maps (`over` is
+        `map`), it has a single panel without a title.
+        """
+        found: dict[str, list[Row]] = {}
+        for row in self.rows:
+            name = "" if self.keys.get("over") == "map" else row.map
+            found.setdefault(name, []).append(row)
+        return found
+
+    def panels(self, height: float) -> tuple[Figure, list[Axes]]:
+        """Returns a figure and its panels, which have a given height [px]."""
+        titles = self.panel_rows
+        columns = 1 if self.width < WIDE else min(2, len(titles))
+        lines = math.ceil(len(titles) / columns)
+        figure = self.figure(lines * height)
+        grid = figure.subplots(lines, columns, squeeze=False, sharey=True)
+        for axes in grid.flat[len(titles) :]:
+            axes.axis("off")
+        for axes, name in zip(grid.flat, titles, strict=False):
+            axes.set_title(escape_dollars(name), loc="left")
+        return figure, list(grid.flat[: len(titles)])
+
+    def figure(self, height: float) -> Figure:
+        """Returns an empty figure of a given height [px]."""
+        size = self.width * PX, height * PX
+        return Figure(figsize=size, layout="constrained")
+
+
+def with_significance(message: str, chart: Chart, at: object) -> str:
+    """Adds to a chart's message which methods differ significantly by AUC.
+
+    The message stays unchanged if the chart shows another metric.
+
+    Args:
+        message: the message.
+        chart: a chart over a factor.
+        at: the value of the factor at which the methods are compared.
+    """
+    if chart.metric != "auc":
+        return message
+    rows = [row for row in chart.rows if row[chart.keys["over"]] == at]
+    clause = greatest_auc(rows, chart.queries)
+    return f"{message}; {clause}" if clause else message
+
+
+def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
+    """Makes axes start at 0 whose metric cannot be negative.
+
+    Args:
+        axes: a panel in which everything is drawn.
+        x, y: name of what the axis shows; empty for an axis that stays.
+    """
+    limits = [range_of(name) for name in (x, y)]
+    is_least = [limit is not None and limit.least == 0.0 for limit in limits]
+    # Markers at 0 are whole.
+    axes.update_datalim([(0.0, 0.0)], *is_least)
+    axes.autoscale_view()

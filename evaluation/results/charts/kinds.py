@@ -1,0 +1,224 @@
+"""Checks the description of a chart, and draws a chart of any kind."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+import re
+import textwrap
+from typing import Any, NamedTuple, TypeVar
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from cns_drake.base.errors import InputError
+from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
+from evaluation.results.charts.dumbbell import draw_dumbbell
+from evaluation.results.charts.lines import draw_lines
+from evaluation.results.charts.matrix import draw_matrix
+from evaluation.results.charts.scatter import draw_scatter
+from evaluation.results.figure_text import escape_dollars
+from evaluation.results.keys import SETTINGS
+from evaluation.results.styles import method_styles
+from evaluation.results.table import Answers, QueryRows, Results, Row
+from evaluation.results.table_forms import in_table_order
+
+_Measured = TypeVar("_Measured", Row, Answers)
+# Width for a name in a legend [px].
+_LEGEND_COLUMN = 220
+
+
+@dataclass(frozen=True)
+class DrawnChart:
+    """A chart that is drawn.
+
+    Attributes:
+        message: sentence that says what the chart shows.
+        figure: the drawing.
+        legend: name -> colour, line style (empty if no line has this name) and
+            marker; the mapping is empty if the drawing itself contains the
+            names.
+    """
+
+    message: str
+    figure: Figure
+    legend: Mapping[str, tuple[str, str, str]]
+
+
+def draw_chart(
+    chart: Mapping[str, Any],
+    results: Results,
+    width: int = WIDE,
+    *,
+    alone: bool = False,
+    queries: QueryRows | None = None,
+) -> DrawnChart:
+    """Returns a chart, drawn from a table of results.
+
+    Args:
+        chart: description of the chart, as in an experiment's file.
+        results: the table.
+        width: width of the drawing [px].
+        alone: whether the drawing is shown without a page, and therefore
+            includes its message and legend.
+        queries: the answers from which the table was made, for the message on
+            significant differences; None if they are unknown.
+
+    Raises:
+        InputError: the chart has an unknown kind or column, or selects no rows.
+    """
+    keys = check_chart(chart)
+    if names_of := _file_names(results.rows):
+        results = Results.of(_renamed(results.rows, names_of))
+        if queries is not None:
+            queries = QueryRows.of(_renamed(queries.answers, names_of))
+    rows = _selected_rows(chart, keys, results)
+    styles = method_styles(in_table_order(row.label for row in rows))
+    kind = chart["kind"]
+    with rc_context({"font.size": FONT, "axes.titlesize": "medium"}):
+        message, figure = _KINDS[kind].draw(
+            Chart(keys, results, rows, styles, width, queries)
+        )
+        legend = {}
+        if kind in ("lines", "scatter"):
+            legend = _legend(figure, styles)
+        if alone:
+            figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
+            _add_legend(figure, legend, width)
+    return DrawnChart(message, figure, legend)
+
+
+def _selected_rows(
+    chart: Mapping[str, Any], keys: Mapping[str, str], results: Results
+) -> tuple[Row, ...]:
+    """Returns the rows of a chart's metric that its description selects."""
+    kind = chart["kind"]
+    metric = keys.get("metric", keys.get("y"))
+    chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
+    for name in (*chosen, *(keys[n] for n in keys if n in ("over", "strips"))):
+        if not any(row[name] is not None for row in results.rows):
+            raise InputError(f"charts: {kind}: {name}: the table has none")
+    tasks = results.where(metric=metric).distinct("task")
+    task = "place" if "place" in tasks else tasks[:1]
+    chosen = {"task": task, "gate": 0, **chosen}
+    rows = results.where(chosen, metric=metric).rows
+    rows = tuple(row for row in rows if not math.isnan(row.value))
+    if not rows:
+        raise InputError(f"charts: {kind}: the table has no {metric} like that")
+    return rows
+
+
+def _file_names(rows: Sequence[Row]) -> dict[tuple[str, object], str]:
+    """Returns settings of methods that name files, without their folders.
+
+    Paths are too long for a chart. If two paths of a table end alike, all paths
+    stay whole.
+
+    Returns:
+        (Column, value) -> the value without folders; empty if nothing changes.
+    """
+    found = {
+        (name, value): re.sub(r"[^\s\"',\[\]]*/", "", value)
+        for row in rows
+        for name, value in row.factors.items()
+        if name.startswith(SETTINGS) and isinstance(value, str)
+    }
+    different = {(name, short) for (name, _), short in found.items()}
+    if len(different) < len(found):
+        return {}
+    return {key: short for key, short in found.items() if key[1] != short}
+
+
+def _renamed(
+    items: Iterable[_Measured], names_of: Mapping[tuple[str, object], str]
+) -> list[_Measured]:
+    return [
+        replace(
+            one,
+            factors={
+                name: names_of.get((name, value), value)
+                for name, value in one.factors.items()
+            },
+        )
+        for one in items
+    ]
+
+
+def _legend(
+    figure: Figure, looks: Mapping[str, tuple[str, str, str]]
+) -> dict[str, tuple[str, str, str]]:
+    """Returns the looks of methods, without a line style if none is drawn."""
+    with_line = {
+        line.get_color()
+        for axes in figure.axes
+        for line in axes.get_lines()
+        if line.get_linestyle() != "None"
+    }
+    return {
+        name: (colour, style if colour in with_line else "", marker)
+        for name, (colour, style, marker) in looks.items()
+    }
+
+
+def _add_legend(
+    figure: Figure, legend: Mapping[str, tuple[str, str, str]], width: int
+) -> None:
+    """Adds a legend below a figure, and makes the figure higher by its rows."""
+    if not legend:
+        return
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=colour,
+            linestyle=style,
+            marker=marker,
+            label=escape_dollars(name),
+        )
+        for name, (colour, style, marker) in legend.items()
+    ]
+    columns = max(1, width // _LEGEND_COLUMN)
+    lines = math.ceil(len(handles) / columns)
+    figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+
+
+def check_chart(chart: Mapping[str, Any]) -> dict[str, str]:
+    """Checks the description of a chart before there are results.
+
+    Returns:
+        The fields of the description that this kind of chart uses.
+
+    Raises:
+        InputError: the kind is unknown, or the description lacks a key.
+    """
+    kind = chart.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise InputError(
+            f"charts: kind: {kind!r} is none of {', '.join(_KINDS)}"
+        )
+    _, needed, optional = _KINDS[kind]
+    keys = {n: chart[n] for n in (*needed, *optional) if n in chart}
+    for name in (*needed, *keys):
+        if not isinstance(keys.get(name), str):
+            raise InputError(f"charts: {kind}: {name}: a name is needed")
+    return keys
+
+
+class _Kind(NamedTuple):
+    """How charts of a kind are drawn, and the keys of their descriptions.
+
+    `draw` returns the message and the figure.
+    """
+
+    draw: Callable[[Chart], tuple[str, Figure]]
+    needed: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+
+
+_KINDS = {
+    "dumbbell": _Kind(draw_dumbbell, ("over", "metric")),
+    "lines": _Kind(draw_lines, ("over", "metric")),
+    "matrix": _Kind(draw_matrix, ("over", "metric"), ("strips",)),
+    "scatter": _Kind(draw_scatter, ("x", "y")),
+}

@@ -1,0 +1,76 @@
+"""Lines: a metric over a numeric factor, with a band over the seeds."""
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from evaluation.results.charts.chart import (
+    FONT,
+    Chart,
+    start_at_zero,
+    with_significance,
+)
+from evaluation.results.charts.words import in_words
+from evaluation.results.figure_text import escape_dollars
+from evaluation.results.headlines import from_least_to_greatest
+from evaluation.results.summaries import means
+from evaluation.results.table import COSTS, Row
+from evaluation.results.table_forms import title
+
+# Beyond this ratio of its values, an axis is logarithmic.
+_WIDE_RANGE = 50.0
+
+
+def draw_lines(chart: Chart) -> tuple[str, Figure]:
+    """Returns the chart's message, and the chart."""
+    over = chart.keys["over"]
+    figure, panels = chart.panels(280.0)
+    last: dict[str, list[float]] = {}
+    at = sorted({_checked_number(row, over) for row in chart.rows})
+    for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
+        for label, (colour, style, marker) in chart.styles.items():
+            some = [row for row in rows if title(row.label) == label]
+            points = sorted(means(some, over), key=lambda one: one.key)
+            x = [one.key[0] for one in points]
+            y, low, high = (
+                [getattr(one, end) for one in points]
+                for end in ("value", "least", "greatest")
+            )
+            axes.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
+            axes.plot(x, y, linestyle=style, marker=marker, color=colour, ms=5)
+            if x[-1:] == at[-1:]:
+                last.setdefault(label, []).append(y[-1])
+        _spread_axis(axes, at)
+        if chart.metric in COSTS:
+            axes.set_yscale("log")
+        else:
+            start_at_zero(axes, y=chart.metric)
+        axes.grid(alpha=0.3)
+        # A label of the whole figure would lie below its legend.
+        axes.set_xlabel(escape_dollars(in_words(over)))
+    figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=FONT)
+    found = {name: float(np.mean(some)) for name, some in last.items()}
+    message = (
+        f"{in_words(chart.metric)} at {at[-1]:g} {in_words(over)}:"
+        f" {from_least_to_greatest(found)}"
+    )
+    return with_significance(message, chart, at[-1]), figure
+
+
+def _checked_number(row: Row, column: str) -> float:
+    value = row[column]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"charts: {column}: {value!r} is no number")
+    return float(value)
+
+
+def _spread_axis(axes: Axes, at: Sequence[float]) -> None:
+    """Makes the x axis logarithmic if its values span a wide range."""
+    above = [one for one in at if one > 0.0]
+    if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:
+        axes.set_xscale("symlog", linthresh=min(above))
+        axes.set_xticks(list(at), [f"{one:g}" for one in at])
+        axes.minorticks_off()

@@ -1,0 +1,60 @@
+"""Compares methods by their answers to the same queries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+import zlib
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.significance import Difference, compared_by_auc
+from evaluation.results.table import Answers
+
+
+def check_same_queries(one: Answers, other: Answers) -> None:
+    """Raises an error unless two methods answered the same queries.
+
+    Raises:
+        InputError: the two methods answered different queries.
+    """
+    frames, others = (a.columns["query_frame"] for a in (one, other))
+    if not np.array_equal(frames, others):
+        raise InputError(
+            f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
+            f" {other.label} answered different queries"
+        )
+
+
+def drive_number(queries: Answers) -> int:
+    """Returns a number of the drive of queries, equal in all tables."""
+    return zlib.crc32(f"{queries.map} {queries.query}".encode())
+
+
+def compared_answers(
+    answers: Mapping[str, Sequence[Answers]],
+) -> dict[tuple[Any, Any], tuple[Difference, float]]:
+    """Returns the difference of the mean AUC between any two methods.
+
+    Args:
+        answers: method -> its answers in each condition. The conditions must be
+            the same for all methods.
+
+    Returns:
+        The differences and p-values, see
+        `evaluation.recognition.significance.compared_by_auc`.
+
+    Raises:
+        InputError: two methods answered different queries.
+    """
+    for one, *others in zip(*answers.values(), strict=True):
+        for other in others:
+            check_same_queries(one, other)
+    return compared_by_auc(
+        {
+            name: [one.outcomes for one in some]
+            for name, some in answers.items()
+        },
+        [drive_number(one) for one in next(iter(answers.values()), ())],
+    )

@@ -1,0 +1,162 @@
+"""Keys: where, under which condition and how something was measured.
+
+Each row of `results.csv` and `queries.csv` contains a key. Its columns are the
+attributes of `Key`, and one for each factor of the experiment. A factor is
+named by the path of its field in the experiment's file, such as
+`query.transient.snow`. The values of factors are numbers, text or truth values;
+a cell is empty where a factor does not apply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import Any
+
+from cns_drake.base.version import __version__
+from evaluation.recognition.protocol import RetrievalProtocol
+
+# The beginning of a factor that is a setting of a method.
+SETTINGS = "methods."
+_BEFORE_FACTORS = ("experiment", "map", "database", "query", "seed")
+_AFTER_FACTORS = ("task", "method", "gate", "protocol")
+# Columns of a key that every table has.
+NEEDED_KEYS = (*_BEFORE_FACTORS, *_AFTER_FACTORS)
+# Columns that tables of earlier versions lack; their values are then unknown.
+LATER_KEYS = ("protocol_digest", "version")
+KEYS = (*NEEDED_KEYS, *LATER_KEYS)
+# Columns of a row behind its key.
+MEASURED = ("metric", "value", "low", "high", "n")
+# Factor: the stage of the city in which both drives are.
+STAGE = "both.stage"
+# Its value if each drive is in its own stage.
+OWN = "own"
+# Its value if both drives are in the stage of the query.
+LAST = "last"
+# The factor of the frozen redraws of the shipped maps.
+FROZEN_REDRAW = "both.redraw.frozen"
+# The factors of an experiment with cases: the name of the case, and its level.
+CAUSE = "cause"
+LEVEL = "level"
+# The cause of the condition without a change.
+NO_CAUSE = "none"
+# Names that no factor can have.
+RESERVED = frozenset(("label", *KEYS, *MEASURED))
+
+
+def key_columns(factors: Iterable[str]) -> tuple[str, ...]:
+    """Returns all columns of a key in the order of tables."""
+    return (*_BEFORE_FACTORS, *factors, *_AFTER_FACTORS, *LATER_KEYS)
+
+
+@dataclass(frozen=True)
+class Key:
+    """Where, under which condition and how something was measured.
+
+    Attributes:
+        experiment: name of the experiment.
+        map: name of the map.
+        database: name of the drive that makes the database.
+        query: name of the drive whose scans are the queries.
+        seed: seed of everything that is random.
+        factors: name -> value of each factor of the experiment. A factor that
+            does not apply is missing or None.
+        task: `place`, `pose`, `localise`, `map`, `change`, `cost` or another.
+        method: method, estimator or baseline; "" for the task `change`.
+        gate: whether geometric verification rejected places, by the method's
+            own pose.
+        protocol: name of the protocol: `fair`, `paper` or `recorded` for the
+            shipped protocol as it is, and `own` for any other.
+        protocol_digest: hash of everything in the protocol that changes a
+            number, see `RetrievalProtocol.digest`; "" if unknown.
+        version: version of this program; "" if unknown.
+    """
+
+    experiment: str
+    map: str
+    database: str
+    query: str
+    seed: int
+    factors: Mapping[str, object]
+    task: str
+    method: str
+    gate: bool
+    protocol: str
+    protocol_digest: str = field(default="", kw_only=True)
+    version: str = field(default="", kw_only=True)
+
+    def __getitem__(self, column: str) -> object:
+        """Returns the value of a column, or `label`; None if it is unknown."""
+        if column in RESERVED:
+            return getattr(self, column, None)
+        return self.factors.get(column)
+
+    @property
+    def label(self) -> str:
+        """Name of the method, with its settings that are factors."""
+        start = f"{SETTINGS}{self.method}."
+        settings = (
+            f"{name.removeprefix(start)} {value}"
+            for name, value in self.factors.items()
+            if name.startswith(start) and value is not None
+        )
+        return ", ".join((self.method, *settings))
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """All values except the version: equal for equal conditions."""
+        return self.without()
+
+    def without(self, *names: str) -> tuple[object, ...]:
+        """Returns the key without some of its columns, to group rows by.
+
+        If two rows have the same reduced key, they were measured under
+        conditions that differ only in the columns left out.
+
+        Args:
+            names: names of the columns to leave out. With `method`, settings of
+                methods, such as `methods.ring++.crop`, are left out as well.
+                With `protocol` or a field of the protocol, such as
+                `protocol.radius`, name and digest of the protocol are left out.
+                The version is never part of the key.
+
+        Returns:
+            The values of the remaining columns, in a fixed order.
+        """
+        if any(one.partition(".")[0] == "protocol" for one in names):
+            names = (*names, "protocol", "protocol_digest")
+        known = [name for name in KEYS if name not in (*names, "version")]
+        without_settings = "method" in names
+        applying = (
+            (name, value)
+            for name, value in self.factors.items()
+            if value is not None
+            and name not in names
+            and not (without_settings and name.startswith(SETTINGS))
+        )
+        return (
+            *(getattr(self, n) for n in known),
+            *sorted(applying, key=itemgetter(0)),
+        )
+
+
+def made_by(
+    protocol: RetrievalProtocol, settings: Mapping[str, object] | None = None
+) -> dict[str, Any]:
+    """Returns the columns of a `Key` that say how something was measured.
+
+    Args:
+        protocol: the protocol.
+        settings: name -> value of the settings that affect results, are no part
+            of the protocol, and differ from their defaults.
+
+    Returns:
+        `protocol`, `protocol_digest` and `version`. With settings, the protocol
+        is `own`.
+    """
+    return {
+        "protocol": "own" if settings else protocol.name,
+        "protocol_digest": protocol.digest(**(settings or {})),
+        "version": __version__,
+    }

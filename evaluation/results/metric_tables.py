@@ -1,0 +1,220 @@
+"""Tables of one metric by method and condition: the user's and the shipped."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import functools
+from pathlib import Path
+from typing import Any
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.metrics import main_metrics
+from evaluation.recognition.protocol import PROTOCOLS
+from evaluation.results.keys import SETTINGS
+from evaluation.results.table import (
+    QUERIES,
+    RESULTS,
+    Answers,
+    QueryRows,
+    Results,
+    Row,
+)
+
+_BASELINES = Path(__file__).with_name("baselines")
+SHIPPED = "shipped"
+# Metric -> its index in the result of `resampled_metrics`.
+RESAMPLED_METRICS = {"auc": 0, "r1": 1}
+# Metrics that are computed from answers to queries.
+_FROM_ANSWERS = ("auc", "r1", "auc_strict")
+# The same for a value and its answers, for tables that were rounded by hand.
+_ROUNDED_BY_HAND = 1e-3
+# What identifies a condition, without the method.
+Condition = tuple[object, ...]
+# A method with its settings, and a condition.
+_Measured = tuple[str, Condition]
+
+
+@dataclass(frozen=True)
+class MetricTable:
+    """A table's rows of one metric, and its answers to queries.
+
+    Attributes:
+        name: name of the table.
+        rows: (method with its settings, condition) -> row of the metric.
+        answers: the same -> answers; empty if they are unknown.
+    """
+
+    name: str
+    rows: Mapping[_Measured, Row]
+    answers: Mapping[_Measured, Answers]
+
+    @property
+    def methods(self) -> list[str]:
+        return list(dict.fromkeys(method for method, _ in self.rows))
+
+    @property
+    def conditions(self) -> list[Condition]:
+        return list(dict.fromkeys(condition for _, condition in self.rows))
+
+
+def table_name(path: Path, paths: Iterable[Path]) -> str:
+    """Returns the name of a table: the name of its file or folder.
+
+    If several of the tables have this name, the result is the path.
+
+    Args:
+        path: path of the table.
+        paths: paths of all tables.
+    """
+    names = [
+        one.stem
+        if one.is_file() and one.name != RESULTS
+        # A folder, or the file that it holds.
+        else (one if one.is_dir() else one.parent).absolute().name
+        for one in (path, *paths)
+    ]
+    name = names.pop(0)
+    return name if names.count(name) < 2 else str(path)
+
+
+def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
+    names = list(dict.fromkeys(row.protocol for row in rows))
+    if "fair" not in names and len(names) > 1:
+        raise InputError(
+            f"{path}: protocol: {' and '.join(names)} in one table; choose one"
+            " with --protocol"
+        )
+    chosen = "fair" if "fair" in names else names[0]
+    return tuple(row for row in rows if row.protocol == chosen)
+
+
+def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
+    """Returns (method with settings, condition) -> row or answers.
+
+    An unknown digest of a protocol is taken for that of the shipped protocol.
+    """
+    found = {}
+    for key in keys:
+        factors = {
+            name: value
+            for name, value in key.factors.items()
+            if not name.startswith(SETTINGS)
+        }
+        digest = key.protocol_digest
+        if not digest and key.protocol in PROTOCOLS:
+            digest = PROTOCOLS[key.protocol].digest()
+        plain = replace(
+            key, method=key.label, factors=factors, protocol_digest=digest
+        )
+        found[plain.method, plain.without("method")] = plain
+    return found
+
+
+def _check_answers(
+    queries: Path, answers: Iterable[Answers], path: Path, results: Results
+) -> None:
+    """Checks that answers to queries give the results beside them.
+
+    Raises:
+        InputError: a result differs, or the number of queries.
+    """
+    known = {
+        (*row.identity, row.metric): row
+        for row in results.where(task="place").rows
+    }
+    for one in answers:
+        # Areas take time, and other tasks have none.
+        if one.task != "place" or not any(
+            (*one.identity, name) in known for name in _FROM_ANSWERS
+        ):
+            continue
+        for name, value in main_metrics(one.outcomes).items():
+            row = known.get((*one.identity, name))
+            number = len(one.outcomes)
+            if row is None or (
+                abs(row.value - value) <= _ROUNDED_BY_HAND
+                and row.n in (None, number)
+            ):
+                continue
+            count = "" if row.n is None else f" of {row.n} queries"
+            raise InputError(
+                f"{queries}: contradicts {path}: {name} of {one.label},"
+                f" {one.database} -> {one.query}: {value:.4f} of {number}"
+                f" queries, but {row.value:.4f}{count} in the results"
+            )
+
+
+def read_metric_table(
+    path: Path,
+    results: Results,
+    selection: Mapping[str, object],
+    *,
+    name: str,
+    is_alone: bool,
+) -> tuple[MetricTable, list[str]]:
+    """Returns the selected rows of a table, and notes for the user.
+
+    The answers to queries in a `queries.csv` next to the table are read as
+    well.
+
+    Args:
+        path: the table, or the folder that contains it.
+        results: all rows of the table.
+        selection: name of a column -> its value in the rows to select:
+            `metric`, `task`, `gate` and, if only rows of one protocol count,
+            `protocol`.
+        name: name of the table for the user.
+        is_alone: whether the rows must be of one protocol, because they are
+            ranked without rows of other tables.
+
+    Raises:
+        InputError: no row is selected, or the answers contradict the table.
+    """
+    rows = results.where(selection).rows
+    if not rows:
+        raise InputError(f"{path}: {_no_row_text(results, selection)}")
+    if is_alone and "protocol" not in selection:
+        rows = _by_one_protocol(rows, path)
+    notes = []
+    if any(not row.protocol_digest for row in rows):
+        notes.append(
+            f"{path}: rows do not say how they were made (column"
+            " protocol_digest); taken for the shipped protocol of this name"
+        )
+    queries = (path if path.is_dir() else path.parent) / QUERIES
+    answers = QueryRows.read(queries).answers if queries.is_file() else ()
+    _check_answers(queries, answers, path, results)
+    asked = [
+        one
+        for one in answers
+        if (one.task, one.gate) == (selection["task"], selection["gate"])
+    ]
+    if selection["metric"] in RESAMPLED_METRICS and any(
+        one.outcomes.blocks is None for one in asked
+    ):
+        notes.append(
+            f"{queries}: without blocks of the route (column block),"
+            " intervals are too narrow"
+        )
+    rows_of = _by_method_and_condition(rows)
+    return MetricTable(name, rows_of, _by_method_and_condition(asked)), notes
+
+
+def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
+    with_or = "with" if selection["gate"] else "without"
+    chosen = f"{selection['metric']} {with_or} geometric verification"
+    protocol = selection.get("protocol")
+    by = f" by protocol {protocol}" if protocol else ""
+    known = ", ".join(sorted(results.distinct("metric")))
+    return f"no row of {chosen}{by} (metrics: {known})"
+
+
+def shipped_table(selection: Mapping[str, object]) -> MetricTable:
+    """Returns the selected rows of all shipped tables, see `Results.where`."""
+    rows = [row for one in _baselines() for row in one.where(selection).rows]
+    return MetricTable(SHIPPED, _by_method_and_condition(rows), {})
+
+
+@functools.cache
+def _baselines() -> list[Results]:
+    """Returns the shipped tables."""
+    return [Results.read(path) for path in sorted(_BASELINES.glob("*.csv"))]

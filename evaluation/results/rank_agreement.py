@@ -1,0 +1,129 @@
+"""How similarly two tables rank the methods that are in both."""
+
+from collections.abc import Sequence
+import itertools
+from typing import NamedTuple
+import warnings
+
+import numpy as np
+from scipy.stats import kendalltau
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.bootstrap import (
+    percentile_interval,
+    resampled_metrics,
+    weights_by_drive,
+)
+from evaluation.recognition.metrics import Interval
+from evaluation.results.compared_answers import check_same_queries, drive_number
+from evaluation.results.metric_tables import RESAMPLED_METRICS, MetricTable
+from evaluation.results.ranking import LEAST_UNITS, rank_methods
+
+
+class Agreement(NamedTuple):
+    """How similarly two tables rank the methods that are in both tables.
+
+    Attributes:
+        first, second: names of the two tables.
+        methods: names of these methods.
+        tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
+            rank the methods in the same order, -1 if they rank them in opposite
+            orders; NaN if all values of a table are equal.
+        interval: 95 % interval of `tau`.
+    """
+
+    first: str
+    second: str
+    methods: tuple[str, ...]
+    tau: float
+    interval: Interval
+
+
+def rank_agreement(
+    first: MetricTable, second: MetricTable, metric: str
+) -> Agreement:
+    """Compares the rankings of two tables, each over its own conditions.
+
+    The interval is by bootstrap. For a table with four or more maps, the
+    bootstrap samples maps, because a ranking should hold on other maps, too.
+    For a table with fewer maps, it samples blocks of the routes if the answers
+    to all queries are known, and otherwise the units of `rank_methods`.
+
+    Raises:
+        InputError: fewer than two methods have results in all conditions of
+            both tables.
+    """
+    whole = [
+        {
+            method
+            for method in table.methods
+            if all((method, one) in table.rows for one in table.conditions)
+        }
+        for table in (first, second)
+    ]
+    methods = tuple(sorted(set.intersection(*whole)))
+    if len(methods) < 2:
+        raise InputError(
+            f"{first.name}, {second.name}: fewer than two methods are on all"
+            f" conditions of both ({', '.join(methods) or 'none'})"
+        )
+    one, one_samples = _means_and_samples(first, methods, metric)
+    other, other_samples = _means_and_samples(second, methods, metric)
+    samples = zip(one_samples, other_samples, strict=True)
+    taus = np.array([_kendall_tau(*pair) for pair in samples])
+    return Agreement(
+        first.name,
+        second.name,
+        methods,
+        _kendall_tau(one, other),
+        percentile_interval(taus),
+    )
+
+
+def _means_and_samples(
+    table: MetricTable, methods: Sequence[str], metric: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns means (M,) of methods, and their bootstrap samples (B, M).
+
+    See `rank_agreement` on what the bootstrap samples.
+    """
+    ranked, samples = rank_methods(
+        row for (method, _), row in table.rows.items() if method in methods
+    )
+    order = [[one.method for one in ranked].index(name) for name in methods]
+    means = np.array([one.value for one in ranked])[order]
+    measured = list(itertools.product(table.conditions, methods))
+    if (
+        len({row.map for row in table.rows.values()}) >= LEAST_UNITS
+        or metric not in RESAMPLED_METRICS
+        or any((method, one) not in table.answers for one, method in measured)
+    ):
+        return means, samples[:, order]
+    asked = [
+        [table.answers[method, one] for method in methods]
+        for one in table.conditions
+    ]
+    for some in asked:
+        for answers in some:
+            check_same_queries(some[0], answers)
+    drawn = weights_by_drive(
+        [some[0].outcomes.own_blocks for some in asked],
+        [drive_number(some[0]) for some in asked],
+    )
+    of_condition = [
+        [
+            resampled_metrics(answers.outcomes, weights)[
+                RESAMPLED_METRICS[metric]
+            ]
+            for answers in some
+        ]
+        for some, (_, weights) in zip(asked, drawn, strict=True)
+    ]
+    return means, np.mean(of_condition, axis=0).T
+
+
+def _kendall_tau(first: np.ndarray, second: np.ndarray) -> float:
+    with warnings.catch_warnings():
+        # SciPy warns if all values are equal; the result is then NaN.
+        warnings.simplefilter("ignore")
+        return float(kendalltau(first, second).statistic)

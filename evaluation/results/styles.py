@@ -1,0 +1,59 @@
+"""Colours, line styles and markers, the same in all figures."""
+
+from collections.abc import Sequence
+
+from evaluation.results.table_forms import title
+
+# Method -> colour, line style and marker. All kinds of colour vision can
+# distinguish these colours by Okabe and Ito. Line styles and markers are for
+# prints without colour.
+METHOD_STYLES = {
+    "ring++": ("#0072B2", "-", "o"),
+    "btc": ("#D55E00", "--", "s"),
+    "scan-context++": ("#009E73", "-.", "^"),
+    "solid": ("#CC79A7", ":", "D"),
+    "layered-overlap": ("#E69F00", "-", "v"),
+    "learned": ("#56B4E9", "--", "P"),
+}
+# Styles of methods that are not shipped.
+_OTHERS = (
+    ("#000000", "-.", "X"),
+    ("#8C564B", ":", "p"),
+    ("#882255", "-", "<"),
+    ("#44AA99", "--", ">"),
+    ("#999933", "-.", "h"),
+    ("#6F6F6F", ":", "*"),
+)
+
+# Colours of what belongs to no method.
+INK = "#1C2430"
+PALE = "#7A8594"
+# Colour of points that are in the older of two maps alone.
+GONE = (214, 48, 49)
+# Colour of points that are in the newer of two maps alone.
+NEW = (38, 96, 214)
+# Colours (red, green, blue) and what they mean.
+Legend = tuple[tuple[tuple[int, int, int], str], ...]
+
+
+def unit_rgb(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
+    """Scales a colour from 0 to 255 to 0 to 1, as matplotlib needs it."""
+    red, green, blue = rgb
+    return red / 255.0, green / 255.0, blue / 255.0
+
+
+def method_styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
+    """Returns the colour, line style and marker of each method in a figure.
+
+    Args:
+        labels: names of the methods, with their settings.
+
+    Returns:
+        Method as written in the legend (see `title`) -> the three values.
+    """
+    others = [name for name in labels if name not in METHOD_STYLES]
+    return {
+        title(name): METHOD_STYLES.get(name)
+        or _OTHERS[others.index(name) % len(_OTHERS)]
+        for name in labels
+    }

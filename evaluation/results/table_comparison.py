@@ -1,0 +1,347 @@
+"""Compares your tables of results with one another and the shipped tables."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+import itertools
+from pathlib import Path
+import re
+from typing import Any, NamedTuple
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import json_values
+from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.recognition.significance import Difference
+from evaluation.results.common_conditions import (
+    common_conditions,
+    reduced_to,
+    without_controls,
+)
+from evaluation.results.compared_answers import compared_answers
+from evaluation.results.metric_tables import (
+    Condition,
+    MetricTable,
+    read_metric_table,
+    shipped_table,
+    table_name,
+)
+from evaluation.results.rank_agreement import Agreement, rank_agreement
+from evaluation.results.ranking import Ranked, rank_methods
+from evaluation.results.table import Answers, Results, Row
+
+# Metrics for which less is better.
+_LESS = re.compile(
+    r"translation_\w+|rotation_\w+|\w+_ms|no_\w+|other_city|too_far|elsewhere"
+    r"|lost|memory|\w+_time"
+)
+
+# Values that differ by no more are the same result, with the digits that ship.
+_ALIKE = 1e-4
+
+
+class Compared(NamedTuple):
+    """The mean AUC of one method minus the mean AUC of another.
+
+    Attributes:
+        first, second: names of the two methods.
+        difference: the difference.
+        p_value: p-value of the difference, corrected by Holm's method for the
+            number of differences in the comparison.
+    """
+
+    first: str
+    second: str
+    difference: Difference
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The result of comparing tables.
+
+    Attributes:
+        metric: the number that is compared.
+        task: the task to which this number belongs.
+        conditions: number of the conditions that all tables have; 0 for
+            rankings.
+        ranked: methods, the best first. If a method is in two tables, or is
+            also shipped, the name of the table is appended to its name. If only
+            rankings are compared, each table is ranked over its own conditions.
+        differences: differences between any two methods whose answers to all
+            queries are known.
+        agreements: how similarly any two tables rank their methods, if they
+            have at least two method names in common.
+        notes: what was left out.
+    """
+
+    metric: str
+    task: str
+    conditions: int
+    ranked: Sequence[Ranked]
+    differences: Sequence[Compared]
+    agreements: Sequence[Agreement]
+    notes: Sequence[str]
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the whole comparison as a dictionary for JSON.
+
+        NaN becomes None.
+        """
+        return {
+            "metric": self.metric,
+            "task": self.task,
+            "conditions": self.conditions,
+            "methods": [
+                {
+                    "method": one.method,
+                    "value": one.value,
+                    "interval_95": one.interval.to_json(),
+                }
+                for one in self.ranked
+            ],
+            "differences": [
+                {
+                    "first": one.first,
+                    "second": one.second,
+                    "difference": one.difference.value,
+                    "interval_95": one.difference.interval.to_json(),
+                    "p": json_values(one.p_value),
+                }
+                for one in self.differences
+            ],
+            "agreements": [
+                {
+                    "first": one.first,
+                    "second": one.second,
+                    "methods": list(one.methods),
+                    "kendall_tau": json_values(one.tau),
+                    "interval_95": one.interval.to_json(),
+                }
+                for one in self.agreements
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def compare_tables(
+    paths: Sequence[Path],
+    metric: str = "auc",
+    protocol: str | None = None,
+    *,
+    gate: bool = False,
+    rankings: bool = False,
+) -> Comparison:
+    """Compares tables of results with one another and the shipped tables.
+
+    Args:
+        paths: tables of results, or folders with a `results.csv`. The answers
+            to queries in a `queries.csv` next to a table are used as well.
+        metric: the metric to compare. If several tasks have it, the results of
+            `place` are compared.
+        protocol: name of the protocol whose rows count. By default, rows of the
+            same protocol are compared. With `rankings`, the default is `fair`
+            or, in a table without this protocol, the table's only protocol.
+            Rows whose protocols differ in anything that changes a number (see
+            `RetrievalProtocol.digest`) are never compared.
+        gate: whether to compare the rows that were measured with geometric
+            verification (true) or without (false).
+        rankings: whether to compare only the order of the methods in these
+            tables, without the shipped tables. The tables need no condition in
+            common; one can contain simulated drives and another real drives.
+
+    Raises:
+        InputError: a table cannot be read, has no such row, contradicts the
+            answers beside it, or the tables have no condition in common.
+    """
+    if protocol not in (None, *PROTOCOL_NAMES):
+        names = ", ".join(PROTOCOL_NAMES)
+        raise InputError(f"--protocol: {protocol!r} is none of {names}")
+    read = [Results.read(path) for path in paths]
+    tasks = {row.task for one in read for row in one.where(metric=metric).rows}
+    task = "place" if "place" in tasks else min(tasks, default="")
+    selection: dict[str, object] = {
+        "metric": metric,
+        "task": task,
+        "gate": gate,
+    }
+    if protocol is not None:
+        selection["protocol"] = protocol
+    own: list[MetricTable] = []
+    notes: list[str] = []
+    for path, results in zip(paths, read, strict=True):
+        table, found = read_metric_table(
+            path,
+            results,
+            selection,
+            name=table_name(path, paths),
+            is_alone=rankings,
+        )
+        own.append(table)
+        notes += found
+    if rankings:
+        compared = _compared_rankings(own, metric)
+    else:
+        shipped = shipped_table(selection)
+        compared = _compared_values(own, shipped, metric, paths)
+    notes += compared.notes
+    return replace(compared, task=task, notes=notes)
+
+
+def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
+    """Compares the orders of the methods in the user's tables."""
+    if len(own) < 2:
+        raise InputError("--rankings: two tables are needed")
+    tables, notes = [], []
+    for table in own:
+        changed, left_out = without_controls(table.conditions)
+        tables.append(reduced_to(table, changed))
+        notes += [f"{table.name}: {one}" for one in left_out]
+    agreements = [
+        rank_agreement(*pair, metric)
+        for pair in itertools.combinations(tables, 2)
+    ]
+    ranked = [
+        one._replace(method=f"{one.method} ({table.name})")
+        for table in tables
+        for one in _ranked(table.rows.values(), metric)
+    ]
+    return Comparison(metric, "", 0, ranked, (), agreements, notes)
+
+
+def _compared_values(
+    own: Sequence[MetricTable],
+    shipped: MetricTable,
+    metric: str,
+    paths: Sequence[Path],
+) -> Comparison:
+    """Compares the values of all tables in the conditions of all tables."""
+    common, notes = common_conditions(own, shipped, paths)
+    common, left_out = without_controls(common)
+    tables = [reduced_to(table, common) for table in (shipped, *own)]
+    entries, incomplete = _ranked_entries(tables, common)
+    notes += [*left_out, *incomplete, *_mismatch_notes(entries, common)]
+    rows = [
+        replace(table.rows[method, one], method=name)
+        for name, (table, method) in entries.items()
+        for one in common
+    ]
+    agreements = [
+        rank_agreement(*pair, metric)
+        for pair in itertools.combinations(tables, 2)
+        if len({*pair[0].methods} & {*pair[1].methods}) > 1
+    ]
+    return Comparison(
+        metric,
+        "",
+        len(common),
+        _ranked(rows, metric),
+        _differences(entries, common) if metric == "auc" else (),
+        agreements,
+        notes,
+    )
+
+
+def _ranked(rows: Iterable[Row], metric: str) -> list[Ranked]:
+    is_less_better = bool(_LESS.fullmatch(metric))
+    return rank_methods(rows, least_first=is_less_better)[0]
+
+
+def _ranked_entries(
+    tables: Sequence[MetricTable], common: Sequence[Condition]
+) -> tuple[dict[str, tuple[MetricTable, str]], list[str]]:
+    """Returns the methods to rank by their names, and notes on the others.
+
+    A method with the same results in two tables is there once. If the results
+    differ, the name of a table is appended to the name of its method.
+
+    Args:
+        tables: the shipped tables, followed by the user's.
+        common: the conditions that all tables have.
+    """
+    notes = []
+    kept: list[tuple[MetricTable, str]] = []
+    # The user's tables come first: they may hold answers to queries.
+    for table in (*tables[1:], tables[0]):
+        for method in table.methods:
+            has = sum((method, one) in table.rows for one in common)
+            if has < len(common):
+                is_once = sum(method in one.methods for one in tables) == 1
+                name = method if is_once else f"{method} ({table.name})"
+                notes.append(
+                    f"{name}: left out, with {has} of {len(common)} conditions"
+                )
+                continue
+            same = [
+                other.name
+                for other, name in kept
+                if name == method
+                and all(
+                    abs(
+                        other.rows[method, one].value
+                        - table.rows[method, one].value
+                    )
+                    <= _ALIKE
+                    for one in common
+                )
+            ]
+            if same:
+                notes.append(
+                    f"{method}: the same in {same[0]} and {table.name}; shown"
+                    " once"
+                )
+            else:
+                kept.append((table, method))
+    counts = Counter(method for _, method in kept)
+    # In the order of the tables, as ties are shown.
+    kept.sort(key=lambda one: tables.index(one[0]))
+    return {
+        f"{method} ({table.name})"
+        if table is not tables[0] and counts[method] > 1
+        else method: (table, method)
+        for table, method in kept
+    }, notes
+
+
+def _mismatch_notes(
+    entries: Mapping[str, tuple[MetricTable, str]],
+    common: Sequence[Condition],
+) -> Iterator[str]:
+    """Yields notes on results that are not of the same queries or version."""
+    rows = {
+        name: [table.rows[method, one] for one in common]
+        for name, (table, method) in entries.items()
+    }
+    unknown = [
+        name for name, some in rows.items() if any(r.n is None for r in some)
+    ]
+    if unknown and len(unknown) < len(rows):
+        yield f"{', '.join(unknown)}: of how many queries is not known"
+    for some in zip(*rows.values(), strict=True):
+        numbers: dict[int, str] = {}
+        for name, row in zip(rows, some, strict=True):
+            if row.n is not None:
+                numbers.setdefault(row.n, name)
+        if len(numbers) > 1:
+            each = ", ".join(f"{n} ({name})" for n, name in numbers.items())
+            yield (
+                f"{some[0].database} -> {some[0].query}: not the same queries:"
+                f" {each}; their values are of different difficulty"
+            )
+            break
+    versions = {row.version for some in rows.values() for row in some} - {""}
+    if len(versions) > 1:
+        yield f"measured by versions {', '.join(sorted(versions))}"
+
+
+def _differences(
+    entries: Mapping[str, tuple[MetricTable, str]],
+    common: Sequence[Condition],
+) -> list[Compared]:
+    """Compares any two methods that have answers in all conditions."""
+    asked: dict[str, list[Answers]] = {}
+    for name, (table, method) in entries.items():
+        keys = [(method, one) for one in common]
+        if all(key in table.answers for key in keys):
+            asked[name] = [table.answers[key] for key in keys]
+    compared = compared_answers(asked)
+    return [Compared(*two, *found) for two, found in compared.items()]

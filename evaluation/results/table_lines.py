@@ -1,0 +1,283 @@
+"""The lines of `results.csv` and `queries.csv`, read with checked cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+import csv
+from dataclasses import dataclass
+import io
+import math
+from pathlib import Path
+import re
+from typing import Any
+
+from cns_drake.base.csv_files import check_separator
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.repetitions import repeated
+from cns_drake.base.terminal import note
+from evaluation.recognition.protocol import PROTOCOL_NAMES
+from evaluation.results.keys import (
+    FROZEN_REDRAW,
+    LATER_KEYS,
+    NEEDED_KEYS,
+    RESERVED,
+    Key,
+    key_columns,
+)
+
+# Names of columns in tables of earlier versions -> names of now.
+_FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
+# Type -> value that stands for an empty cell.
+_EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
+_NUMBER = re.compile(
+    r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
+)
+# Leading zeros belong to names, as in the stage 01.
+_NAME_OF_DIGITS = re.compile(r"0\d+")
+_TRUTH = {"0": False, "1": True, "false": False, "true": True}
+# Columns of tables of earlier versions -> the command that makes such a table
+# now.
+_FORMER_TABLES = (
+    ({"version", "db", "kept"}, "cns-drake study fresh"),
+    ({"db", "cause", "level"}, "cns-drake study ladder"),
+    ({"year", "seed", "kept"}, "cns-drake study years"),
+    ({"tenth", "half"}, "cns-drake study years"),
+    ({"db", "auc_unchanged"}, "cns-drake study stages"),
+    ({"tcr_sym", "recall_at_1"}, "cns-drake study trend"),
+    ({"others", "places", "query_ms"}, "cns-drake study size"),
+    ({"map", "db", "query"}, "cns-drake study stages"),
+)
+
+
+@dataclass(frozen=True)
+class TableLine:
+    """A line of a table."""
+
+    file: Path
+    number: int
+    columns: Mapping[str, int]
+    cells: Sequence[str]
+
+    def fault(self, column: str, fault: str) -> InputError:
+        return InputError(f"{self.file}: line {self.number}: {column}: {fault}")
+
+    def cells_of(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple([self.cells[self.columns[name]] for name in names])
+
+    def text(self, column: str) -> str:
+        cell = self.cells[self.columns[column]]
+        if not cell:
+            raise self.fault(column, "empty")
+        return cell
+
+    def value(self, column: str, kind: type) -> Any:
+        """Returns a cell as a value of a type.
+
+        The value of an empty cell is -1 for int, NaN for float, and "" for str.
+
+        Raises:
+            InputError: the cell contains no value of this type.
+        """
+        cell = self.cells[self.columns[column]]
+        if kind is bool:
+            if cell.lower() not in _TRUTH:
+                raise self.fault(column, f"{cell!r} is neither 0 nor 1")
+            return _TRUTH[cell.lower()]
+        if kind is str or not cell:
+            return cell or _EMPTY[kind]
+        if not _NUMBER.fullmatch(cell) or math.isinf(float(cell)):
+            raise self.fault(column, f"{cell!r} is no number")
+        if kind is float:
+            return float(cell)
+        # Programs with NaN for empty cells write whole numbers with a point.
+        whole = int(cell) if cell.isdigit() else float(cell)
+        if not 0 <= whole < 2**63 or whole != int(whole):
+            raise self.fault(column, f"{cell!r} is no whole number from 0 on")
+        return int(whole)
+
+    def factor(self, column: str) -> object:
+        """Returns the value of a factor: number, truth value, text or None."""
+        cell = self.cells[self.columns[column]]
+        if _NUMBER.fullmatch(cell) and not _NAME_OF_DIGITS.fullmatch(cell):
+            value = float(cell)
+            if math.isinf(value):
+                raise self.fault(column, f"{cell!r} is no number")
+            return int(cell) if cell.lstrip("+-").isdigit() else value
+        if cell.lower() in ("true", "false"):
+            return _TRUTH[cell.lower()]
+        return cell or None
+
+    def key(self, factors: Iterable[str]) -> dict[str, Any]:
+        """Returns the arguments with which to make the `Key` of this line.
+
+        `factors` contains the names of the columns with factors. Factors whose
+        cells are empty are left out.
+
+        Raises:
+            InputError: a cell is empty or has a value that is not allowed.
+        """
+        values: dict[str, Any] = {
+            name: self.text(name) for name in ("experiment", "map", "task")
+        }
+        for name in ("database", "query", "method", "protocol"):
+            values[name] = self.cells[self.columns[name]]
+        for name in filter(self.columns.__contains__, LATER_KEYS):
+            values[name] = self.cells[self.columns[name]]
+        values["seed"] = self.value("seed", int)
+        if values["seed"] < 0:
+            raise self.fault("seed", "empty")
+        values["gate"] = self.value("gate", bool)
+        known = {name: self.factor(name) for name in factors}
+        values["factors"] = {n: v for n, v in known.items() if v is not None}
+        if not values["method"] and values["task"] != "change":
+            raise self.fault("method", "empty")
+        names = (*PROTOCOL_NAMES, "")
+        if values["protocol"] not in names:
+            raise self.fault(
+                "protocol",
+                f"{values['protocol']!r} is none of {', '.join(names[:-1])}",
+            )
+        return values
+
+
+@dataclass(frozen=True)
+class TableLines:
+    """The lines of a file, and where each column stands."""
+
+    file: Path
+    columns: Mapping[str, int]
+    factors: tuple[str, ...]
+    rows: Sequence[tuple[int, list[str]]]
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        usual: str,
+        needed: Iterable[str],
+        known: Iterable[str] = (),
+        *,
+        may_be_empty: bool = False,
+    ) -> TableLines:
+        """Reads the lines of a table.
+
+        Args:
+            path: the file, or a folder that contains it.
+            usual: name of the file in a folder.
+            needed: names of columns that the file must have besides those of
+                its keys.
+            known: names of further columns that are not factors.
+            may_be_empty: whether the file may have no rows.
+
+        Raises:
+            InputError: the file cannot be read, is a table of an earlier
+                version, lacks a column, has a column twice, or a line has too
+                many or too few cells.
+        """
+        path = Path(path)
+        file = path / usual if path.is_dir() else path
+        (_, names), *lines = _csv_lines(file)
+        for former, now in _FORMER_NAMES.items():
+            if former in names and now not in names:
+                note(f"{file}: the column {former} is named {now} now")
+                names[names.index(former)] = now
+        needed = (*NEEDED_KEYS, *needed)
+        _check_columns(file, names, needed)
+        others = {*needed, *LATER_KEYS, *known}
+        factors = tuple(name for name in names if name not in others)
+        for name in factors:
+            if name in RESERVED:
+                raise InputError(f"{file}: line 1: '{name}' names no factor")
+        columns = {name: k for k, name in enumerate(names)}
+        rows = [one for one in lines if any(one[1])]
+        if not (rows or may_be_empty):
+            raise InputError(f"{file}: no rows")
+        for number, row in rows:
+            if len(row) != len(names):
+                raise InputError(
+                    f"{file}: line {number}: {len(row)} cells instead of"
+                    f" {len(names)}"
+                )
+        return cls(file, columns, factors, rows)
+
+    def keyed(
+        self,
+    ) -> Iterator[tuple[TableLine, dict[str, Any], tuple[object, ...]]]:
+        """Yields each line of the file with its key.
+
+        Yields:
+            The line; the attributes of its `Key`, by name; and the `identity`
+            of this key.
+
+        Raises:
+            InputError: a line has a wrong key.
+        """
+        names = filter(self.columns.__contains__, key_columns(self.factors))
+        columns = tuple(names)
+        known: dict[tuple[str, ...], tuple[dict, tuple[object, ...]]] = {}
+        for number, cells in self.rows:
+            line = TableLine(self.file, number, self.columns, cells)
+            spelled = line.cells_of(columns)
+            if spelled not in known:
+                key = line.key(self.factors)
+                known[spelled] = key, Key(**key).identity
+            yield line, *known[spelled]
+
+
+def _csv_lines(file: Path) -> list[tuple[int, list[str]]]:
+    """Returns the lines of a CSV file: number and cells, the header first.
+
+    Raises:
+        InputError: the file cannot be read, is no CSV file, or a cell has a
+            control character.
+    """
+    try:
+        text = read_bytes(file).decode("utf-8-sig")
+        check_separator(file, text)
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        lines = [
+            (reader.line_num, [cell.strip(" ") for cell in row])
+            for row in reader
+        ] or [(1, [])]
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not UTF-8 text") from None
+    except csv.Error as error:
+        raise InputError(f"{file}: not CSV: {error}") from None
+    names = lines[0][1]
+    for index, (number, cells) in enumerate(lines):
+        if "".join(cells).isprintable():
+            continue
+        k, cell = next(
+            (k, cell) for k, cell in enumerate(cells) if not cell.isprintable()
+        )
+        column = names[k] if index > 0 and k < len(names) else k + 1
+        raise InputError(
+            f"{file}: line {number if index else 1}: {column}: {cell!r} has a"
+            " control character"
+        )
+    return lines
+
+
+def _check_columns(
+    file: Path, names: Sequence[str], needed: Iterable[str]
+) -> None:
+    """Checks the names of a table's columns.
+
+    Raises:
+        InputError: the table is of an earlier version, lacks a column, has a
+            column twice or a column without a name.
+    """
+    missing = [name for name in needed if name not in names]
+    for former_columns, command in _FORMER_TABLES:
+        if missing and former_columns <= set(names):
+            raise InputError(
+                f"{file}: a table of an earlier version; '{command}' makes"
+                " one with the columns of now"
+            )
+    if missing:
+        raise InputError(f"{file}: no column '{missing[0]}'")
+    if "" in names:
+        raise InputError(f"{file}: line 1: column '' has no name")
+    for name in repeated(names):
+        raise InputError(f"{file}: line 1: column '{name}' is there twice")

@@ -1,0 +1,137 @@
+"""What feature extraction finds in a drive: its map, descriptors and scans."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+from numpy.lib.recfunctions import repack_fields
+
+from cns_drake.base.points import xyz
+from evaluation.change.drive_change import DriveMap
+from evaluation.drives import DriveNames
+from evaluation.drives.scan_clouds import within_range
+from evaluation.maps.voxel_maps import VoxelMap
+from evaluation.recognition.descriptors import DriveDescriptors
+from evaluation.recognition.protocol import RetrievalProtocol
+
+# Fields of the points of kept scans, where a drive has them.
+_KEPT_FIELDS = ("x", "y", "z", "instance")
+
+
+@dataclass(frozen=True)
+class DriveSummary:
+    """A drive with its map, and with its scans reduced to small pictures.
+
+    Attributes:
+        placed: names of the drive, its world frame and its map.
+        stamps_ns: (N,) int64 time stamps of all frames [ns].
+        X_WS: (N, 4, 4) poses of the sensor at all frames.
+        coarse: the map, in voxels of 1 m from which the change ratio (TCR) is
+            computed.
+        frames: (K,) frames that are places or queries; empty if the drive has
+            neither.
+        thumbnails: K reduced scans at these frames, see
+            `evaluation.maps.thumbnails`.
+    """
+
+    placed: DriveNames
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+    coarse: VoxelMap
+    frames: np.ndarray
+    thumbnails: list[np.ndarray]
+
+    @property
+    def name(self) -> str:
+        return self.placed.name
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(N, 3) positions of the sensor in the world [m]."""
+        return self.X_WS[:, :3, 3]
+
+    @property
+    def drive_map(self) -> DriveMap:
+        """The map, with the names of the drive, its world and its map."""
+        return DriveMap(self.name, self.coarse, self.positions, self.placed)
+
+
+@dataclass(frozen=True)
+class KeptScans:
+    """A drive with only the scans of its places and queries.
+
+    Attributes:
+        name: name of the drive.
+        X_WS: (N, 4, 4) poses of the sensor at all frames.
+        instances: instance id of a structure -> its name and class; None if
+            unknown.
+        scans: frame -> structured array (M,) with coordinates and instance ids
+            of the points within range.
+    """
+
+    name: str
+    X_WS: np.ndarray
+    instances: Mapping[int, Mapping] | None
+    scans: dict[int, np.ndarray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Returns the number of frames of the drive."""
+        return len(self.X_WS)
+
+    def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
+        """Stores a scan in `scans`.
+
+        Args:
+            frame: number of the frame.
+            scan: structured array (M,) in the sensor's frame.
+            max_range: limit of the coordinates in the frame of the rotated
+                sensor [m]. A point is stored if some rotation of the sensor can
+                bring all its coordinates within this limit.
+        """
+        # A corner of the cube may lie on an axis of a rotated sensor.
+        max_range *= math.sqrt(3.0)
+        names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
+        kept = within_range(xyz(scan), max_range)
+        # A view would hold all fields.
+        self.scans[frame] = repack_fields(scan[names][kept])
+
+    def scan(self, index: int) -> np.ndarray:
+        """Returns the scan of a frame, which must have been kept."""
+        return self.scans[index]
+
+
+@dataclass(frozen=True)
+class ExtractedFeatures:
+    """The results of reading a recording once: map, places and queries.
+
+    Attributes:
+        placed: names of the drive, its world frame and its map.
+        described: key of a method -> its descriptors of the places and
+            queries; empty if the drive has neither.
+        scans: scans of places and queries; None if they are not kept. If there
+            is a map, this is a `KeptScans` with the recorded scans. Otherwise
+            it is a list of arrays (N, 3) float32, in which queries are changed
+            as the protocol says: rotated, tilted or without a sector.
+        drive: the drive with its map; None without a map.
+        fine: (K, 3) cloud for pictures in W [m]; None without a map.
+    """
+
+    placed: DriveNames
+    described: dict[str, DriveDescriptors]
+    scans: KeptScans | list[np.ndarray] | None
+    drive: DriveSummary | None = None
+    fine: np.ndarray | None = None
+
+
+def described_key(method: str, protocol: RetrievalProtocol) -> str:
+    """Returns the key in `ExtractedFeatures.described` for a second protocol.
+
+    Descriptors by the study's own protocol have the key of the method. Use this
+    function for descriptors by any other protocol.
+
+    Args:
+        method: key of the method.
+        protocol: the second protocol, such as that of published results.
+    """
+    return f"{method},{protocol.name}"

@@ -1,0 +1,180 @@
+"""Finds the recordings in a folder, and the map and stage of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import os
+from pathlib import Path
+import re
+
+from cns_drake.base.drives.drive import SCENARIO, driven_way
+from cns_drake.base.errors import InputError, one_line
+from cns_drake.base.listing import listed, natural_key
+from evaluation.drives import find_readers, open_drive
+from evaluation.drives.cns_folder import holds_cns
+from evaluation.drives.kitti import holds_kitti
+from evaluation.study.map_drives import RecordingInfo
+from evaluation.study.sources import RecordingSource
+
+# The names of drives that state map and stage, the first ones as those of NCLT,
+# Boreas and rosbag2, which end in a date and a time, the last ones as MulRan's.
+_NAME_FORMS = (
+    re.compile(r"(?P<map>.*?)[-_]?(?P<stage>\d{4}([-_])\d\d?\3\d\d?(\D.*)?)"),
+    re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),
+    re.compile(r"(?P<map>.*\D)(?P<stage>\d+)"),
+)
+# A whole disk has more folders, and takes minutes to search.
+_MOST_FOLDERS = 10_000
+_UNKNOWN_STAGE = (
+    "map and stage are unknown: no scenario, and no name <map>_<stage>"
+)
+
+
+def find_recordings(
+    folder: Path,
+    on_note: Callable[[str], None] = lambda text: None,
+    lidar: str | None = None,
+    columns: int | None = None,
+) -> list[RecordingInfo]:
+    """Returns all recordings in a folder and its direct subfolders.
+
+    The recordings can have any format that `evaluation.drives.open_drive`
+    reads. Recordings in the layouts of CNS and KITTI are found up to three
+    levels down, where exports put them. A recording in the layout of KITTI
+    needs a `scenario.yaml`.
+
+    Map and stage of a recording come from its scenario. Without a scenario,
+    the name of the recording gives both: `<map>_<stage>`, `<map><stage>` as in
+    KAIST01, or `<map>-<date>`. If the name is only a date, as in NCLT, the
+    world frame is the map. Recordings without map and stage, and recordings in
+    deeper folders, are left out with a note.
+
+    Args:
+        folder: the folder.
+        on_note: is called with each note on how recordings are read or left
+            out.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
+
+    Raises:
+        InputError: if no recording has a map and a stage, or a recording cannot
+            be read.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    paths = _find_drives(folder, on_note)
+    placed = {
+        path: _recording_info(path, on_note, lidar, columns) for path in paths
+    }
+    found = [one for one in placed.values() if one is not None]
+    if not found:
+        raise InputError(f"{paths[0]}: {_UNKNOWN_STAGE}")
+    for path, one in placed.items():
+        if one is None:
+            on_note(f"{path}: left out: {_UNKNOWN_STAGE}")
+    return found
+
+
+def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
+    """Returns the paths of the drives in a folder, in order.
+
+    Raises:
+        InputError: there is none, or there are too many folders.
+    """
+    children = listed(folder)
+    drives = [path for path in children if _holds_drive(path)]
+    nested = [path for path in children if path.is_dir() and path not in drives]
+    deeper: list[Path] = []
+    below = (path for child in nested for path in _folders_in(child, 2))
+    for number, path in enumerate(below):
+        if number == _MOST_FOLDERS:
+            raise InputError(
+                f"{folder}: more than {_MOST_FOLDERS} folders in it; give the"
+                " folder of the recordings"
+            )
+        if _holds_drive(path):
+            is_export = holds_cns(path) or holds_kitti(path)
+            (drives if is_export else deeper).append(path)
+    for path in sorted(deeper, key=_natural):
+        on_note(
+            f"{path}: left out: not directly in {folder}; give its folder, or"
+            " move it up"
+        )
+    paths: list[Path] = []
+    unnamed: list[Path] = []
+    for path in sorted(drives, key=_natural):
+        is_placed = not holds_kitti(path) or (path / SCENARIO).is_file()
+        (paths if is_placed else unnamed).append(path)
+    if unnamed:
+        fault = (
+            f"{unnamed[0]}: no {SCENARIO}, which states map and stage of a"
+            f" drive in KITTI's layout ({len(unnamed)} drives have none)"
+        )
+        if not paths:
+            raise InputError(fault)
+        on_note(f"{fault}; left out")
+    if not paths:
+        raise InputError(f"{folder}: no recorded drive in it")
+    return paths
+
+
+def _natural(path: Path) -> tuple:
+    return natural_key(str(path))
+
+
+def _folders_in(folder: Path, levels: int) -> Iterator[Path]:
+    """Yields the folders in a folder, down to a number of levels."""
+    with os.scandir(folder) as entries:
+        found = [
+            Path(entry)
+            for entry in entries
+            if entry.is_dir() and not entry.name.startswith(".")
+        ]
+    for path in found:
+        yield path
+        if levels > 1:
+            yield from _folders_in(path, levels - 1)
+
+
+def _holds_drive(path: Path) -> bool:
+    return path.suffix != ".part" and bool(find_readers(path))
+
+
+def _recording_info(
+    path: Path,
+    on_note: Callable[[str], None],
+    lidar: str | None,
+    columns: int | None,
+) -> RecordingInfo | None:
+    """Returns a recording; None if its map or stage is unknown."""
+    drive = open_drive(path, lidar, columns)
+    for note in drive.notes:
+        on_note(note)
+    scenario = drive.scenario or {}
+    way = driven_way(scenario)
+    is_guessed = not {"map", "stage"} <= set(scenario)
+    if not is_guessed:
+        map_name = one_line(Path(str(scenario["map"])).name)
+        stage = one_line(scenario["stage"])
+    else:
+        matches = (name.fullmatch(drive.session) for name in _NAME_FORMS)
+        match = next(filter(None, matches), None)
+        if match is None:
+            return None
+        map_name = match["map"] or drive.world_frame.partition("/")[0]
+        stage = match["stage"]
+    source = None
+    if (lidar, columns) != (None, None):
+        source = RecordingSource(path.absolute(), lidar, columns)
+    return RecordingInfo(
+        drive.name,
+        path,
+        map_name,
+        stage,
+        way,
+        made_by=source,
+        lidar_field=drive.lidar_field,
+        is_guessed=is_guessed,
+    )

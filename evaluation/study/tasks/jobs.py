@@ -1,0 +1,243 @@
+"""The jobs of a study's tasks, and what several of them share."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.running import Job
+from evaluation.recognition.describing import Role
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.feature_extraction import FeatureExtraction, map_source
+from evaluation.study.parts import MakePart, Part
+from evaluation.study.place_measurements import DescribedSource
+from evaluation.study.study_files import StudyFiles
+from evaluation.study.tasks.pair import NamedDrive, Pair, Result
+
+# Expected time to start a job and to open a drive [s].
+OPENING_COST = 8.0
+# Expected time to read a scan [s].
+SCAN_COST = 0.011
+# Expected time to map a drive with each of its scans [s].
+_MAP_COST = 60.0
+# Expected time of other work [s].
+_OTHER_COST = 20.0
+
+
+@dataclass
+class Jobs:
+    """The jobs of a study, and the data from which they are made.
+
+    If several pairs of drives need the descriptors of the same drive, one job
+    writes these descriptors to files.
+
+    Attributes:
+        files: paths of the study's files.
+        methods: the methods that are run.
+        distractors: drives through other cities, whose places are added to
+            each database in this order.
+        jobs: name -> job.
+        notes: note -> None, for each note on what is left out. A dictionary
+            keeps the order and omits repetitions.
+        radii: key of a pair -> the greatest distances between a query and its
+            match that are used for this pair [m].
+        processes: number of processes that a task may use by itself.
+        shows_overlaps: whether results contain the share of each query's scan
+            that its best match shows. Computing this share takes time.
+        leaves_out_slow: whether methods that would take more than an hour for a
+            pair are left out.
+    """
+
+    shows_overlaps: ClassVar[bool] = True
+    leaves_out_slow: ClassVar[bool] = True
+
+    files: StudyFiles
+    methods: tuple[MethodChoice, ...]
+    distractors: Sequence[NamedDrive] = ()
+    jobs: dict[str, Job] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+    radii: dict[str, set[float]] = field(default_factory=dict)
+    processes: int = 1
+    # Descriptor -> keys of the pairs that need it.
+    _uses: dict[str, set[str]] = field(default_factory=dict)
+
+    def expect(self, pair: Pair) -> None:
+        """Registers a pair of drives.
+
+        Register all pairs before you call `described`, which must know how many
+        pairs need the descriptors of a drive.
+        """
+        self.radii.setdefault(pair.key, set()).add(pair.protocol.radius)
+        for drive, role in pair.roles:
+            name = _description_name(drive, role, pair.protocol)
+            self._uses.setdefault(name, set()).add(pair.key)
+
+    def described(
+        self,
+        drive: NamedDrive,
+        role: Role,
+        protocol: RetrievalProtocol,
+        needs: list[str],
+        *,
+        kept: bool = False,
+    ) -> DescribedSource:
+        """Returns the source from which a job gets a drive's descriptors.
+
+        If several pairs need the descriptors, this function adds a job that
+        writes the descriptors, and returns the files: first the file with the
+        scans, then a file for each method. If only one pair needs the
+        descriptors, the function returns the source of the drive, and the job
+        of this pair computes the descriptors itself.
+
+        Args:
+            drive: the drive.
+            role: role of its scans, `places` or `queries`.
+            protocol: protocol of the pair.
+            needs: list to which the name of the added job is appended.
+            kept: whether to write the files even if only one pair needs them.
+        """
+        name = _description_name(drive, role, protocol)
+        if not (kept or len(self._uses.get(name, ())) > 1):
+            needs += drive.needs
+            return drive.source
+        files = self.files.features(name)
+        step = FeatureExtraction(
+            drive.source,
+            frozenset({role}),
+            self.methods,
+            protocol,
+            files,
+            with_scans=True,
+            with_map=False,
+        )
+        job = f"describe {name}"
+        cost = self.description_cost(drive, role, protocol)
+        self.jobs[job] = Job(job, step, drive.needs, cost)
+        needs.append(job)
+        return (
+            files.scans,
+            *(files.described(one.key) for one in self.methods),
+        )
+
+    def description_cost(
+        self, drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+    ) -> float:
+        """Returns the expected time to describe a drive by all methods [s]."""
+        made = [one.make() for one in self.methods]
+        scans = max(map(protocol.scans, made), default=1)
+        each = SCAN_COST * scans + sum(one.describe_time for one in made)
+        return OPENING_COST + each * num_described(drive, role, protocol)
+
+    def mapped(
+        self, drive: NamedDrive, spacing: float | None, needs: list[str]
+    ) -> Result:
+        """Returns the file with a drive's map, and adds the job that makes it.
+
+        Args:
+            drive: the drive.
+            spacing: distance along the path between two scans in the map [m];
+                None for all scans.
+            needs: list to which the name of the job is appended.
+        """
+        name = drive.name if spacing is None else f"{drive.name} {spacing:g}"
+        part = self.files.part("mapped", name)
+        needs.append(job_name(part))
+        cost = _MAP_COST * drive.share if spacing is None else _OTHER_COST
+        arguments = (drive.source, spacing)
+        return self.add(part, map_source, arguments, drive.needs, cost)
+
+    def beside(self, pair: Pair, needs: list[str]) -> list[tuple[Part, ...]]:
+        """Returns the files of a pair's further drives in the same world.
+
+        Args:
+            pair: the pair.
+            needs: list to which the names of the jobs are appended that write
+                the files.
+
+        Returns:
+            For each drive, the file with the scans of its places, and one file
+            per method with their descriptors.
+        """
+        found = []
+        for drive in pair.beside:
+            parts = self.described(
+                drive, "places", pair.protocol, needs, kept=True
+            )
+            assert isinstance(parts, tuple)
+            found.append(parts)
+        return found
+
+    def distractor_places(
+        self, pair: Pair, needs: list[str]
+    ) -> tuple[tuple[Part, ...], ...]:
+        """Returns descriptors of drives through other cities, for a pair.
+
+        Places of these drives are distractors: they enlarge the database.
+
+        Args:
+            pair: the pair; without distractors, the result is empty.
+            needs: list to which the names of the jobs are appended that
+                describe these drives.
+
+        Returns:
+            For each drive through another city, one file per method with the
+            descriptors of its places.
+        """
+        if not pair.distractors:
+            return ()
+        found = []
+        for drive in self.distractors:
+            parts = self.described(
+                drive, "places", pair.protocol, needs, kept=True
+            )
+            assert isinstance(parts, tuple)
+            found.append(parts[1:])
+        return tuple(found)
+
+    def add(
+        self,
+        part: Part,
+        function: Callable[..., object],
+        arguments: tuple[object, ...],
+        needs: Iterable[str] = (),
+        cost: float = _OTHER_COST,
+    ) -> Result:
+        """Adds a job that writes a file of results; returns the file.
+
+        The job is named by the file's folder and name.
+
+        Args:
+            part: the file.
+            function: function whose result is written. The first argument of
+                this function is a `Reporter`.
+            arguments: further arguments of the function.
+            needs: names of jobs that must be finished before.
+            cost: approximate cost of the job [s].
+        """
+        name = job_name(part)
+        step = MakePart(part, function, arguments)
+        self.jobs[name] = Job(name, step, tuple(needs), cost)
+        return part
+
+
+def num_described(
+    drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+) -> float:
+    """Returns about how many places or queries a drive has."""
+    spacing = protocol.place_spacing
+    if role == "queries":
+        spacing = protocol.query_spacing
+    return min(drive.num_scans, drive.length / spacing)
+
+
+def job_name(part: Part) -> str:
+    """Returns the name of the job that `Jobs.add` adds for a file."""
+    return f"{part.path.parent.name} {part.path.stem}"
+
+
+def _description_name(
+    drive: NamedDrive, role: Role, protocol: RetrievalProtocol
+) -> str:
+    options = protocol.descriptor_options(queries=role == "queries")
+    return f"{drive.name} {role} {fingerprint(options)[:6]}"

@@ -1,0 +1,169 @@
+"""A pair of drives, as tasks measure it under a condition of an experiment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+from typing import Any, Protocol
+
+import numpy as np
+
+from evaluation.recognition.describing import Role
+from evaluation.recognition.kept_places import KEEP_ALL
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.keys import FROZEN_REDRAW
+from evaluation.study.sources import DriveSource
+
+# Length of a drive through a shipped city, about [m].
+USUAL_LENGTH = 1400.0
+
+
+@dataclass(frozen=True)
+class NamedDrive:
+    """A drive that is measured.
+
+    Attributes:
+        name: unique name of the drive.
+        source: function that opens the drive.
+        needs: names of the jobs that record the drive; empty if it is recorded
+            already, or is simulated while it is read.
+        length: about how long the drive is [m], to estimate costs.
+        num_scans: number of the drive's scans, if known; at most this number of
+            scans is described.
+    """
+
+    name: str
+    source: DriveSource
+    needs: tuple[str, ...] = ()
+    length: float = USUAL_LENGTH
+    num_scans: float = math.inf
+
+    @property
+    def share(self) -> float:
+        """Its length as a share of `USUAL_LENGTH`."""
+        return self.length / USUAL_LENGTH
+
+
+class Result(Protocol):
+    """The result of a job, such as a `Part`."""
+
+    def read(self) -> Any:
+        """Returns the result.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+
+
+@dataclass(frozen=True)
+class Held:
+    """A result that is in memory instead of in a file."""
+
+    value: Any
+
+    def read(self) -> Any:
+        """Returns the result."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two drives that are measured under a condition of an experiment.
+
+    The first fields are columns of the tables; the others determine what is
+    measured.
+
+    Attributes:
+        map_name: name of the map.
+        names: names of the database drive and of the query drive in tables. All
+            conditions of the same two drives have the same names.
+        factors: name -> value of each factor of the condition.
+        seed: seed of everything that is random.
+        is_baseline: whether other conditions are compared with this one.
+        stated: protocol that the tables name: the protocol of the experiment,
+            before the condition changes its queries.
+        key: name of the results. Two pairs have the same key only if they
+            measure the same thing; only the radius of a match can differ.
+        database, query: the drives.
+        way: drive along the query's route through the database's city, if there
+            is one; otherwise the database drive. The change of the city
+            (TCR_sym) is measured between this drive and the query drive.
+        protocol: protocol of place recognition.
+        distractors: number of places of other cities that are added to the
+            database.
+        beside: further drives in the same world, whose places are added to the
+            database, from older to newer.
+        keep: which places of these drives and of the database drive are kept,
+            see `evaluation.recognition.kept_places.kept_places`.
+        ages: for an aged city, the years that it has aged by at each drive of
+            the database and at the query; empty if the city does not age.
+        leaves_out_itself: whether a drive is compared with itself, and each
+            scan with all other scans.
+        may_repeat: whether the pair can repeat drives of another pair, because
+            its condition changes the queries (random yaw, tilt or occluded
+            sector) or adds distractors. A task whose results depend only on the
+            drives then skips the pair if it has measured these drives before.
+        settings: name -> value of settings outside of the protocol that change
+            a number, such as the height of a LiDAR that differs from the
+            methods' default.
+        overlaps: (Q, D) overlap of each query with each place, if the protocol
+            says that matches are by overlap; otherwise None.
+        parts: task -> its results, as files or in memory, for the tasks that
+            measure the pair.
+    """
+
+    map_name: str
+    names: tuple[str, str]
+    factors: Mapping[str, Any]
+    seed: int
+    is_baseline: bool
+    stated: RetrievalProtocol
+    key: str
+    database: NamedDrive
+    query: NamedDrive
+    way: NamedDrive
+    protocol: RetrievalProtocol
+    distractors: int = 0
+    beside: tuple[NamedDrive, ...] = ()
+    keep: str | int = KEEP_ALL
+    ages: tuple[int, ...] = ()
+    leaves_out_itself: bool = False
+    may_repeat: bool = False
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    overlaps: np.ndarray | None = None
+    parts: dict[str, tuple[Result, ...]] = field(default_factory=dict)
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """Key of map, drives and protocol; each key has one baseline."""
+        fixed = [
+            (name, value)
+            for name, value in self.factors.items()
+            if name == FROZEN_REDRAW or name.startswith("protocol.")
+        ]
+        return self.map_name, self.names, *fixed
+
+    @property
+    def closes_loops(self) -> bool:
+        """Whether a drive is compared with places that it passed before."""
+        is_itself = self.database == self.query
+        return is_itself and self.protocol.exclude_recent is not None
+
+    @property
+    def roles(self) -> tuple[tuple[NamedDrive, Role], ...]:
+        """Both drives, each with its role: `places` or `queries`."""
+        return (self.database, "places"), (self.query, "queries")
+
+    @property
+    def is_composed(self) -> bool:
+        """Whether the database is anything but all places of one drive.
+
+        A composed database has places of several drives, or only some places of
+        one drive.
+        """
+        return bool(self.beside) or self.keep != KEEP_ALL
+
+    @property
+    def drives(self) -> tuple[object, ...]:
+        """Names of the drives of database and query, and the field `keep`."""
+        database = [one.name for one in (self.database, *self.beside)]
+        return (*database, self.keep, self.query.name)
