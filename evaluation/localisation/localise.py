@@ -148,13 +148,7 @@ class Localiser:
             X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
         measured = cropped(scan, MAX_RANGE)
         points = downsample(measured, self.settings.scan_voxel)
-        row = np.zeros((), QUERY)
-        for name in COLUMNS[8:-2]:
-            row[name] = np.nan
-        row["own_score"] = row["fit"] = -math.inf
-        row["frame"], row["stamp_ns"] = frame, stamp_ns
-        for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
-            row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
+        row = _record_of_start(frame, stamp_ns, offset, turn)
         if len(points) < FEWEST_POINTS:
             return row, None
         begin = time.process_time()
@@ -167,15 +161,55 @@ class Localiser:
             fit = fit_at(self.surroundings.surface, points, end)
             row["own_score"] = fit.share if found.score is None else found.score
             row["fit"], row["residual"] = fit.share, fit.residual
-            row["translation_error"], row["rotation_error_deg"] = pose_error(
-                end, np.eye(4), X_WS
-            )
-            errors = R_WT.T @ (end[:3, 3] - X_WS[:3, 3])
-            spread = R_WT.T @ fit.covariance[3:, 3:] @ R_WT
-            for k, name in enumerate(("along", "across", "up")):
-                row[name] = errors[k]
-                row[f"std_{name}"] = math.sqrt(spread[k, k])
+            _record_errors(row, end, fit.covariance, X_WS, R_WT)
         return row, end
+
+
+def _record_of_start(
+    frame: int, stamp_ns: int, offset: np.ndarray, turn: np.ndarray
+) -> np.ndarray:
+    """Returns a record of `QUERY` in which only the initial pose is known.
+
+    Args:
+        frame: number of the scan.
+        stamp_ns: time of the scan [ns].
+        offset: (3,) offset of the initial position in W [m].
+        turn: (3,) rotation vector of the initial orientation in S [rad].
+    """
+    row = np.zeros((), QUERY)
+    for name in COLUMNS[8:-2]:
+        row[name] = np.nan
+    row["own_score"] = row["fit"] = -math.inf
+    row["frame"], row["stamp_ns"] = frame, stamp_ns
+    for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
+        row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
+    return row
+
+
+def _record_errors(
+    row: np.ndarray,
+    found: np.ndarray,
+    covariance: np.ndarray,
+    X_WS: np.ndarray,
+    R_WT: np.ndarray,
+) -> None:
+    """Enters the errors of an estimated pose into its record of `QUERY`.
+
+    Args:
+        row: the record.
+        found: (4, 4) estimated pose of S in W.
+        covariance: (6, 6) covariance of the estimate, see `Fit`.
+        X_WS: (4, 4) ground-truth pose.
+        R_WT: (3, 3) axes of the path.
+    """
+    row["translation_error"], row["rotation_error_deg"] = pose_error(
+        found, np.eye(4), X_WS
+    )
+    errors = R_WT.T @ (found[:3, 3] - X_WS[:3, 3])
+    spread = R_WT.T @ covariance[3:, 3:] @ R_WT
+    for k, name in enumerate(("along", "across", "up")):
+        row[name] = errors[k]
+        row[f"std_{name}"] = math.sqrt(spread[k, k])
 
 
 # The localisers in a forked process.
