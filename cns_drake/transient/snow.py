@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 import shapely
 
 from cns_drake.base.elementary import sin
-from cns_drake.city.geometry.upper_sides import (
+from cns_drake.city.geometry.triangles import (
     from_above,
     quartered,
     turned_up,

@@ -148,4 +148,4 @@ def sample(
         site = site.detached(kind.overhang)
     building = BUILDERS[archetype](kind, site, height, rng)
     building.build()
-    return building.finish(footprint)
+    return building.to_model(footprint)

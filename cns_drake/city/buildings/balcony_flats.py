@@ -77,7 +77,12 @@ class BalconyFlats(Building):
         facade = _storey_walls(self, exact, walls)
         top = tiers.add_storeys(self, plan, facade, top, count, per_group)
         common = count * per_group
-        _add_balconies(self, walls, ground.height, (count, per_group, exact))
+        _add_balconies(
+            self,
+            walls,
+            ground.height,
+            tiers.StoreyGroups(count, per_group, exact),
+        )
         for k, section in enumerate(sections):
             part = f"section_{k}"
             high = top
@@ -151,7 +156,7 @@ def _add_balconies(
     p: BalconyFlats,
     walls: list[_Front],
     z0: float,
-    stack: tuple[int, int, float],
+    stack: tiers.StoreyGroups,
 ) -> None:
     """Adds the balconies of several storeys, one above another."""
     groups, per_group, storey = stack

@@ -137,7 +137,7 @@ def _add_garden_floor(
 
 
 def _stack_adder(
-    p: BandedTower, plan: np.ndarray, counts: tuple[int, int, float], name: str
+    p: BandedTower, plan: np.ndarray, counts: tiers.StoreyGroups, name: str
 ) -> Callable[[float, int], float]:
     """Returns a function that adds a stack of storeys with one outline.
 

@@ -29,7 +29,8 @@ from cns_drake.city.facades import (
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
-# Windows of the sides are further apart than those of the front [m].
+# Distance between the windows of the sides [m]. The windows of the front are
+# closer together.
 _SIDE_PITCH_M = 3.8
 
 
@@ -52,7 +53,7 @@ class _FamilyHouse(Building):
 
 
 def _window_rows(p: _FamilyHouse, wing: Wing, storeys: int) -> Openings:
-    """Returns the windows of a wing; those of its sides are further apart."""
+    """Returns the windows of a wing, which are further apart on its sides."""
     openings = Openings(p, wing, p.boxes)
     width = p.window_width
     for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):

@@ -64,7 +64,7 @@ class GalleryFlats(Building):
         top = _add_ground(self, slab)
         walls = _storey_walls(self, storey, open_edge)
         top = tiers.add_storeys(self, slab, walls, top, groups, per_group)
-        stack = (groups, per_group, storey)
+        stack = tiers.StoreyGroups(groups, per_group, storey)
         _add_galleries(self, slab, open_edge, stack)
         crown = Facade(0.6, (Band(0.4, 0.6, -0.1),))
         tiers.add_crown(
@@ -120,7 +120,7 @@ def _storey_walls(p: GalleryFlats, storey: float, open_edge: int) -> Facade:
 
 
 def _add_galleries(
-    p: GalleryFlats, slab: np.ndarray, edge: int, stack: tuple[int, int, float]
+    p: GalleryFlats, slab: np.ndarray, edge: int, stack: tiers.StoreyGroups
 ) -> None:
     """Adds a gallery to each storey, with continuous posts, and screens."""
     wall = WallFrame(slab, edge)

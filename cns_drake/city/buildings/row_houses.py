@@ -1,4 +1,4 @@
-"""Row houses: single ones, terraces, and houses above a shop."""
+"""Row houses: single houses, terraces, and houses above a shop."""
 
 from collections.abc import Sequence
 import copy
@@ -392,14 +392,14 @@ class Terrace(_HouseInARow):
             house = self._varied(k)
             house.height = self.height - self.step * low
             _add_unit(
-                house, area, self.site.blind_in(k, count),
+                house, area, self.site.blind_edges_of_unit(k, count),
                 f"house_{k:02d}_", self.pick(_DOORS),
             )  # fmt: skip
 
     def _varied(self, k: int) -> _HouseInARow:
         """Returns the k-th house, which differs from its neighbours in details.
 
-        Its parts and meshes are collected in those of the terrace.
+        Its parts and meshes are added to the parts and meshes of the terrace.
         """
         house = copy.copy(self)
         if self.chance(self.crossed) and k > 0:

@@ -50,7 +50,7 @@ class ShopStrip(Building):
         bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
         highest = self.whole(0, count)
         for k in range(count):
-            blind = self.site.blind_in(k, count)
+            blind = self.site.blind_edges_of_unit(k, count)
             tall = self.height > self.ground + 3.4 and (
                 k == highest or self.chance(self.upper)
             )

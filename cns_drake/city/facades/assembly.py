@@ -1,4 +1,4 @@
-"""Collects the parts of one building."""
+"""The assembly of one building from its parts."""
 
 from __future__ import annotations
 
@@ -30,9 +30,17 @@ class Assembly(Dice):
     """Collects the parts of one building, and makes its random choices.
 
     `add` makes one part from the given meshes. `add_to` collects meshes by
-    material, and `paint` sets the materials' colours: each material becomes one
-    part, so that a building of many small pieces has few visuals. Parts without
-    their own finish have the finish of the `walls`.
+    material, and each material that `declare_materials` names becomes one part:
+    a building of many small pieces thus has few visuals.
+
+    Attributes:
+        site: the ground of the building.
+        rng: the random generator.
+        walls: finish of all parts without a finish of their own; None for the
+            colour and the material of the semantic class.
+        glass: finish of panes.
+        parts: the parts so far.
+        meshes: name -> mesh of all meshes that the parts use.
     """
 
     site: Site
@@ -73,7 +81,7 @@ class Assembly(Dice):
         """Merges panes into one part, raised by `z` [m], and adds it."""
         self.add(part, *meshes, z=z, finish=self.glass)
 
-    def paint(self, **colours: Finish) -> None:
+    def declare_materials(self, **colours: Finish) -> None:
         """Declares the building's materials: name=colour, as keywords.
 
         Call it before `add_to`, which adds meshes to the part of a declared
@@ -86,7 +94,7 @@ class Assembly(Dice):
         """Adds meshes in the building's frame to the part of a material.
 
         Raises:
-            ValueError: the material was not declared with `paint`.
+            ValueError: the material was not declared with `declare_materials`.
         """
         if material not in self._pieces:
             raise ValueError(f"unknown material {material}")
@@ -103,8 +111,10 @@ class Assembly(Dice):
             mesh = merge_meshes(*pieces).moved(translation, yaw)
             self._pieces[material] = [mesh]
 
-    def finish(self, footprint: BaseGeometry) -> Model:
-        """Returns the finished building, with one part for each material.
+    def to_model(self, footprint: BaseGeometry) -> Model:
+        """Returns the whole building as a model; to be called once, at the end.
+
+        Each material becomes one part.
 
         `footprint` is the ground of the building in its frame S [m].
         """
@@ -144,7 +154,7 @@ class Assembly(Dice):
             z0: height of the lowest copy [m].
             step: vertical distance from one copy to the next [m].
             count: number of copies.
-            finish: colour and material; by default those of the walls.
+            finish: colour and material; by default the finish of the walls.
         """
         shape = MeshShape(self.define(part, mesh))
         for k in range(count):
@@ -179,7 +189,7 @@ class Assembly(Dice):
             shape: the shape.
             xyz: position of the shape in the building's frame [m].
             yaw: heading of the shape [rad].
-            finish: colour and material; by default those of the walls.
+            finish: colour and material; by default the finish of the walls.
         """
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))

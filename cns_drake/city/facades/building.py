@@ -44,7 +44,9 @@ class Building(Assembly, abc.ABC):
         if self.walls is None and self.colours:
             self.walls = next(iter(self.colours.values()))
         self.glass = self.colours.setdefault("glass", self.glass)
-        self.paint(**{part: self.colours[part] for part in kind.materials})
+        self.declare_materials(
+            **{part: self.colours[part] for part in kind.materials}
+        )
 
     @abc.abstractmethod
     def draw(self) -> None:

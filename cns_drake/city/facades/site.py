@@ -87,7 +87,7 @@ class Site:
         edges_at = {FRONT_LEFT: {3, 0}, FRONT_RIGHT: {0, 1}}
         return [k for k, e in edges_at.items() if not e & self.blind_edges]
 
-    def blind_in(self, number: int, count: int) -> frozenset[int]:
+    def blind_edges_of_unit(self, number: int, count: int) -> frozenset[int]:
         """Returns the blind edges of one of several units side by side.
 
         Edges between two units are blind. The left edge of the first unit, and

@@ -1,8 +1,9 @@
-"""Adds the ground floor, the storeys, the top walls and the roof."""
+"""The tiers of a building: ground floor, storeys, and top walls with a roof."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,24 +21,36 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 _PANE_OVERLAP = 0.004
 
 
-def storey_groups(
-    height: float, storey: float, most: int = 10
-) -> tuple[int, int, float]:
+class StoreyGroups(NamedTuple):
+    """Equal storeys, in groups of which each becomes one part.
+
+    Attributes:
+        count: number of groups.
+        per_group: number of storeys in a group.
+        storey: height of a storey [m].
+    """
+
+    count: int
+    per_group: int
+    storey: float
+
+
+def storey_groups(height: float, storey: float, most: int = 10) -> StoreyGroups:
     """Divides a height into equal storeys, and the storeys into groups.
 
-    A storey is approximately `storey` high [m]. There are at most `most`
-    groups; each group becomes one part.
+    The height of a storey is rounded down to millimetres, so that stacked
+    storeys leave no gap.
 
-    Returns:
-        The number of groups, the number of storeys in a group, and the height
-        of a storey [m]. This height is rounded down to millimetres, so that
-        stacked storeys leave no gap.
+    Args:
+        height: height of all storeys together [m].
+        storey: approximate height of a storey [m].
+        most: greatest number of groups.
     """
     count = max(1, round(height / storey))
     per_group = -(-count // most)
     groups = max(1, round(count / per_group))
     exact = height / (groups * per_group)
-    return groups, per_group, math.floor(1000.0 * exact) / 1000.0
+    return StoreyGroups(groups, per_group, math.floor(1000.0 * exact) / 1000.0)
 
 
 def add_ground(

@@ -167,7 +167,8 @@ def _panel(
 
     The function takes N corners and returns their positions (N, 2).
 
-    At the ends of the wall, its corners meet those of the neighbouring walls.
+    At the ends of the wall, corners of its faces meet corners of the faces of
+    the neighbouring walls.
     """
     count = len(points)
     before, after = (edge - 1) % count, (edge + 1) % count

@@ -39,9 +39,7 @@ from cns_drake.city.geometry.polygons import (
     tiles,
 )
 from cns_drake.city.geometry.structures import Structure, ground_triangles
-from cns_drake.city.geometry.triangulation import triangulate
-from cns_drake.city.geometry.upper_sides import (
-    UpperSides,
+from cns_drake.city.geometry.triangles import (
     from_above,
     long_normals,
     looks_up,
@@ -49,6 +47,8 @@ from cns_drake.city.geometry.upper_sides import (
     turned_up,
     unit_normals,
 )
+from cns_drake.city.geometry.triangulation import triangulate
+from cns_drake.city.geometry.upper_sides import UpperSides
 
 __all__ = [
     "OBJECT_MESHES",

@@ -91,10 +91,10 @@ class Part:
         shape: the shape.
         xyz: position of the shape's origin in S [m].
         rpy: roll, pitch and yaw of the shape in S, as in SDF [rad].
-        rgb: colour; by default that of the structure's semantic class.
+        rgb: colour; by default the colour of the structure's semantic class.
         material: name of the material, a key of
-            `cns_drake.scene.materials.MATERIALS`; by default the usual one of
-            the structure's semantic class.
+            `cns_drake.scene.materials.MATERIALS`; by default the usual
+            material of the structure's semantic class.
     """
 
     name: str
@@ -131,7 +131,7 @@ class Model:
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Converts three values, such as those of an array, to a float tuple."""
+    """Converts three values, such as an array of three, to a float tuple."""
     x, y, z = values
     return float(x), float(y), float(z)
 

@@ -74,7 +74,7 @@ def post(
         radius: radius of the cylinder [m].
         height: height of its top above the ground [m].
         xy: position of its axis in the structure's frame [m].
-        rgb: colour; by default that of the structure's semantic class.
+        rgb: colour; by default the colour of the structure's semantic class.
     """
     return Part(
         name,
@@ -98,7 +98,7 @@ def bar(
         start: (3,) centre of one end in the structure's frame [m].
         end: (3,) centre of the other end in the structure's frame [m].
         radius: radius of the cylinder [m].
-        rgb: colour; by default that of the structure's semantic class.
+        rgb: colour; by default the colour of the structure's semantic class.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
@@ -129,8 +129,8 @@ def block(
         size: lengths along the box's own x, y and z [m].
         center: (3,) centre of the box in the structure's frame [m].
         yaw: heading of the box in the structure's frame [rad].
-        rgb: colour; by default that of the structure's semantic class.
-        material: name of the material; by default the usual one of the
+        rgb: colour; by default the colour of the structure's semantic class.
+        material: name of the material; by default the usual material of the
             structure's semantic class.
     """
     return Part(
@@ -163,7 +163,7 @@ def pillar(
         height: height of its top above the ground [m].
         xy: position of its middle in the structure's frame [m].
         yaw: heading of the box in the structure's frame [rad].
-        rgb: colour; by default that of the structure's semantic class.
+        rgb: colour; by default the colour of the structure's semantic class.
     """
     center = (*xy, (height - ROOT_DEPTH) / 2)
     return block(name, (x, y, height + ROOT_DEPTH), center, yaw, rgb)
@@ -185,9 +185,9 @@ def mesh_part(
         mesh: name of its file without `.obj`.
         at: (3,) position of the mesh's origin in the structure's frame [m].
         yaw: heading of the mesh in the structure's frame [rad].
-        rgb: colour; by default that of the structure's semantic class.
+        rgb: colour; by default the colour of the structure's semantic class.
         scale: factors along the mesh's own x, y and z.
-        material: name of the material; by default the usual one of the
+        material: name of the material; by default the usual material of the
             structure's semantic class.
     """
     rpy = (0.0, 0.0, float(yaw))

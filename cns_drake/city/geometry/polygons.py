@@ -72,9 +72,12 @@ def tiles(geometry: BaseGeometry, size: float) -> Iterator[MultiPolygon]:
 def squares_of_grid(
     geometry: BaseGeometry, size: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the corners (N, 2) and the boxes (N,) of squares that are hit.
+    """Returns the squares of a grid in W that an area intersects.
 
-    The corners are the lower left ones [m].
+    `size` is the side of the squares [m].
+
+    Returns:
+        The lower left corners (N, 2) [m] and the polygons (N,) of the squares.
     """
     if geometry.is_empty:
         return np.zeros((0, 2)), np.zeros(0, object)

@@ -32,7 +32,8 @@ class Covering(NamedTuple):
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         area: the area in W [m].
         rgb: colour.
-        material: name of the material; by default the usual one of the class.
+        material: name of the material; by default the usual material
+            of the class.
     """
 
     name: str

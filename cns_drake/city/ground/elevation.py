@@ -46,7 +46,7 @@ class LevelGround:
     """The ground of a city whose streets are all at z = 0.
 
     Attributes:
-        height: height of the ground in W, which is that of the sidewalks [m].
+        height: height of the ground and of the sidewalks in W [m].
         pads: empty, because level ground needs no level areas of its own.
     """
 
@@ -174,7 +174,7 @@ class SlopingGround:
         inside = shapely.intersects_xy(self._streets, x, y)
         z[inside] = self._sidewalk(x[inside], y[inside])
         shape = len(self._y), len(self._x)
-        return np.round(relaxed(z.reshape(shape)), _ROUNDING)
+        return np.round(with_gaps_filled(z.reshape(shape)), _ROUNDING)
 
     def _interpolate(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Returns the bilinear interpolation of the nodes."""
@@ -235,8 +235,8 @@ def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
     return pads
 
 
-def relaxed(z: np.ndarray) -> np.ndarray:
-    """Fills the gaps (NaN) in a grid of heights [m] smoothly.
+def with_gaps_filled(z: np.ndarray) -> np.ndarray:
+    """Returns a grid of heights [m] whose gaps (NaN) are filled smoothly.
 
     The height of every gap is the mean height of its two to four neighbours, as
     in a harmonic field. At least one height must be given.

@@ -43,7 +43,7 @@ _WAVELENGTHS = (22.0, 60.0)
 class GroundShape:
     """The height of a city's finished ground, at any x and y in W [m].
 
-    The height is that of `base`, plus the swells on the lawns of districts.
+    It is the height of `base`, plus the height of the swells on the lawns.
     """
 
     def __init__(

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 import math
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -18,9 +17,9 @@ from cns_drake.city.plan.stages import LotUse
 _MARGIN = 0.8
 # A smaller lot is a gap between houses, and stays empty [m^2].
 _SMALLEST = 40.0
-# Use of a lot -> its objects, their spacing and how many places they fill.
-_USES = parse_yaml(Path(__file__).with_name("lot_uses.yaml").read_bytes())
-USES: tuple[LotUse, ...] = get_args(LotUse)
+# Use of a lot -> the objects on the lot, the distances between their places,
+# and the share of the places that have an object.
+_LAYOUTS = parse_yaml(Path(__file__).with_name("lot_uses.yaml").read_bytes())
 
 
 def use_by_size(structure: Structure) -> LotUse:
@@ -53,7 +52,7 @@ def lot_objects(
     footprint = structure.model.footprint
     if use == "empty" or footprint.area < _SMALLEST:
         return
-    weights = _USES[use].get("objects", cars)
+    weights = _LAYOUTS[use].get("objects", cars)
     taken = Occupancy()
     count = 0
     for x, y, yaw in _object_places(footprint, use, rng):
@@ -81,14 +80,14 @@ def _object_places(
 ) -> Iterator[tuple[float, float, float]]:
     """Yields x, y [m] and heading [rad] of the objects on a lot, in S."""
     x0, y0, x1, y1 = largest_rectangle(footprint).bounds
-    along, across = _USES[use]["pitch"]
+    along, across = _LAYOUTS[use]["pitch"]
     columns = max(1, math.floor((x1 - x0 - 2 * _MARGIN) / along))
     rows = max(1, math.floor((y1 - y0 - 2 * _MARGIN) / across))
     for row in range(rows):
         y = (y0 + y1) / 2 + (row - (rows - 1) / 2) * across
         for column in range(columns):
             x = (x0 + x1) / 2 + (column - (columns - 1) / 2) * along
-            taken = rng.random() < _USES[use]["fill"]
+            taken = rng.random() < _LAYOUTS[use]["fill"]
             jitter = rng.uniform(-0.3, 0.3, 2)
             turn = int(rng.integers(2)) * math.pi
             if not taken:

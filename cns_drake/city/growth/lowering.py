@@ -195,8 +195,8 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     for outer, ring in sorted(rings, key=lambda r: r[0].area, reverse=True):
         mine = edges[shapely.intersects(lines, ring)]
         a, b = (mine - mine.mean(axis=(0, 1))).transpose(1, 0, 2)
-        # The outer edges of a building run counter-clockwise, those of a
-        # courtyard clockwise.
+        # The outer edges of a building run counter-clockwise, and the edges
+        # of a courtyard clockwise.
         if (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() > 0:
             plan = plan.union(_grown_area(outer, -_REVEAL))
         else:

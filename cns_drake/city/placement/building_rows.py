@@ -40,9 +40,14 @@ _LEFT_EDGE = 3
 class _House:
     """A building to be built.
 
-    Its frame S is at `xy` and `yaw` in W [m, rad]. `height` is that of its
-    walls [m], and `taken` the ground in W that was taken for it. Its
-    `blind_edges` touch a neighbour.
+    Attributes:
+        archetype: name of the archetype.
+        footprint: ground of the building, in its frame S [m].
+        xy: position of S in W [m].
+        yaw: heading of S in W [rad].
+        height: height of the parapet, ridge or spire [m].
+        taken: ground in W that was taken for the building.
+        blind_edges: numbers of the edges towards a neighbour.
     """
 
     archetype: str

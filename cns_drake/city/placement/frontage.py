@@ -21,7 +21,7 @@ _QUAD_SEGMENTS = 16
 # this angle [rad]. Houses around a tighter curve, or in a corner, would look
 # askew.
 _BEND = math.radians(17)
-# The heading at a place is that of a chord of twice this length [m].
+# The heading at a place is the heading of a chord twice as long as this [m].
 _SHORT = 0.25
 
 

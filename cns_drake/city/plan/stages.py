@@ -125,7 +125,7 @@ class Stages(_Model):
         }
 
     def _onwards(self, stage: str) -> list[Stage]:
-        """Returns a stage and all later ones."""
+        """Returns a stage and all later stages."""
         names = list(self.stages)
         if stage not in self.stages:
             raise KeyError(stage)

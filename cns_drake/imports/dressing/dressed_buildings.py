@@ -129,7 +129,7 @@ def _dress_building(
     structure, style = some.one.structure, some.style
     footprint = structure.model.footprint
     out = Assembly(Site(Polygon(), structure.name), some.rng)
-    out.paint(
+    out.declare_materials(
         body=style.wall,
         doors=style.door,
         frames=style.frame,
@@ -155,7 +155,7 @@ def _dress_building(
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
         roof_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
-    return out.finish(footprint), counts
+    return out.to_model(footprint), counts
 
 
 def _plan_facades(

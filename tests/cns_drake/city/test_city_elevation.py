@@ -14,7 +14,7 @@ from cns_drake.city.ground.elevation import (
     Pad,
     aprons,
     make_ground,
-    relaxed,
+    with_gaps_filled,
 )
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.surface_heights import RoadSurface
@@ -62,7 +62,7 @@ def test_relaxed_fills_a_strip_linearly():
     z = np.full((5, 9), np.nan)
     z[:, 0], z[:, -1] = 2.0, 10.0
     expected = np.tile(np.linspace(2.0, 10.0, 9), (5, 1))
-    np.testing.assert_allclose(relaxed(z), expected, atol=1e-9)
+    np.testing.assert_allclose(with_gaps_filled(z), expected, atol=1e-9)
 
 
 def test_relaxed_keeps_a_harmonic_polynomial():
@@ -71,7 +71,7 @@ def test_relaxed_keeps_a_harmonic_polynomial():
     z = 0.3 * (x**2 - y**2) - 0.2 * x * y + x
     holes = z.copy()
     holes[1:-1, 1:-1] = np.nan
-    np.testing.assert_allclose(relaxed(holes), z, atol=1e-9)
+    np.testing.assert_allclose(with_gaps_filled(holes), z, atol=1e-9)
 
 
 def test_relaxed_stays_between_given_values():
@@ -79,7 +79,7 @@ def test_relaxed_stays_between_given_values():
     z = np.full((20, 30), np.nan)
     given = rng.random(z.shape) < 0.1
     z[given] = rng.uniform(-2, 5, given.sum())
-    result = relaxed(z)
+    result = with_gaps_filled(z)
     assert not np.isnan(result).any()
     np.testing.assert_array_equal(result[given], z[given])
     assert result.min() >= np.nanmin(z) - 1e-9

@@ -1,5 +1,7 @@
 """Buildings of less height, building sites and lots."""
 
+from typing import get_args
+
 from helpers.building_checks import (
     cast,
     placed_triangles,
@@ -16,13 +18,15 @@ from cns_drake.city.geometry.mesh import box_mesh
 from cns_drake.city.geometry.models import part_mesh
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.building_sites import building_site
-from cns_drake.city.growth.lot_uses import USES, lot_objects, use_by_size
+from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.growth.lowering import cut_at, enclosed, lowered, top_of
 from cns_drake.city.growth.stage_structures import GrowingCity
-from cns_drake.city.plan.stages import Growth, Stage, Stages
+from cns_drake.city.plan.stages import Growth, LotUse, Stage, Stages
 
 # Height of the walls that the edge of the roof covers [m].
 BAND = 0.51
+
+USES = get_args(LotUse)
 
 
 def building(name, model, xyz, yaw):

@@ -24,7 +24,9 @@ GROUND = box(0, 0, 9, 9)
 def assembly(name, **colours):
     site = Site(GROUND, name)
     result = Assembly(site, np.random.default_rng(0), walls=Finish((9, 9, 9)))
-    result.paint(**{part: Finish(rgb) for part, rgb in colours.items()})
+    result.declare_materials(
+        **{part: Finish(rgb) for part, rgb in colours.items()}
+    )
     return result
 
 
@@ -73,7 +75,7 @@ def test_gables_stand_below_the_ends_of_the_ridge(along_y):
     wing = Wing.at((0, 0, 6, 6), 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
     house = assembly("h", walls=(1, 1, 1), roof=(0, 0, 0))
     add_roof(house, wing)
-    meshes = house.finish(GROUND).meshes
+    meshes = house.to_model(GROUND).meshes
     walls = meshes["h_walls"].vertices
     across = walls[:, 0] if along_y else walls[:, 1]
     ends = walls[:, 1] if along_y else walls[:, 0]
@@ -98,7 +100,7 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
         house = assembly("d", walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
         wing_roofs.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
-        meshes = house.finish(GROUND).meshes
+        meshes = house.to_model(GROUND).meshes
         corners = np.vstack([m.vertices for m in meshes.values()])
         assert corners[:, 2].max() < 9.0
         assert corners[:, 0].min() > 2.0
@@ -114,7 +116,7 @@ def test_no_dormer_on_a_flat_slope():
     wing = Wing.at((0, 0, 20, 16), 6.0, 8.0, Roof())
     house = assembly("d", walls=(1, 1, 1))
     wing_roofs.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
-    assert house.finish(GROUND).parts == ()
+    assert house.to_model(GROUND).parts == ()
 
 
 @pytest.mark.parametrize(("height", "storeys"), [(5.0, 1), (9.0, 2), (12.5, 3)])
@@ -130,7 +132,7 @@ def test_each_material_becomes_one_part():
     house.add_to("b", box_mesh((1, 1, 1)))
     house.add_to("a", box_mesh((1, 1, 1)), box_mesh((1, 2, 3), (5, 0, 0)))
     house.turn((1.0, 2.0, 0.0), np.pi / 2)
-    model = house.finish(GROUND)
+    model = house.to_model(GROUND)
     assert [(p.name, p.rgb) for p in model.parts] == [
         ("a", (1, 0, 0)),
         ("b", (0, 1, 0)),

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from cns_drake.city.geometry.models import part_triangles
-from cns_drake.city.geometry.upper_sides import UpperSides, turned_up
+from cns_drake.city.geometry.triangles import turned_up
+from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
 from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.steerable_drives import WaypointRoute

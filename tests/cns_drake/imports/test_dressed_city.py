@@ -374,11 +374,11 @@ def test_a_gable_keeps_its_slopes():
     assert {o.row for o in plan.openings} == {0, 1, 2}
     out = Assembly(Site(Polygon(), "a"), np.random.default_rng(1))
     names = ("body", "doors", "frames", "glass", "sign", "trim")
-    out.paint(**dict.fromkeys(names, Finish((0.5, 0.5, 0.5))))
+    out.declare_materials(**dict.fromkeys(names, Finish((0.5, 0.5, 0.5))))
     counts = add_facade(out, plan, out.rng)
     # The upper row leaves the gable.
     assert counts == {"windows": 6}
-    model = out.finish(Polygon())
+    model = out.to_model(Polygon())
     found = np.concatenate(
         [
             v[t]

@@ -4,7 +4,7 @@ from helpers.transient_town import DRIVE, X_WT
 import numpy as np
 import pytest
 
-from cns_drake.city.geometry.upper_sides import turned_up, unit_normals
+from cns_drake.city.geometry.triangles import turned_up, unit_normals
 from cns_drake.transient.ground_surface import GroundSurface
 
 
