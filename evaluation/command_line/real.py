@@ -48,7 +48,7 @@ def real(
             all places are used.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.real.measuring import measure_real
+    from evaluation.real.real_study import measure_real
     from evaluation.results.table import RESULTS
     from evaluation.study.chosen_methods import with_standard
 

@@ -1,5 +1,5 @@
 """Public real scans, measured as a study measures simulated scans.
 
-`data_sets` opens the scans, `measuring` measures methods on them, and `judge`
+`data_sets` opens the scans, `real_study` measures methods on them, and `judge`
 trains a classifier to distinguish real from simulated scans.
 """

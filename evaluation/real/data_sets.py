@@ -24,12 +24,12 @@ from evaluation.clouds.notes import OnNote
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.trajectories import read_poses, read_quaternions
-from evaluation.real import image_sequences, sessions
+from evaluation.real import image_sequences, session_tables
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.pair import NamedDrive
 
 # Folders that other modules read.
-_OTHERS = (image_sequences.FOLDER, sessions.FOLDER)
+_OTHERS = (image_sequences.FOLDER, session_tables.FOLDER)
 # Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0
 
@@ -177,7 +177,7 @@ class DataSetSource:
 
     def __call__(self) -> Drive:
         files = listed(self.folder, self.data_set.scans)
-        return _open(self.folder, self.data_set, files, self.columns)
+        return _open_files(self.folder, self.data_set, files, self.columns)
 
     def identity(self) -> list[list]:
         """Returns what identifies the data set: its name and its files."""
@@ -249,7 +249,7 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     return found
 
 
-def _open(
+def _open_files(
     folder: Path, one: DataSet, files: Sequence[Path], columns: int | None
 ) -> Drive:
     if one.poses == "drive":

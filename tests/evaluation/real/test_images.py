@@ -20,7 +20,7 @@ from evaluation.real.image_sequences import (
     open_images,
     open_sequences,
 )
-from evaluation.real.measuring import judge_scans
+from evaluation.real.judge_task import judge_scans
 from evaluation.results.table import QueryRows, Results
 
 # Heading, x and y of each image: the second half passes the places of the first

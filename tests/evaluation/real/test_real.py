@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import choose_cluster
 from cns_drake.base.jobs.step import Reporter
 from evaluation.real import data_sets
-from evaluation.real.measuring import measure_real
+from evaluation.real.real_study import measure_real
 from evaluation.results.table import QueryRows, Results
 from evaluation.study import engine
 

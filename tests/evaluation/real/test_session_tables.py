@@ -5,7 +5,7 @@ from PIL import Image
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.real.sessions import draw_sessions, read_sessions
+from evaluation.real.session_tables import draw_sessions, read_sessions
 from evaluation.results.table import Results
 
 CURVE = "days,r1,low,high,remark\n446,0.75,0.74,0.77,\n20,0.83,0.82,0.84,snow\n"

@@ -50,10 +50,10 @@ def read_sessions(folder: Path, experiment: str) -> list[Row]:
     files = listed(folder, "*.csv")
     if not files:
         raise InputError(f"{folder}: no table (*.csv) in it")
-    return [row for file in files for row in _rows(file, experiment)]
+    return [row for file in files for row in _read_rows(file, experiment)]
 
 
-def _rows(file: Path, experiment: str) -> list[Row]:
+def _read_rows(file: Path, experiment: str) -> list[Row]:
     found: dict[float, Row] = {}
     for line, cells in read_records(file, _COLUMNS):
         days, r1, low, high = (

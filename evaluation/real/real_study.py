@@ -9,16 +9,14 @@ is trained to distinguish each data set from simulated scans of the same model
 of LiDAR (see `evaluation.real.judge`).
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 import importlib.util
-import math
 from pathlib import Path
 from typing import Any
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.step import Reporter
 from evaluation.clouds.notes import OnNote
 from evaluation.localisation.settings import METHODS
 from evaluation.methods import MethodConfig, shipped_methods
@@ -33,27 +31,25 @@ from evaluation.real.image_sequences import (
     RADIUS,
     UNIT,
     ImageSequence,
-    ImageSource,
     open_images,
     open_sequences,
 )
-from evaluation.real.sessions import FOLDER as SESSIONS
-from evaluation.real.sessions import draw_sessions, read_sessions
+from evaluation.real.judge_task import JudgeTask
+from evaluation.real.session_tables import FOLDER as SESSIONS
+from evaluation.real.session_tables import draw_sessions, read_sessions
 from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     RECORDED_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.recognition.result_number import Number
 from evaluation.results.table import QueryRows, Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.engine import Engine
 from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.sources import DriveSource
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import SHIPPED, LocaliseTask
-from evaluation.study.tasks.pair import NamedDrive, Pair, Result
+from evaluation.study.tasks.pair import NamedDrive, Pair
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Task
 
@@ -71,10 +67,7 @@ _IMAGES = replace(
 # Name of the experiment.
 _NAME = "real"
 # More places than all drives have.
-_ALL = 10**9
-# Number of random samples of patches for the classifier; their AUCs differ by
-# up to 0.04.
-_DRAWS = 1
+_ALL_PLACES = 10**9
 
 
 def measure_real(
@@ -183,7 +176,7 @@ def _add_images(
     """
     if not sequences:
         return
-    is_judged = bool(made) and _has_judge(FOLDER, engine.on_note)
+    is_judged = bool(made) and _has_classifier(FOLDER, engine.on_note)
     able = [one for one in choices if one.make().sees_images]
     if unable := [one.name for one in choices if one not in able]:
         names = ", ".join(dict.fromkeys(unable))
@@ -264,14 +257,16 @@ def _add_unit(
         )
         if one.data_set.poses:
             jobs = _RealJobs.of(methods, (*elsewhere, *made), frozenset(made))
-            engine.add([_pair(one, own, own, here)], (), jobs, tasks)
+            engine.add([_data_set_pair(one, own, own, here)], (), jobs, tasks)
         if made and _can_be_judged(one, engine.on_note):
             simulated = NamedDrive("simulated", made[0].source)
             judged = _RealJobs.of((), made, frozenset(made))
-            engine.add([_pair(one, simulated, own)], (), judged, ["judge"])
+            engine.add(
+                [_data_set_pair(one, simulated, own)], (), judged, ["judge"]
+            )
 
 
-def _pair(
+def _data_set_pair(
     one: RealScans,
     database: NamedDrive,
     query: NamedDrive,
@@ -291,7 +286,7 @@ def _pair(
         query=query,
         way=database,
         protocol=_REAL,
-        distractors=_ALL,
+        distractors=_ALL_PLACES,
         beside=beside,
         leaves_out_itself=database == query,
         settings={} if is_usual else {"sensor_height": height},
@@ -302,10 +297,10 @@ def _can_be_judged(one: RealScans, on_note: OnNote) -> bool:
     if not one.data_set.whole:
         on_note(f"{one.name}: thinned scans, not judged")
         return False
-    return _has_judge(one.name, on_note)
+    return _has_classifier(one.name, on_note)
 
 
-def _has_judge(name: str, on_note: OnNote) -> bool:
+def _has_classifier(name: str, on_note: OnNote) -> bool:
     """Returns whether the classifier's package is there; if not, says so."""
     if importlib.util.find_spec("sklearn") is not None:
         return True
@@ -350,58 +345,3 @@ class _RealJobs(Jobs):
             protocol = _SIMULATED
         # Several pairs need the same places.
         return super().described(drive, role, protocol, needs, kept=True)
-
-
-class JudgeTask(Task):
-    """Measures how well a classifier tells real scans from simulated ones.
-
-    The simulated scans are those of the jobs' distractors.
-    """
-
-    name = "judge"
-
-    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
-        part = jobs.files.part("judge", pair.key)
-        made = tuple(one.source for one in jobs.distractors)
-        return (jobs.add(part, judge_scans, (pair.query.source, made)),)
-
-    def numbers(
-        self, found: dict[str, Any] | None, before: Any | None
-    ) -> Iterator[Number]:
-        if found is None:
-            return
-        for group, auc in found["auc"].items():
-            values = {"auc": auc, "auc_control": found["control"][group]}
-            for name, value in values.items():
-                if not math.isnan(value):
-                    number = found["patches"][0]
-                    yield Number(group, False, name, value, n=number)
-
-
-def judge_scans(
-    reporter: Reporter, source: DriveSource, made: tuple[DriveSource, ...]
-) -> dict[str, Any] | None:
-    """Returns how well a classifier tells a data set from simulated scans.
-
-    Real images are compared with images that are made of the simulated scans.
-
-    Args:
-        reporter: reports notes.
-        source: the data set, or a sequence of images.
-        made: the simulated drives.
-
-    Returns:
-        The result of `evaluation.real.judge.judge_draws`; None for a data set
-        of a single place.
-    """
-    from evaluation.real import judge
-
-    drive = source()
-    is_of_images = isinstance(source, ImageSource)
-    table = judge.image_table if is_of_images else judge.scan_table
-    places = judge.places_of([drive], table, reporter.note)
-    if len(places) < 2:
-        reporter.note(f"{drive.name}: one place, not judged")
-        return None
-    simulated = judge.places_of((one() for one in made), table, reporter.note)
-    return judge.judge_draws(places, simulated, _DRAWS)

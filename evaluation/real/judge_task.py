@@ -1,0 +1,74 @@
+"""The task `judge`: can a classifier tell real scans from simulated scans?"""
+
+from collections.abc import Iterator
+import math
+from typing import Any
+
+from cns_drake.base.jobs.step import Reporter
+from evaluation.real.image_sequences import (
+    ImageSource,
+)
+from evaluation.recognition.result_number import Number
+from evaluation.study.sources import DriveSource
+from evaluation.study.tasks.jobs import Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Task
+
+# Number of random samples of patches for the classifier; their AUCs differ by
+# up to 0.04.
+_DRAWS = 1
+
+
+class JudgeTask(Task):
+    """Measures how well a classifier tells real scans from simulated ones.
+
+    The simulated scans are those of the jobs' distractors.
+    """
+
+    name = "judge"
+
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+        part = jobs.files.part("judge", pair.key)
+        made = tuple(one.source for one in jobs.distractors)
+        return (jobs.add(part, judge_scans, (pair.query.source, made)),)
+
+    def numbers(
+        self, found: dict[str, Any] | None, before: Any | None
+    ) -> Iterator[Number]:
+        if found is None:
+            return
+        for group, auc in found["auc"].items():
+            values = {"auc": auc, "auc_control": found["control"][group]}
+            for name, value in values.items():
+                if not math.isnan(value):
+                    number = found["patches"][0]
+                    yield Number(group, False, name, value, n=number)
+
+
+def judge_scans(
+    reporter: Reporter, source: DriveSource, made: tuple[DriveSource, ...]
+) -> dict[str, Any] | None:
+    """Returns how well a classifier tells a data set from simulated scans.
+
+    Real images are compared with images that are made of the simulated scans.
+
+    Args:
+        reporter: reports notes.
+        source: the data set, or a sequence of images.
+        made: the simulated drives.
+
+    Returns:
+        The result of `evaluation.real.judge.judge_draws`; None for a data set
+        of a single place.
+    """
+    from evaluation.real import judge
+
+    drive = source()
+    is_of_images = isinstance(source, ImageSource)
+    table = judge.image_table if is_of_images else judge.scan_table
+    places = judge.places_of([drive], table, reporter.note)
+    if len(places) < 2:
+        reporter.note(f"{drive.name}: one place, not judged")
+        return None
+    simulated = judge.places_of((one() for one in made), table, reporter.note)
+    return judge.judge_draws(places, simulated, _DRAWS)
