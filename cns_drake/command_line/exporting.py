@@ -435,11 +435,17 @@ def _write_training_data(
 
     tested = [load_scenario(name) for name in held_out]
     taken = {one.name for one in tested}
+    settings = pair_export.ExportOptions(
+        "overlap" if layout == Format.OVERLAP else "pointnetvlad",
+        spacing,
+        num_scans,
+        max_range,
+    )
     paths = pair_export.export_pairs(
         [one for one in learned if one.name not in taken],
         tested,
         output,
-        pair_export.ExportOptions(layout.value, spacing, num_scans, max_range),
+        settings,
         cluster,
         note,
     )
