@@ -100,7 +100,14 @@ def load_world(
     parser = Parser(plant)
     notes = parse_world(parser, sdf, [Path(one) for one in model_paths])
     _leave_out(scene_graph, source, sdf, without)
-    found = _check_visible(scene_graph, sdf, notes)
+    found = _visible_structures(scene_graph)
+    if not found:
+        left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
+        raise InputError(
+            f"{sdf}: the world has no visuals, and so no geometry that a "
+            f"LiDAR can see{left_out and f' ({left_out})'}"
+        )
+    _check_shapes(scene_graph, sdf)
     notes += _mesh_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
@@ -111,10 +118,19 @@ def load_world(
     table = StructureTable(())
     if structures is not None or is_there(file):
         table = load_structure_table(file)
-        notes += _mismatches(file, {entry.name for entry in table}, found)
+        notes += _mismatch_notes(file, {entry.name for entry in table}, found)
     with errors_at(sdf):
         table = table.completed(found)
     return World(scene_graph, plant, vehicle_model, table, notes)
+
+
+def structures_in(world: World) -> set[str]:
+    """Returns the names of the structures of a world."""
+    inspector = world.scene_graph.model_inspector()
+    return {
+        structure_name(inspector.GetName(geometry_id))
+        for geometry_id in inspector.GetAllGeometryIds()
+    }
 
 
 def _leave_out(
@@ -149,24 +165,27 @@ def _read_names(scene_graph: SceneGraph, sdf: Path) -> dict[GeometryId, str]:
     return names
 
 
-def _check_visible(
-    scene_graph: SceneGraph, sdf: Path, notes: tuple[str, ...]
-) -> set[str]:
-    """Checks what a LiDAR can see; returns the names of visible structures."""
+def _visible_structures(scene_graph: SceneGraph) -> set[str]:
+    """Returns the names of structures that a LiDAR can see."""
     inspector = scene_graph.model_inspector()
-    structures = set()
+    return {
+        structure_name(inspector.GetName(geometry_id))
+        for geometry_id in inspector.GetAllGeometryIds(Role.kPerception)
+    }
+
+
+def _check_shapes(scene_graph: SceneGraph, sdf: Path) -> None:
+    """Checks that no shape that a LiDAR can see is too large.
+
+    Raises:
+        InputError: a shape is too large.
+    """
+    inspector = scene_graph.model_inspector()
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
-        name = inspector.GetName(geometry_id)
-        structures.add(structure_name(name))
         with errors_at(sdf):
-            check_shape(name, inspector.GetShape(geometry_id))
-    if not structures:
-        left_out = "; ".join(note.removeprefix(f"{sdf}: ") for note in notes)
-        raise InputError(
-            f"{sdf}: the world has no visuals, and so no geometry that a "
-            f"LiDAR can see{left_out and f' ({left_out})'}"
-        )
-    return structures
+            check_shape(
+                inspector.GetName(geometry_id), inspector.GetShape(geometry_id)
+            )
 
 
 def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
@@ -186,12 +205,17 @@ def _mesh_notes(scene_graph: SceneGraph) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _mismatches(
+def _mismatch_notes(
     table: Path, listed: set[str], found: set[str]
 ) -> tuple[str, ...]:
-    """Returns a note if a table lacks some of the structures.
+    """Returns a note if names in the table and in the world differ.
 
-    Rows without a structure are normal: another stage may have it.
+    Rows without a structure are normal: another stage may have the structure.
+
+    Args:
+        table: file of the table.
+        listed: names in the table.
+        found: names in the world.
     """
     unlabelled, unused = sorted(found - listed), sorted(listed - found)
     if not (unlabelled and unused):
@@ -203,12 +227,3 @@ def _mismatches(
         " <structure>/<part> is of <structure>, one without a slash of its"
         " model",
     )
-
-
-def structures_in(world: World) -> set[str]:
-    """Returns the names of the structures of a world."""
-    inspector = world.scene_graph.model_inspector()
-    return {
-        structure_name(inspector.GetName(geometry_id))
-        for geometry_id in inspector.GetAllGeometryIds()
-    }
