@@ -1,1 +1,1 @@
-"""Scenario files, which describe drives, and families of scenarios."""
+"""Scenarios, which describe drives; their files, and plans of drives."""
