@@ -13,7 +13,7 @@ from cns_drake.city.geometry import Mesh, MeshShape
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 
 def cropped_city(
@@ -35,7 +35,7 @@ def cropped_city(
         raise InputError("--within: no drive was found; give one with --along")
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
-    changed: dict[Imported, Imported | None] = {}
+    changed: dict[ImportedStructure, ImportedStructure | None] = {}
     for one in city.kept:
         corners = one.triangles.reshape(-1, 3)
         if not _are_near(corners[None], paths, distance)[0]:
@@ -65,8 +65,8 @@ def _are_near(
 
 
 def _cropped_terrain(
-    one: Imported, paths: BaseGeometry, distance: float
-) -> Imported:
+    one: ImportedStructure, paths: BaseGeometry, distance: float
+) -> ImportedStructure:
     """Returns the part of a terrain that is near paths."""
     meshes = {}
     for name, mesh in one.structure.model.meshes.items():

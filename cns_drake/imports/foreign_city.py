@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.streets import Street, StreetPlaces
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class ForeignCity:
         small_objects: small objects, which are placed in a dressed city only.
     """
 
-    structures: list[Imported]
+    structures: list[ImportedStructure]
     origin: tuple[float, ...]
     reference_system: str
     faults: ImportFaults

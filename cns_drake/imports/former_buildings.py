@@ -6,7 +6,7 @@ import numpy as np
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Two buildings stand in the same place if they share this much of the smaller
 # outline.
@@ -14,8 +14,8 @@ _SHARED = 0.3
 
 
 def with_former_buildings(
-    former: Sequence[Imported], others: Iterable[Imported]
-) -> list[Imported]:
+    former: Sequence[ImportedStructure], others: Iterable[ImportedStructure]
+) -> list[ImportedStructure]:
     """Returns the structures of a past city: `others`, and former buildings.
 
     Where a building of today stands in the place of a former building, the
@@ -29,8 +29,8 @@ def with_former_buildings(
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]
     tree = STRtree([one.structure.model.footprint for one in later])
-    stood: list[Imported] = []
-    replaced: set[Imported] = set()
+    stood: list[ImportedStructure] = []
+    replaced: set[ImportedStructure] = set()
     for one in former:
         outline = one.structure.model.footprint
         there = [

@@ -19,7 +19,7 @@ from cns_drake.city.geometry import (
     hull_of,
 )
 from cns_drake.imports.faces import joined_triangles
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.imports.surface_samples import surface_samples
 
 # Cell size of a guessed ground [m].
@@ -145,7 +145,7 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def ground_of(
-    structures: Sequence[Imported], below_bridges: bool = False
+    structures: Sequence[ImportedStructure], below_bridges: bool = False
 ) -> Ground:
     """Returns the ground of a city: its terrain or, without one, a guess.
 
@@ -178,7 +178,7 @@ def ground_of(
 
 
 def ground_structures(
-    structures: Sequence[Imported], ground: Ground
+    structures: Sequence[ImportedStructure], ground: Ground
 ) -> list[Structure]:
     """Returns the guessed ground of a city, as a list of one structure.
 

@@ -13,7 +13,7 @@ from cns_drake.city.geometry import MeshShape
 from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.named_randomness import random_share
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Buildings within this distance of each other belong to one block [m].
 _BLOCK_WITHIN = 4.0
@@ -63,7 +63,7 @@ def grow(
     }
     first = [new for one in last if (new := variants.get(one, one)) is not None]
     missing = [one.structure.name for one in chosen if one not in lower]
-    stood: list[Imported] = []
+    stood: list[ImportedStructure] = []
     if city.gone:
         before = first
         first = with_former_buildings(city.gone, before)
@@ -92,8 +92,8 @@ def grow(
 
 
 def _heights_of_lower(
-    chosen: Sequence[Imported], seed: int
-) -> dict[Imported, float]:
+    chosen: Sequence[ImportedStructure], seed: int
+) -> dict[ImportedStructure, float]:
     """Returns building -> share of its height, for buildings that are lower."""
     least, most = _LOWER_HEIGHTS
     heights = {}
@@ -109,18 +109,18 @@ def _heights_of_lower(
 
 
 def _choose_buildings(
-    buildings: Sequence[Imported], number: int, seed: int
-) -> list[Imported]:
+    buildings: Sequence[ImportedStructure], number: int, seed: int
+) -> list[ImportedStructure]:
     """Returns `number` random buildings, about half of them block by block."""
-    blocks: dict[int, list[Imported]] = {}
+    blocks: dict[int, list[ImportedStructure]] = {}
     for block, one in zip(_block_numbers(buildings), buildings, strict=True):
         blocks.setdefault(block, []).append(one)
 
-    def lot_of_block(members: list[Imported]) -> float:
+    def lot_of_block(members: list[ImportedStructure]) -> float:
         name = min(one.structure.name for one in members)
         return random_share(seed, "block", name)
 
-    chosen: list[Imported] = []
+    chosen: list[ImportedStructure] = []
     for members in sorted(blocks.values(), key=lot_of_block):
         if len(chosen) >= _SHARE_BY_BLOCK * number:
             break
@@ -133,7 +133,7 @@ def _choose_buildings(
     return chosen + singles[: number - len(chosen)]
 
 
-def _block_numbers(buildings: Sequence[Imported]) -> np.ndarray:
+def _block_numbers(buildings: Sequence[ImportedStructure]) -> np.ndarray:
     """Returns (N,) the number of the block to which each building belongs."""
     if not buildings:
         return np.zeros(0, dtype=int)
@@ -147,7 +147,9 @@ def _block_numbers(buildings: Sequence[Imported]) -> np.ndarray:
     return np.asarray(block)
 
 
-def _lowered_building(one: Imported, share: float, taken: set[str]) -> Imported:
+def _lowered_building(
+    one: ImportedStructure, share: float, taken: set[str]
+) -> ImportedStructure:
     """Returns a building cut to a share of its height, with a new name."""
     suffix = "_lower"
     while f"{one.structure.name}{suffix}" in taken:

@@ -33,7 +33,7 @@ from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
 from cns_drake.imports.staged_city import StagedCity, stage_city
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoint_file import read_waypoints
@@ -136,8 +136,8 @@ def _write_lanes(
     draft: Path,
     source: Path,
     city: ForeignCity,
-    bare: Sequence[Imported],
-    kept: Sequence[Imported],
+    bare: Sequence[ImportedStructure],
+    kept: Sequence[ImportedStructure],
     drives: Sequence[WaypointRoute],
     side: DriveOn,
 ) -> None:

@@ -17,7 +17,7 @@ from cns_drake.imports.colours import WATER
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130
@@ -30,7 +30,7 @@ _ROOM_ALPHA = 0.6
 
 def draw_overview(
     path: Path,
-    structures: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
     space: FreeSpace | None,
     drives: Sequence[WaypointRoute],
 ) -> None:
@@ -80,7 +80,7 @@ def draw_overview(
 
 
 def _draw_structures(
-    axes: Axes, structures: Sequence[Imported]
+    axes: Axes, structures: Sequence[ImportedStructure]
 ) -> dict[str, Artist]:
     """Draws structures, the ground first; returns the legend."""
     legend: dict[str, Artist] = {}
@@ -157,7 +157,7 @@ def _draw_drives(
     return legend
 
 
-def _colour_of(one: Imported) -> tuple[float, float, float]:
+def _colour_of(one: ImportedStructure) -> tuple[float, float, float]:
     part = one.structure.model.parts[0]
     if one.structure.semantic_class == "vegetation":
         return CLASS_RGB["vegetation"]

@@ -13,7 +13,7 @@ from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.former_buildings import with_former_buildings
 from cns_drake.imports.options import ImportOptions
-from cns_drake.imports.structures import Imported, boxes_of
+from cns_drake.imports.structures import ImportedStructure, boxes_of
 from cns_drake.scene.labels import MAX_INSTANCE
 
 # Greatest distance of a structure from the middle of a city [m].
@@ -33,28 +33,28 @@ class StagedCity:
             of the import do not include `grow`.
     """
 
-    standing: dict[str, list[Imported]]
-    kept: list[Imported]
+    standing: dict[str, list[ImportedStructure]]
+    kept: list[ImportedStructure]
     undated: int
     dated: int
-    gone: Sequence[Imported] = ()
+    gone: Sequence[ImportedStructure] = ()
 
     def replaced(
-        self, changed: Mapping[Imported, Imported | None]
+        self, changed: Mapping[ImportedStructure, ImportedStructure | None]
     ) -> StagedCity:
         """Returns the city with some structures replaced or removed.
 
         `changed` maps a structure to its replacement, or to None to remove it.
         """
 
-        def new(some: Iterable[Imported]) -> list[Imported]:
+        def new(some: Iterable[ImportedStructure]) -> list[ImportedStructure]:
             others = (changed.get(one, one) for one in some)
             return [one for one in others if one is not None]
 
         standing = {stage: new(some) for stage, some in self.standing.items()}
         return replace(self, standing=standing, kept=new(self.kept))
 
-    def with_structures(self, added: Sequence[Imported]) -> StagedCity:
+    def with_structures(self, added: Sequence[ImportedStructure]) -> StagedCity:
         """Returns the city with more structures, which exist in all stages."""
         standing = {
             stage: [*some, *added] for stage, some in self.standing.items()
@@ -88,7 +88,7 @@ def stage_city(
         ]
         for k, stage in enumerate(stage_names(options.years))
     }
-    gone: list[Imported] = []
+    gone: list[ImportedStructure] = []
     if options.grow is not None:
         (today,) = map(set, standing.values())
         gone = [one for one in found if one not in today]
@@ -121,12 +121,14 @@ def stage_city(
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
 
 
-def _is_here(one: Imported) -> bool:
+def _is_here(one: ImportedStructure) -> bool:
     """Returns whether a structure, once built, still stands today."""
     return not one.is_gone and stands_today(one.until)
 
 
-def _stands_at(one: Imported, stage: int, options: ImportOptions) -> bool:
+def _stands_at(
+    one: ImportedStructure, stage: int, options: ImportOptions
+) -> bool:
     """Returns whether a structure stands at a stage, given by its number.
 
     A structure that was demolished at an unknown date stands at all stages
@@ -166,7 +168,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
     return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
 
-def _without_outliers(city: ForeignCity) -> list[Imported]:
+def _without_outliers(city: ForeignCity) -> list[ImportedStructure]:
     """Returns the structures of a city without those far from its middle."""
     if not city.structures:
         return []
@@ -184,7 +186,7 @@ def _without_outliers(city: ForeignCity) -> list[Imported]:
     return kept
 
 
-def _why_never(one: Imported, options: ImportOptions) -> str:
+def _why_never(one: ImportedStructure, options: ImportOptions) -> str:
     """Returns why a building stands at no stage, in words."""
     first = options.years[0] if options.years else None
     if one.until is not None and (first is None or one.until <= first):
@@ -198,7 +200,7 @@ def _why_never(one: Imported, options: ImportOptions) -> str:
     return "that stood between stages"
 
 
-def _may_be_missing(one: Imported) -> bool:
+def _may_be_missing(one: ImportedStructure) -> bool:
     """Returns whether a structure may be missing at some stages.
 
     Of the structures without a year, only buildings may.

@@ -22,7 +22,7 @@ _GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
 # Compared by identity, because there are thousands and comparing meshes takes
 # long.
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedStructure:
     """A structure of an imported city, made from an object of its file.
 
     Attributes:
@@ -77,7 +77,7 @@ def make_imported(
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
     narrower: str = "",
-) -> Imported:
+) -> ImportedStructure:
     """Returns a structure made of triangles in the world.
 
     Args:
@@ -114,7 +114,9 @@ def make_imported(
         (0.0, 0.0, 0.0),
         kind=kind_word(narrower or kind),
     )
-    return Imported(structure, kind, year, triangles, until, tags or {}, lod)
+    return ImportedStructure(
+        structure, kind, year, triangles, until, tags or {}, lod
+    )
 
 
 def kind_word(text: str) -> str:
@@ -126,7 +128,7 @@ def kind_word(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", words).strip("_")
 
 
-def boxes_of(structures: Sequence[Imported]) -> np.ndarray:
+def boxes_of(structures: Sequence[ImportedStructure]) -> np.ndarray:
     """Returns the bounding boxes (N, 2, 3) of structures [m].
 
     Each box is given by its least and its greatest coordinates.

@@ -23,7 +23,7 @@ from cns_drake.imports.cityjson.reading import read_cityjson
 from cns_drake.imports.faces import face_triangles, joined_triangles
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
@@ -82,7 +82,7 @@ def import_structures(
     origin: np.ndarray,
     lod: float | None,
     year_attribute: str | None,
-) -> list[Imported]:
+) -> list[ImportedStructure]:
     """Returns a structure for each object that has a surface.
 
     A building and its parts become one structure.

@@ -11,7 +11,7 @@ from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import is_upright
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.named_randomness import random_generator
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # A building whose feet are farther from the ground than this was sunk into it
 # [m].
@@ -33,7 +33,7 @@ class BareBuilding:
         rng: random generator for the details.
     """
 
-    one: Imported
+    one: ImportedStructure
     walls: np.ndarray
     roof: np.ndarray
     rest: np.ndarray
@@ -44,7 +44,7 @@ class BareBuilding:
 
 
 def split_buildings(
-    buildings: Sequence[Imported], ground: Ground, seed: int
+    buildings: Sequence[ImportedStructure], ground: Ground, seed: int
 ) -> list[BareBuilding]:
     """Returns buildings, split into walls, roof and other surfaces.
 
@@ -66,7 +66,10 @@ def split_buildings(
 
 
 def _split_building(
-    one: Imported, ground: Ground, seed: int, known: Style | None = None
+    one: ImportedStructure,
+    ground: Ground,
+    seed: int,
+    known: Style | None = None,
 ) -> BareBuilding:
     """Returns a building, split; `known` is the style of its original."""
     surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}

@@ -30,7 +30,7 @@ from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import Imported, to_mesh
+from cns_drake.imports.structures import ImportedStructure, to_mesh
 
 # Walls farther than this from all drives get no windows [m].
 _WALLS_WITHIN = 60.0
@@ -62,18 +62,18 @@ class DressedBuildings:
             which the file determines it.
     """
 
-    buildings: Mapping[Imported, Imported]
+    buildings: Mapping[ImportedStructure, ImportedStructure]
     at_random: Counter[str]
     by_file: Counter[str]
 
 
 def dress_buildings(
-    structures: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
     drives: Sequence[WaypointRoute],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
-    always: Collection[Imported] | None = None,
+    always: Collection[ImportedStructure] | None = None,
     paving: np.ndarray = _NO_TRIANGLES,
 ) -> DressedBuildings:
     """Returns the buildings of a city with windows, doors and shops.

@@ -24,7 +24,7 @@ from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import Ground, ground_structures
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.scene.labels import MAX_INSTANCE
 
 # Colour of paving stones.
@@ -139,12 +139,12 @@ def dress_city(
 
 
 def _laid_paving(
-    kept: Sequence[Imported],
+    kept: Sequence[ImportedStructure],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
     ground: Ground,
     is_paved: bool,
-) -> list[Imported]:
+) -> list[ImportedStructure]:
     """Returns carriageways and sidewalks that the file does not have.
 
     Args:
@@ -154,7 +154,7 @@ def _laid_paving(
         ground: the ground.
         is_paved: whether ground of unknown kind is paved.
     """
-    laid: list[Imported] = []
+    laid: list[ImportedStructure] = []
     if drives:
         laid += missing_sidewalks(kept, streets, drives)
         classes = {one.structure.semantic_class for one in kept}
@@ -165,7 +165,7 @@ def _laid_paving(
     return laid
 
 
-def is_dense(structures: Sequence[Imported]) -> bool:
+def is_dense(structures: Sequence[ImportedStructure]) -> bool:
     """Returns whether buildings cover at least 12 % of their convex hull."""
     outlines = [
         one.structure.model.footprint

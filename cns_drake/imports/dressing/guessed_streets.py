@@ -20,7 +20,7 @@ from cns_drake.imports.faces import flat_surface, joined_triangles, parts_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Half the width of a street of unknown width [m].
 HALF_STREET = 3.9
@@ -33,10 +33,10 @@ _ABOVE_GROUND = 0.02
 
 
 def guessed_streets(
-    structures: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
     drives: Sequence[WaypointRoute],
     ground: Ground,
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields structures for a carriageway and sidewalks along drives.
 
     Use this function for a city whose file has no roads: the drives are assumed

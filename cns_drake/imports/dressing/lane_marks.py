@@ -9,7 +9,7 @@ from shapely.geometry import LineString, MultiLineString
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.streets import Street, ends_at_nodes
-from cns_drake.imports.structures import Imported, make_imported
+from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # Streets get marks if they are this close to drives [m].
 _MARKS_WITHIN = 80.0
@@ -31,7 +31,7 @@ _BEFORE_JUNCTION = 4.0
 
 def lane_marks(
     streets: Sequence[Street], drives: Sequence[WaypointRoute]
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields dashed lines in the middle of the larger streets near drives.
 
     There must be at least one drive, and the ground must be level.

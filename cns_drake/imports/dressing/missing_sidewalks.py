@@ -20,7 +20,7 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Streets of these kinds have sidewalks unless their tags say otherwise.
 _WITH_SIDEWALKS = (
@@ -33,10 +33,10 @@ _WITH_SIDEWALKS = (
 
 
 def missing_sidewalks(
-    structures: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields sidewalks for streets whose tags do not mention sidewalks.
 
     Only the larger streets within 80 m of a drive get sidewalks. The ground

@@ -13,7 +13,7 @@ from cns_drake.imports.dressing.street_room import StreetRoom
 from cns_drake.imports.dressing.street_tables import TABLES
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Cars farther than this from all drives are left out [m].
 ROWS_WITHIN = 70.0
@@ -102,7 +102,7 @@ def park_along(
             s += float(rng.uniform(*_CAR_EVERY))
 
 
-def fill_car_park(room: StreetRoom, one: Imported, seed: int) -> None:
+def fill_car_park(room: StreetRoom, one: ImportedStructure, seed: int) -> None:
     """Parks cars at random along the longer sides of a car park.
 
     Args:

@@ -19,7 +19,7 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.streets import KERB_HEIGHT
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Width of the widest gap that is paved [m].
 _WIDEST_GAP = 3.0
@@ -34,8 +34,8 @@ _SQUARE = 50.0
 
 
 def paved_gaps(
-    structures: Sequence[Imported], drives: Sequence[WaypointRoute]
-) -> Iterator[Imported]:
+    structures: Sequence[ImportedStructure], drives: Sequence[WaypointRoute]
+) -> Iterator[ImportedStructure]:
     """Yields sidewalks that fill gaps beside existing sidewalks.
 
     A gap is unpaved ground at most 3 m wide, such as the strip between a
@@ -94,6 +94,6 @@ def paved_gaps(
         yield paved_structure(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
-def _flat_outline(one: Imported) -> BaseGeometry:
+def _flat_outline(one: ImportedStructure) -> BaseGeometry:
     """Returns the area of a level structure, seen from above."""
     return shapely.coverage_union_all(triangles_from_above([one]))

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry import looks_up, turned_up
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles, parts_of
-from cns_drake.imports.structures import Imported, make_imported
+from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
@@ -20,8 +20,8 @@ GRID = 0.001
 
 
 def near_drives(
-    structures: Sequence[Imported], drives: Sequence[WaypointRoute]
-) -> list[Imported]:
+    structures: Sequence[ImportedStructure], drives: Sequence[WaypointRoute]
+) -> list[ImportedStructure]:
     """Returns the structures that are at most 80 m from a drive."""
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
@@ -34,7 +34,7 @@ def near_drives(
 
 def paved_structure(
     name: str, semantic_class: str, surface: np.ndarray
-) -> Imported:
+) -> ImportedStructure:
     """Returns a road or a sidewalk made of triangles (N, 3, 3) [m]."""
     kind = semantic_class.capitalize()
     return make_imported(name, semantic_class, kind, {"surface": surface}, {})
@@ -51,7 +51,7 @@ def area_outside(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
 
 
 def triangles_from_above(
-    structures: Sequence[Imported], *, with_downward: bool = True
+    structures: Sequence[ImportedStructure], *, with_downward: bool = True
 ) -> np.ndarray:
     """Returns triangles of structures as polygons (N,), seen from above [m].
 

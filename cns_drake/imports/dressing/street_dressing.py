@@ -32,7 +32,7 @@ from cns_drake.imports.foreign_city import SmallObject
 from cns_drake.imports.ground import Ground
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Objects farther than this from all drives are left out [m].
 _OBJECTS_WITHIN = 100.0
@@ -43,7 +43,7 @@ _SMALL_EVERY = 22.0
 
 
 def dress_streets(
-    structures: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
     small_objects: Sequence[SmallObject],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
@@ -113,10 +113,10 @@ def _streets_to_dress(
 
 def _off_carriageway(
     room: StreetRoom,
-    tree: Imported,
+    tree: ImportedStructure,
     streets: Sequence[Street],
     courses: Sequence[LineString],
-) -> Imported:
+) -> ImportedStructure:
     """Returns a tree, moved off the carriageway and its kerb if necessary."""
     structure = tree.structure
     xy = np.array(structure.xyz[:2])

@@ -24,7 +24,7 @@ from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Least distance of objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
@@ -59,9 +59,11 @@ class PlacedObjects:
             would block a drive or stand in a wall or another object.
     """
 
-    structures: list[Imported] = field(default_factory=list)
+    structures: list[ImportedStructure] = field(default_factory=list)
     from_file: set[str] = field(default_factory=set)
-    moved: dict[Imported, Imported] = field(default_factory=dict)
+    moved: dict[ImportedStructure, ImportedStructure] = field(
+        default_factory=dict
+    )
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
     at_random: Counter[str] = field(default_factory=Counter)
@@ -79,7 +81,7 @@ class StreetRoom:
 
     def __init__(
         self,
-        structures: Sequence[Imported],
+        structures: Sequence[ImportedStructure],
         drives: Sequence[WaypointRoute],
         ground: Ground,
         bottom: Sequence[Structure],
@@ -100,7 +102,9 @@ class StreetRoom:
         self.paths = MultiLineString([drive.path for drive in drives])
         shapely.prepare(self.paths)
 
-        def triangles(is_wanted: Callable[[Imported], bool]) -> np.ndarray:
+        def triangles(
+            is_wanted: Callable[[ImportedStructure], bool],
+        ) -> np.ndarray:
             return joined_triangles(
                 o.triangles for o in structures if is_wanted(o)
             )
@@ -122,7 +126,7 @@ class StreetRoom:
         """Returns whether a line (N, 2) is within a distance of a drive [m]."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
-    def keep_tree(self, tree: Imported) -> None:
+    def keep_tree(self, tree: ImportedStructure) -> None:
         """Marks the place of a tree's trunk as occupied."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK_RADIUS, 4))
@@ -194,7 +198,7 @@ class StreetRoom:
         structure = replace(structure, name=name, xyz=(x, y, z))
         triangles = _bounding_triangles(footprint, z)
         self.found.structures.append(
-            Imported(structure, title_of(kind), None, triangles)
+            ImportedStructure(structure, title_of(kind), None, triangles)
         )
         if kind == "lamp_post":
             self.lamps.append((x, y))

@@ -10,7 +10,7 @@ from shapely import STRtree
 
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
-from cns_drake.imports.structures import Imported, boxes_of
+from cns_drake.imports.structures import ImportedStructure, boxes_of
 from cns_drake.imports.surface_samples import surface_samples
 
 CELL = 1.0  # [m]
@@ -89,7 +89,7 @@ class FreeSpace:
 
 
 def find_free_space(
-    structures: Sequence[Imported], ground: Ground
+    structures: Sequence[ImportedStructure], ground: Ground
 ) -> FreeSpace:
     """Returns the space for a car that is free in all stages of a city.
 
@@ -137,7 +137,7 @@ def find_free_space(
     )
 
 
-def _is_water(one: Imported) -> bool:
+def _is_water(one: ImportedStructure) -> bool:
     return one.kind.startswith("Water")
 
 
@@ -157,7 +157,7 @@ def _covered_cells(
 
 
 def _blocked_by(
-    one: Imported, ground: Ground, window: _Window
+    one: ImportedStructure, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Returns the cells that a structure blocks, and the triangles that do.
 
@@ -209,7 +209,7 @@ def _largest_part_size(cells: np.ndarray) -> int:
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
-def _search_bounds(structures: Sequence[Imported]) -> _Window:
+def _search_bounds(structures: Sequence[ImportedStructure]) -> _Window:
     """Returns the corners of the area in which room is searched."""
     boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)

@@ -11,7 +11,7 @@ from cns_drake.city.geometry import Structure, polygons_of
 from cns_drake.imports import map_files, overview
 from cns_drake.imports.opendrive.town import Town
 from cns_drake.imports.report import ImportReport
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # About the radius of a tree's crown, in pictures [m].
@@ -103,7 +103,9 @@ def write_town(
     return report, sizes
 
 
-def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
+def _seen_from_above(
+    structures: Iterable[Structure],
+) -> Iterable[ImportedStructure]:
     """Yields the footprints of structures as flat triangles."""
     for one in structures:
         if one.semantic_class not in _SHOWN_CLASSES:
@@ -123,4 +125,6 @@ def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
         if corners:
             xy = np.array(corners)
             z = np.zeros((*xy.shape[:2], 1))
-            yield Imported(one, "", None, np.concatenate([xy, z], axis=2))
+            yield ImportedStructure(
+                one, "", None, np.concatenate([xy, z], axis=2)
+            )

@@ -11,7 +11,7 @@ from shapely.geometry import LineString
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.features import OsmWay
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
@@ -22,7 +22,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
 )
 from cns_drake.imports.streets import SIDEWALK_WIDTH
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Distance of a parapet from the edge of the street [m].
 _PARAPET_FROM_EDGE = 0.2
@@ -52,7 +52,7 @@ class Bridges:
         return self.over_streets | self.tunnels
 
 
-def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
+def bridges_of(ways: Iterable[OsmWay], local: LocalMetres) -> Bridges:
     """Returns the bridges and the tunnels among the ways of a file.
 
     Of two bridges that cross, the upper bridge counts as a bridge over another
@@ -97,8 +97,8 @@ def _height_rank(way: OsmWay) -> tuple[float, str]:
 
 
 def parapets(
-    ways: Iterable[OsmWay], bridges: Bridges, local: Local
-) -> Iterator[Imported]:
+    ways: Iterable[OsmWay], bridges: Bridges, local: LocalMetres
+) -> Iterator[ImportedStructure]:
     """Yields parapets along both sides of road bridges.
 
     Only bridges at the height of the surrounding ground get parapets.

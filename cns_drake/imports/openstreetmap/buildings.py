@@ -21,11 +21,11 @@ from cns_drake.imports.openstreetmap.building_tags import (
     why_absent,
 )
 from cns_drake.imports.openstreetmap.features import OsmArea, Tags
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.solids import extruded
-from cns_drake.imports.structures import Imported, make_imported
+from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # How the report counts buildings that are not made as in the file.
 TWICE = "building drawn twice, taken once"
@@ -85,12 +85,12 @@ def standing_buildings(
 
 def make_buildings(
     areas: Iterable[OsmArea],
-    local: Local,
+    local: LocalMetres,
     year_attribute: str | None,
     faults: ImportFaults,
     once: bool = False,
     passages: Sequence[Passage] = (),
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields buildings, made from outlines and building parts.
 
     Where a building has parts, the parts replace the outline.
@@ -146,7 +146,7 @@ def make_buildings(
 
 
 def _outlines_and_parts(
-    areas: Iterable[OsmArea], local: Local, faults: ImportFaults
+    areas: Iterable[OsmArea], local: LocalMetres, faults: ImportFaults
 ) -> tuple[list[_Block], list[_Block]]:
     """Returns the outlines of buildings, and the building parts, as solids."""
     outlines: list[_Block] = []

@@ -41,7 +41,7 @@ from cns_drake.imports.openstreetmap.element_kinds import (
 )
 from cns_drake.imports.openstreetmap.features import OsmArea, OsmFeatures
 from cns_drake.imports.openstreetmap.grounds import ground_areas
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.passages import (
     Passage,
@@ -60,7 +60,7 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
@@ -103,7 +103,7 @@ def import_openstreetmap(
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
-    local = Local(longitude, latitude)
+    local = LocalMetres(longitude, latitude)
     size = local.metres(high - low)
     if size.max() > _LARGEST:
         raise InputError(
@@ -165,7 +165,7 @@ def _used_buildings(features: OsmFeatures, dressed: bool) -> list[OsmArea]:
 def _count_walled_up(
     driven: Iterable[Street],
     buildings: Iterable[OsmArea],
-    local: Local,
+    local: LocalMetres,
     passages: Sequence[Passage],
     faults: ImportFaults,
 ) -> None:
@@ -230,7 +230,7 @@ def _bounds(
 
 def _count_unused(
     features: OsmFeatures,
-    found: Iterable[Imported],
+    found: Iterable[ImportedStructure],
     also: AbstractSet[str],
 ) -> None:
     """Counts, by kind, what in the file has no place in the city.
@@ -259,7 +259,9 @@ def _count_unused(
             features.faults.add(f"{kind}, left out", name)
 
 
-def _barriers(features: OsmFeatures, local: Local) -> Iterator[Imported]:
+def _barriers(
+    features: OsmFeatures, local: LocalMetres
+) -> Iterator[ImportedStructure]:
     openings = WayOpenings(features.ways, local)
     for way in features.ways:
         name, tags, line, _ = way
@@ -281,7 +283,9 @@ def _barriers(features: OsmFeatures, local: Local) -> Iterator[Imported]:
         yield from raised_structure(f"{kind}_{name}", look, [strip], where)
 
 
-def _trees(features: OsmFeatures, local: Local) -> Iterator[Imported]:
+def _trees(
+    features: OsmFeatures, local: LocalMetres
+) -> Iterator[ImportedStructure]:
     for name, tags, place in features.trees:
         if is_inside(tags):
             continue
@@ -300,4 +304,4 @@ def _trees(features: OsmFeatures, local: Local) -> Iterator[Imported]:
         structure = Structure(f"tree_{name}", "vegetation", model, place_W)
         trunk = Point(x, y).buffer(0.3, 2)
         walls, _ = extruded(trunk, 0.0, 2.0, name, ImportFaults())
-        yield Imported(structure, "Tree", None, walls)
+        yield ImportedStructure(structure, "Tree", None, walls)

@@ -8,9 +8,9 @@ from shapely.geometry import Polygon
 from cns_drake.imports import faces
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.openstreetmap.features import OsmFeatures
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, street_width
-from cns_drake.imports.structures import Imported, make_imported
+from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
@@ -20,7 +20,9 @@ _STRIPE_LENGTH = 3.0
 _STRIPE_HEIGHT = 0.01
 
 
-def crossing_stripes(features: OsmFeatures, local: Local) -> Iterator[Imported]:
+def crossing_stripes(
+    features: OsmFeatures, local: LocalMetres
+) -> Iterator[ImportedStructure]:
     """Yields the stripes of zebra crossings, slightly above their street."""
     marked = {number for number, tags in features.crossings if is_marked(tags)}
     for _, tags, line, nodes in features.ways:

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from cns_drake.imports.colours import LAWN, WATER, Rgb
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
 from cns_drake.imports.openstreetmap.ground_tags import area_kind, green_kind
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.looks import Look, flat_structure
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 _SAND: Rgb = (0.76, 0.68, 0.51)
 _GRAVEL: Rgb = (0.50, 0.47, 0.43)
@@ -37,8 +37,8 @@ WATER_LOOK = _LOOKS[0][0]
 
 
 def ground_areas(
-    features: OsmFeatures, local: Local, dressed: bool
-) -> Iterator[Imported]:
+    features: OsmFeatures, local: LocalMetres, dressed: bool
+) -> Iterator[ImportedStructure]:
     """Yields areas on the ground, such as lawns and water.
 
     If `dressed`, there are additional kinds of areas, such as sports grounds,

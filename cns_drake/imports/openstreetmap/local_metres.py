@@ -11,7 +11,7 @@ _SEMI_MAJOR = 6378137.0
 _FLATTENING = 1.0 / 298.257223563
 
 
-class Local:
+class LocalMetres:
     """Converts degrees to metres east and north of an origin.
 
     The constructor takes the longitude and latitude of the origin [deg]. An

@@ -12,7 +12,7 @@ from cns_drake.imports import faces
 from cns_drake.imports.colours import Rgb
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.solids import extruded
-from cns_drake.imports.structures import Imported, make_imported
+from cns_drake.imports.structures import ImportedStructure, make_imported
 
 
 class Look(NamedTuple):
@@ -36,7 +36,7 @@ class Look(NamedTuple):
 
 def flat_structure(
     name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields one level surface that fills areas; nothing for empty areas.
 
     Args:
@@ -61,7 +61,7 @@ def raised_structure(
     look: Look,
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields one solid on the ground that fills areas, if there are any.
 
     Args:
@@ -83,7 +83,7 @@ def raised_structure(
 
 def _structure_with_look(
     name: str, look: Look, part: str, triangles: Sequence[np.ndarray]
-) -> Imported:
+) -> ImportedStructure:
     surfaces = {part: np.concatenate(triangles)}
     material = "water" if look.kind == "WaterBody" else None
     finish = look.rgb and Finish(look.rgb, material)

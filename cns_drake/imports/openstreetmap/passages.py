@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.features import OsmWay, Tags
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import (
     has_tag,
     is_inside,
@@ -74,7 +74,7 @@ def _is_on_the_ground(tags: Tags) -> bool:
 
 
 def passages_of(
-    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
+    ways: Iterable[OsmWay], local: LocalMetres, faults: ImportFaults
 ) -> list[Passage]:
     """Returns the ways that lead through buildings or under roofs.
 
@@ -181,7 +181,7 @@ def count_walled_up(
 class WayOpenings:
     """Finds where ways lead through walls, fences and hedges."""
 
-    def __init__(self, ways: Iterable[OsmWay], local: Local):
+    def __init__(self, ways: Iterable[OsmWay], local: LocalMetres):
         used = [
             way
             for way in ways

@@ -14,9 +14,9 @@ from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.features import OsmWay
 from cns_drake.imports.openstreetmap.grounds import WATER_LOOK
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.looks import flat_structure
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 # A coastline that ends within the city is extended by this length [m].
 _COAST_EXTENSION = 3000.0
@@ -31,10 +31,10 @@ def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
 
 def sea(
     coasts: Sequence[OsmWay],
-    local: Local,
+    local: LocalMetres,
     limits: np.ndarray,
     faults: ImportFaults,
-) -> Iterator[Imported]:
+) -> Iterator[ImportedStructure]:
     """Yields the sea, to the right of the coastlines, if there are any.
 
     Args:

@@ -11,7 +11,7 @@ from shapely.geometry import LineString
 
 from cns_drake.imports.foreign_city import SmallObject
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag, is_inside
 
 # Names of directions, clockwise from north.
@@ -48,7 +48,7 @@ def object_kind(tags: Tags) -> str | None:
 
 
 def make_small_objects(
-    features: OsmFeatures, local: Local
+    features: OsmFeatures, local: LocalMetres
 ) -> Iterator[SmallObject]:
     """Yields small objects: those at nodes, and the trees of tree rows.
 

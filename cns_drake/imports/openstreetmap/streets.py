@@ -11,7 +11,7 @@ from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.looks import Look, flat_structure
 from cns_drake.imports.openstreetmap.speed_tags import speed_limit
 from cns_drake.imports.openstreetmap.tags import has_tag
@@ -29,15 +29,15 @@ from cns_drake.imports.streets import (
     Street,
     StreetPlaces,
 )
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 
 _ROAD = Look("Road", "road", None, 0.0)
 _WALK = Look("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 
 
 def street_surfaces(
-    features: OsmFeatures, local: Local, bridges: Bridges
-) -> Iterator[Imported]:
+    features: OsmFeatures, local: LocalMetres, bridges: Bridges
+) -> Iterator[ImportedStructure]:
     """Yields the carriageways, their sidewalks, and paths for people.
 
     Tunnels, and bridges over streets or railways, are left out and counted as
@@ -94,7 +94,7 @@ def _is_elsewhere(name: str, tags: Tags, bridges: Bridges) -> bool:
 
 
 def drivable_streets(
-    ways: Iterable[OsmWay], local: Local, bridges: Bridges
+    ways: Iterable[OsmWay], local: LocalMetres, bridges: Bridges
 ) -> list[Street]:
     """Returns the streets on which cars may drive.
 
@@ -119,7 +119,7 @@ def drivable_streets(
     return streets
 
 
-def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
+def street_places(features: OsmFeatures, local: LocalMetres) -> StreetPlaces:
     """Returns the crossings, traffic signals and footpaths of a file.
 
     `local` converts longitudes and latitudes to coordinates in metres.

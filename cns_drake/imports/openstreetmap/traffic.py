@@ -19,7 +19,7 @@ from cns_drake.imports.openstreetmap.street_lanes import (
 from cns_drake.imports.openstreetmap.walkways import find_walkways
 from cns_drake.imports.options import DriveOn
 from cns_drake.imports.streets import Street, StreetPlaces
-from cns_drake.imports.structures import Imported
+from cns_drake.imports.structures import ImportedStructure
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_joining import join_lanes
@@ -37,8 +37,8 @@ _HIGHEST_OBSTACLE = 3.5
 def lanes_of_streets(
     streets: Sequence[Street],
     places: StreetPlaces,
-    structures: Sequence[Imported],
-    added: Sequence[Imported],
+    structures: Sequence[ImportedStructure],
+    added: Sequence[ImportedStructure],
     drives: Sequence[WaypointRoute],
     drive_on: DriveOn,
 ) -> str | None:
@@ -96,7 +96,7 @@ def lanes_of_streets(
 
 
 def _sidewalks(
-    structures: Iterable[Imported], paths: BaseGeometry
+    structures: Iterable[ImportedStructure], paths: BaseGeometry
 ) -> BaseGeometry:
     """Returns the area of sidewalks near drives."""
     triangles = [
@@ -113,7 +113,7 @@ def _sidewalks(
 
 
 def _are_free(
-    traffic: StreetTraffic, structures: Iterable[Imported]
+    traffic: StreetTraffic, structures: Iterable[ImportedStructure]
 ) -> np.ndarray:
     """Returns (L,) bool: whether no structure of the file blocks a lane."""
     solid = [
@@ -145,7 +145,7 @@ def _driven_area(points: np.ndarray) -> BaseGeometry:
 
 
 def _in_the_way(
-    graph: lane_graph.LaneGraph, added: Sequence[Imported]
+    graph: lane_graph.LaneGraph, added: Sequence[ImportedStructure]
 ) -> list[str]:
     """Returns the names of objects that stand where vehicles drive."""
     if not added:

@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.local_metres import Local
+from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.solids import extruded
 
@@ -274,7 +274,7 @@ def test_places_are_as_exact_as_stated(distance, error, east):
         f"+proj=aeqd +lat_0={LAT} +lon_0={LON} +ellps=WGS84", "OGC:CRS84"
     )
     places = np.array([to_degrees.transform(x, y)])
-    off = Local(LON, LAT)(places)[0] - (x, y)
+    off = LocalMetres(LON, LAT)(places)[0] - (x, y)
     assert np.hypot(*off) == pytest.approx(error, rel=0.02)
 
 
