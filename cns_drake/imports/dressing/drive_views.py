@@ -19,14 +19,14 @@ _SPACING = 4.0
 _EYES = 2.0
 # A wall is looked at from this many of the nearest places.
 _NEAREST = 8
-# It is also looked at from about this many others.
+# A wall is also looked at from about this many other places.
 _OTHERS = 24
-# A wall is visible if one of its probes is. Probes are at these parts of its
-# length and height.
+# Probes of a wall are at these parts of its length and height. The wall is
+# visible if one of its probes is visible.
 _PROBES = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
 # Probes are this far in front of the wall [m].
 _BEFORE = 0.3
-# The highest probes are this far below its top [m].
+# The highest probes are this far below the top of the wall [m].
 _BELOW_TOP = 0.3
 
 
@@ -41,7 +41,8 @@ class DriveViews:
     ):
         """Prepares the places of at least one drive.
 
-        Solids (M, 3, 3) hide other things at all stages [m].
+        `solids` (M, 3, 3) are the triangles that occlude walls in all stages
+        [m].
         """
         paths = [LineString(drive.path) for drive in drives]
         self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
@@ -97,7 +98,11 @@ class DriveViews:
     def _facing_places(
         self, panel: Panel, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (K,) which places face a panel, and their distances [m]."""
+        """Returns the places that face a panel, and their distances.
+
+        The result is two arrays (K,): numbers of places at most `most` from the
+        panel, and their distances from the panel [m].
+        """
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
@@ -113,7 +118,10 @@ class DriveViews:
         return index[usable], distance[usable]
 
     def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-        """Returns (K,) which eyes (K, 3) see any of their probes (K, P, 3)."""
+        """Returns (K,) bool: whether eyes see any of their probes.
+
+        `eyes` (K, 3) and `probes` (K, P, 3) are places in W [m].
+        """
         if self._scene is None:
             return np.ones(len(eyes), dtype=bool)
         starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)

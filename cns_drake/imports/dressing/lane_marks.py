@@ -15,7 +15,8 @@ from cns_drake.imports.structures import ImportedStructure, make_imported
 _MARKS_WITHIN = 80.0
 # Streets get marks if they are at least this wide [m].
 _LEAST_MARKED = 6.0
-_CLASSES = ("primary", "secondary", "tertiary")
+# Streets of these kinds get marks, as do streets with two lanes.
+_MARKED_KINDS = ("primary", "secondary", "tertiary")
 # Length of a dash [m].
 _DASH = 3.0
 # Length of the gap after a dash [m].
@@ -45,7 +46,7 @@ def lane_marks(
             street.forward
             and street.backward
             and street.width >= _LEAST_MARKED
-            and (street.tags.get("highway") in _CLASSES or lanes == "2")
+            and (street.tags.get("highway") in _MARKED_KINDS or lanes == "2")
             and line.distance(paths) < _MARKS_WITHIN
         ):
             middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)

@@ -33,7 +33,8 @@ _STOREYS = (2.3, 6.0)
 # A building whose use is not tagged is a house if its area is smaller than this
 # [m^2].
 _LARGE_HOUSE = 260.0
-# Such a house is lower than this [m].
+# A building whose use is not tagged is a house only if it is lower than this
+# [m].
 _HIGH_HOUSE = 9.5
 # A building whose use is not tagged is an office if it is higher than this [m].
 _HIGH_BLOCK = 26.0

@@ -29,8 +29,8 @@ _MM = 1000.0
 _NO_AREA = 0.01
 # Greatest deviation of a wall from its plane [m].
 _MOST_BENT = 0.05
-# The same for a piece of a bent wall, which must leave no gap to the next piece
-# [m].
+# Greatest deviation of a piece of a bent wall from its plane, so that there is
+# no gap between the piece and the next one [m].
 _MOST_PIECE_BENT = 0.01
 
 

@@ -22,7 +22,8 @@ _KERB = 0.3
 _FROM_WALL = 2.5
 # Least distance from the middle of a path to the edge of a road [m].
 _FROM_EDGE = 1.6
-# Share of this distance that a car that follows the path may lose.
+# A car that follows a path may come closer to obstacles than the path by this
+# much [m].
 _SLACK = 0.6
 # Least distance from the middle of the car to an obstacle [m].
 _HALF_CAR = 1.1
@@ -31,8 +32,8 @@ _HALF_CAR = 1.1
 _HALF_STREET = 20.0
 # Distance between the samples of a surface [m].
 _SAMPLE_SPACING = 0.5
-# Room is searched within this distance of a city's middle, since no drive is
-# longer [m].
+# Free space is searched within this distance of a city's middle, because no
+# drive is longer [m].
 _FARTHEST = 1500.0
 # Least and greatest x and y (2,) [m].
 _Window = tuple[np.ndarray, np.ndarray]
@@ -159,9 +160,10 @@ def _covered_cells(
 def _blocked_by(
     one: ImportedStructure, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Returns the cells that a structure blocks, and the triangles that do.
+    """Returns the cells that a structure blocks, and the triangles that block.
 
-    The insides of buildings are blocked too.
+    The cells, given by row and column (N,) each, include the inside of a
+    building. The triangles are (M, 3, 3) [m].
     """
     corners = one.triangles.reshape(-1, 3)
     above = corners[:, 2] - ground.height(corners[:, :2])
@@ -210,7 +212,7 @@ def _largest_part_size(cells: np.ndarray) -> int:
 
 
 def _search_bounds(structures: Sequence[ImportedStructure]) -> _Window:
-    """Returns the corners of the area in which room is searched."""
+    """Returns the limits of the area in which free space is searched."""
     boxes = boxes_of(structures)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)

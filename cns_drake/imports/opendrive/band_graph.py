@@ -15,7 +15,8 @@ from cns_drake.traffic.lane_joining import usual_limit
 # A lane follows another one if its start is within this distance of the other's
 # end [m].
 _JOINED_WITHIN = 0.6
-# Their headings differ by less than this [rad].
+# A lane follows another one only if their headings differ by less than this
+# [rad].
 _ASTRAY = np.radians(20.0)
 # A lane at least this long may be a ring that follows itself [m].
 _SHORTEST_RING = 10.0
@@ -44,8 +45,8 @@ class BandGraph(way_graph.WayGraph):
             np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
             for line in self.lines
         ]
-        # A drive may use each of these only once: a road, or a lane of a
-        # junction.
+        # A drive may use each road only once. In a junction, each way is a
+        # road.
         self._roads = np.array([band.road.name for band in self.bands])
         before, after = self._followers(lengths)
         # The second lane of a pair follows the first one.

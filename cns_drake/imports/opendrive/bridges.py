@@ -12,8 +12,10 @@ from cns_drake.city.geometry import Structure
 from cns_drake.imports.opendrive.lanes import LaneBand, lane_class
 from cns_drake.imports.structures import make_imported
 
-_DECK_DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
-_LEAST_CROSS = 1e-6
+# The underside of a bridge is this far below its upper side [m].
+_DECK_DEPTH = np.array([0.0, 0.0, 0.8])
+# Triangles are dropped if twice their area is not greater than this [m^2].
+_LEAST_TWICE_AREA = 1e-6
 # How far the end of a bridge extends to both sides: wider than a kerb [m].
 _END_REACH = 0.2
 
@@ -42,7 +44,7 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
         edges = np.cross(
             triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
         )
-        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_CROSS]
+        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
         if len(triangles):
             yield make_imported(
                 f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}

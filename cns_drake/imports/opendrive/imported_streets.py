@@ -23,7 +23,9 @@ _SIMPLIFY = 0.005
 # Ground that lanes enclose beside a junction belongs to it up to this area
 # [m^2]; larger ground is an island.
 _LARGEST_GAP = 60.0
+# Classes of lanes at road level.
 _LEVEL_CLASSES = ("road", "parking", "sidewalk", "other-ground")
+# Lanes with less area are left out [m^2].
 _LEAST_AREA = 1e-6
 _NOWHERE = Polygon()
 _ISLAND_RGB = (0.55, 0.53, 0.50)

@@ -38,6 +38,7 @@ _GAP = 6.0
 _ASIDE = 0.12
 # Height of marks above the road [m].
 _ABOVE = 0.015
+# Shorter stretches of a line are left out [m].
 _SHORTEST = 0.05
 _COLOURS: dict[str, Rgb] = {
     "standard": WHITE,
@@ -48,6 +49,7 @@ _COLOURS: dict[str, Rgb] = {
     "green": (0.22, 0.48, 0.28),
     "orange": (0.85, 0.50, 0.15),
 }
+# Words of a mark's type for its lines.
 _STYLES = ("solid", "broken")
 
 

@@ -23,8 +23,11 @@ from cns_drake.imports.structures import make_imported
 
 # Things of these types are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
+# Lower objects are left out [m].
 _LEAST_HEIGHT = 0.05
+# Least length and width of an object [m].
 _LEAST_SIDE = 0.05
+# Smaller pieces of an outline are dropped [m^2].
 _LEAST_AREA = 1e-4
 # Places that are closer than this are one place [m].
 _SAME_PLACE = 1e-4
