@@ -1,1 +1,10 @@
-"""Ageing of cities year by year, at the rates of change of real cities."""
+"""Ageing of cities year by year, at the rates of change of real cities.
+
+- Today: `old_world` reads it; `lots` and `plots` are its building land.
+- A year: `ageing_city` simulates it by `buildings`, `trees` and
+  `street_renewal`, with random numbers of `yearly_draws` at the `rates`;
+  `standing_structures` says what stands. `new_buildings`, `alterations` and
+  `sections` make what is new; `kinds` says which structures change.
+- The past: `past_city`.
+- A map: `aged_map`, `stage_writer`, `aged_pictures`; `events`, `years`.
+"""

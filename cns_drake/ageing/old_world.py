@@ -1,7 +1,6 @@
 """The city of today: the last stage of a map, prepared for ageing."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 import re
@@ -14,7 +13,6 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import kinds
-from cns_drake.ageing.events import TAKEN_DOWN, Event
 from cns_drake.base.csv_files import read_records, read_rows
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, is_there
@@ -34,8 +32,6 @@ from cns_drake.city.geometry import (
     triple,
 )
 from cns_drake.city.geometry.object_models import ground_footprint
-from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
-from cns_drake.city.plants.plant_sizes import younger_plant
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.roads.network import load_road_network
 from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
@@ -53,10 +49,6 @@ from cns_drake.transient.loaded_structures import (
 _AROUND = 40.0
 # The colour of parts without one.
 _GREY = (0.6, 0.6, 0.6)
-# In each past year, a tree was lower by this height [m].
-_GROWTH = 0.4
-# Trees were never lower than this [m].
-_LEAST_TREE = 2.0
 # The only files that a stage may name, since only these are copied to the aged
 # map.
 _OWN_MESH = re.compile(rf"{MESH_FOLDER}/[^/]+\.obj")
@@ -205,57 +197,6 @@ class OldWorld:
         if isinstance(shape, Sphere):
             return SphereShape(shape.radius())
         return None
-
-    def structures_in(
-        self, year: int
-    ) -> tuple[dict[str, Structure | None], list[Event]]:
-        """Returns the structures of a past year, and the events since then.
-
-        Buildings that were built after that year are missing, and their lots
-        have another use. Trees are smaller. The city must have years of
-        construction, so `today` is not None.
-
-        Args:
-            year: the year relative to today, negative.
-
-        Returns:
-            Name of each structure -> the structure, or None if it is the same
-            as today; and the events in order of time.
-        """
-        assert self.today is not None
-        standing: dict[str, Structure | None] = dict.fromkeys(self.visuals)
-        events = []
-        for name, thing in self.things.items():
-            built = self.built.get(name)
-            if built is not None and built - self.today > year:
-                since = built - self.today
-                events.append(Event(since, "built", name))
-                del standing[name]
-                for one in self._objects_before(name, built):
-                    standing[one.name] = one
-                    events.append(
-                        Event(since, TAKEN_DOWN, one.name, detail="empty plot")
-                    )
-            elif thing.semantic_class == "vegetation":
-                height = thing.top - thing.bottom
-                if height > _LEAST_TREE and thing.kind == kinds.TREE:
-                    young = max(height + _GROWTH * year, _LEAST_TREE)
-                    whole = self.structure(name)
-                    model = younger_plant(whole.model, young)
-                    standing[name] = replace(whole, model=model)
-        events.sort(key=lambda one: one.year)
-        return standing, events
-
-    def _objects_before(self, name: str, built: int) -> Iterator[Structure]:
-        """Returns the objects on a lot before its building was built.
-
-        Args:
-            name: name of the building.
-            built: calendar year in which it was built.
-        """
-        lot = self.structure(name)
-        rng = np.random.default_rng(built)
-        return lot_objects(lot, use_by_size(lot), {"hatchback": 1}, rng)
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""

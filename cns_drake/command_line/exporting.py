@@ -467,7 +467,8 @@ def _write_truth(
     """
     with uninterrupted():
         from cns_drake.base.complete_files import check_new_folder
-        from cns_drake.studies.map_truth import open_labelled, write_truth
+        from cns_drake.studies.labelled_drive import open_labelled
+        from cns_drake.studies.map_truth import write_truth
         from evaluation.map_update.labels import Label
 
     check_new_folder(output)

@@ -27,7 +27,7 @@ from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.camera.renderer import check_renderer
 from cns_drake.simulation.film_stage import FilmStage
 from cns_drake.simulation.scenario_traffic import load_ways
-from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.vehicle_placement import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 
 # Images per second.

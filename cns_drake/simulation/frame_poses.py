@@ -11,9 +11,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.ray_casting.known_poses import KnownPoses
-from cns_drake.traffic.traffic_motion import (
-    TrafficMotion,
-)
+from cns_drake.traffic.traffic_motion import TrafficMotion
 
 
 class FramePoses(LeafSystem):

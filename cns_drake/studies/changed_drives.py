@@ -27,7 +27,7 @@ from cns_drake.studies.viewpoints import (
     with_lidars_beside,
     with_lidars_moved,
 )
-from cns_drake.traffic.vehicles import room_for_vehicles
+from cns_drake.traffic.vehicle_placement import room_for_vehicles
 from evaluation.results.keys import LAST, OWN
 
 # Fields of a drive that do not change the drive itself.

@@ -13,12 +13,7 @@ from cns_drake.studies.factors import (
     split_values,
     table_value,
 )
-from cns_drake.studies.nested_fields import (
-    Changes,
-    merged,
-    nested,
-    set_field,
-)
+from cns_drake.studies.nested_fields import Changes, merged, nested, set_field
 from evaluation.results.keys import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
 
 # Places in the file of an experiment where a list of values is a factor.

@@ -11,12 +11,7 @@ from collections.abc import Mapping
 import contextlib
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    PlainValidator,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
 
 from cns_drake.base.errors import InputError, validated

@@ -17,9 +17,9 @@ from cns_drake.scenarios.shipped import (
 )
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies.experiment import Experiment, MadeMap
+from cns_drake.studies.frozen_redraws import redraw_frozen
 from cns_drake.studies.made_maps import made_map_step
 from cns_drake.studies.map_step import make_maps
-from cns_drake.studies.redrawing import redraw_frozen
 from evaluation.results.keys import FROZEN_REDRAW
 from evaluation.study.map_drives import MapDrives, drives_by_map
 from evaluation.study.recording_search import find_recordings

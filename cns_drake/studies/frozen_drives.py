@@ -38,7 +38,7 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
     }
 
 
-def frozen_print(compared: Compared, worlds: dict[Path, str]) -> str:
+def drives_fingerprint(compared: Compared, worlds: dict[Path, str]) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:

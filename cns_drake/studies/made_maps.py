@@ -1,17 +1,10 @@
-"""Maps that an experiment makes: aged, generated anew or imported.
+"""Maps that an experiment makes: aged, generated anew or imported."""
 
-The module also makes drives through other cities, whose places are added to a
-database to make recognition harder.
-"""
-
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import hashlib
-import itertools
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.rates import DEFAULT_RATES, check_rates, read_rates
@@ -23,22 +16,16 @@ from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.options import ImportOptions
-from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_file
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import load_scenario
-from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies.experiment import Experiment, MadeMap
 from cns_drake.studies.map_step import MakeMap, make_maps
-from cns_drake.studies.redrawing import RedrawCity, redraw_cities
-from evaluation.drives.sampling import sample_frames
+from cns_drake.studies.redrawing import RedrawCity
 
 _FACTOR = "factor"
 # The only stage of a city that is drawn anew.
-_STAGE = "01"
-# Number of drives after which a note reports the search for places elsewhere.
-_NOTED_DRIVES = 20
+ONLY_STAGE = "01"
 
 
 @dataclass(frozen=True)
@@ -143,7 +130,7 @@ class MadeMaps:
         """
         if type(years) is not int or not 1 <= years <= LAST_YEAR:
             raise InputError(f"years: {years!r} is not from 1 to {LAST_YEAR}")
-        key = self._key(drive, rates, seed)
+        key = self._ageing_key(drive, rates, seed)
         self._ages.setdefault(key, set()).add(years)
         return str(drive.map), str(drive.stage)
 
@@ -173,7 +160,7 @@ class MadeMaps:
 
         The arguments must have been given to `want_age` before.
         """
-        key = self._key(drive, rates, seed)
+        key = self._ageing_key(drive, rates, seed)
         number = sorted(self._ages[key]).index(years)
         return str(self._aged_folder(*key)), f"{number + 2:02d}"
 
@@ -185,7 +172,7 @@ class MadeMaps:
         the same arguments.
         """
         source = drive.folder.path.resolve()
-        return str(self.folder / f"{source.name}_c{seed}"), _STAGE
+        return str(self.folder / f"{source.name}_c{seed}"), ONLY_STAGE
 
     def make(self, cluster: Cluster) -> None:
         """Makes all registered maps that do not exist yet.
@@ -205,24 +192,11 @@ class MadeMaps:
         ]
         make_maps([*aged, *self._steps.values()], self.folder, cluster)
 
-    def _key(
+    def _ageing_key(
         self, drive: Scenario, rates: Any, seed: int
     ) -> tuple[Path, tuple[tuple[str, float], ...], int]:
         path = drive.folder.path.resolve()
-        return path, tuple(sorted(self._rates(rates).items())), seed
-
-    def _rates(self, rates: Any) -> Mapping[str, float]:
-        factor: Any = rates
-        found: dict[str, float] = {}
-        if isinstance(rates, dict):
-            found = dict(rates)
-            factor = found.pop(_FACTOR, 1.0)
-            check_rates(found, "rates")
-        if isinstance(factor, bool) or not isinstance(factor, int | float):
-            raise InputError(f"rates: {factor!r} is no number")
-        with errors_at("rates", "--rate: "):
-            known = read_rates(None, factor)
-        return {**known, **found}
+        return path, tuple(sorted(_all_rates(rates).items())), seed
 
     def _aged_folder(
         self, path: Path, rates: tuple[tuple[str, float], ...], seed: int
@@ -231,6 +205,21 @@ class MadeMaps:
         if dict(rates) != dict(DEFAULT_RATES):
             name += f"_{fingerprint(dict(rates))[:6]}"
         return self.folder / name
+
+
+def _all_rates(rates: Any) -> Mapping[str, float]:
+    """Returns event -> rate per year, for a field `rates` of an experiment."""
+    factor: Any = rates
+    found: dict[str, float] = {}
+    if isinstance(rates, dict):
+        found = dict(rates)
+        factor = found.pop(_FACTOR, 1.0)
+        check_rates(found, "rates")
+    if isinstance(factor, bool) or not isinstance(factor, int | float):
+        raise InputError(f"rates: {factor!r} is no number")
+    with errors_at("rates", "--rate: "):
+        known = read_rates(None, factor)
+    return {**known, **found}
 
 
 def made_map_step(
@@ -273,94 +262,3 @@ def made_map_step(
         seed=made.seed, grow=made.grow, dressed=not made.plain
     )
     return ImportCity(folder, path.resolve(), options)
-
-
-def distracting_drives(
-    query: Scenario,
-    number: int,
-    spacing: float,
-    output: Path,
-    cluster: Cluster,
-    on_note: Callable[[str], None] = lambda text: None,
-) -> list[Scenario]:
-    """Returns drives through cities other than the query's city.
-
-    Adding the places of these drives to a database makes recognition harder.
-    The drives come in this order, until they have about the wanted number of
-    places: the shipped drives of other maps, each through its own stage; if the
-    query's map is shipped, drives along its streets between other buildings;
-    the drives of other maps through their other stages; and drives along the
-    streets of other maps, between other buildings.
-
-    Args:
-        query: the query drive. The returned drives have the LiDARs of the query
-            drive, and do not go through its city.
-        number: approximate number of places.
-        spacing: distance between two places [m].
-        output: folder for the newly generated cities, with other buildings.
-        cluster: runs the jobs.
-        on_note: is called with each note for the user.
-
-    Raises:
-        InputError: a shipped map cannot be used.
-    """
-    drives: list[Scenario] = []
-    found = 0
-    if number:
-        on_note(f"{query.name}: looking for {number} places elsewhere")
-    for drive in _drives(query, output, cluster):
-        if found >= number:
-            break
-        drive = drive.replaced(lidars=query.lidars)
-        drives.append(drive)
-        found += _num_places(drive, spacing)
-        if len(drives) % _NOTED_DRIVES == 0:
-            on_note(f"{query.name}: found {found} places elsewhere")
-    return drives
-
-
-def _num_places(scenario: Scenario, spacing: float) -> int:
-    trajectory = plan_drive(scenario)
-    frames = count_frames(scenario, trajectory)
-    _, p_WB = trajectory.poses(scenario.frame_period * np.arange(frames))
-    return len(sample_frames(p_WB, spacing))
-
-
-def _drives(
-    query: Scenario, output: Path, cluster: Cluster
-) -> Iterator[Scenario]:
-    """Yields an endless series of drives."""
-    maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
-    drives = {
-        name: [load_scenario(path) for path in folder.recordable_drives()]
-        for name, folder in maps.items()
-    }
-    own = Path(str(query.map)).name
-    others = [name for name in maps if name != own]
-
-    def redrawn(name: str, seed: int) -> Iterator[Scenario]:
-        cities = redraw_cities(maps[name].path, _STAGE, [seed], output, cluster)
-        for one in drives[name]:
-            yield _elsewhere(one, str(cities[seed]), _STAGE, f"c{seed}")
-
-    for name in others:
-        yield from drives[name]
-    if own in maps:
-        yield from redrawn(own, 1)
-    for name in others:
-        for stage in maps[name].stages():
-            yield from (
-                _elsewhere(one, one.map, stage, stage)
-                for one in drives[name]
-                if one.stage != stage
-            )
-    for seed in itertools.count(1):
-        for name in others:
-            yield from redrawn(name, seed)
-
-
-def _elsewhere(
-    scenario: Scenario, place: str | None, stage: str, ending: str
-) -> Scenario:
-    name = f"{scenario.name}_in_{ending}"
-    return scenario.replaced(name=name, map=place, stage=stage)

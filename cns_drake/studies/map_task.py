@@ -6,7 +6,8 @@ import tempfile
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies import map_truth
+from cns_drake.studies.labelled_drive import labelled_drive
+from cns_drake.studies.map_truth import write_truth
 from evaluation.map_update.baselines import BASELINES
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.jobs import Jobs
@@ -61,8 +62,8 @@ def measure_maps(
     Returns:
         Method -> its scores.
     """
-    a, b = map(map_truth.labelled_drive, (database, query))
+    a, b = map(labelled_drive, (database, query))
     with tempfile.TemporaryDirectory() as folder:
         maps = Path(folder) / "maps"
-        map_truth.write_truth(a, b, maps, spacing, across_maps=True)
+        write_truth(a, b, maps, spacing, across_maps=True)
         return score_methods(reporter, maps, methods)

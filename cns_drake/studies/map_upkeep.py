@@ -10,12 +10,8 @@ import numpy as np
 
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.studies.map_truth import (
-    LabelledDrive,
-    is_there,
-    label_points,
-    labelled_drive,
-)
+from cns_drake.studies.exact_labels import is_there, label_points
+from cns_drake.studies.labelled_drive import LabelledDrive, labelled_drive
 from evaluation.map_update.baselines import run_baseline
 from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.nearest_points import nearest_distances

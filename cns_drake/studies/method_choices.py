@@ -17,7 +17,7 @@ from evaluation.study.chosen_methods import (
 
 def choose_variants(
     wanted: Mapping[str, Mapping[str, Any]] | None,
-) -> dict[str, tuple[MethodChoice, Mapping[str, Any]]]:
+) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
     """Returns key -> method, with columns of its settings.
 
     Args:

@@ -144,12 +144,14 @@ class Record(Step):
         return self.folder / self.scenario.name
 
     def is_done(self) -> bool:
-        return is_recorded(self.scenario, self.folder) and self._is_shown()
+        return (
+            is_recorded(self.scenario, self.folder) and self._is_page_current()
+        )
 
     def run(self, reporter: Reporter) -> None:
-        shown = None if self.page is None else self._shown()
+        shown = None if self.page is None else self._page_inputs()
         is_new = not is_recorded(self.scenario, self.folder)
-        with self._place(is_new) as (folder, overwrite):
+        with self._recording_folder(is_new) as (folder, overwrite):
             simulate(
                 self.scenario,
                 folder,
@@ -161,7 +163,7 @@ class Record(Step):
             self._page_part.write(shown, None)
 
     @contextlib.contextmanager
-    def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:
+    def _recording_folder(self, is_new: bool) -> Iterator[tuple[Path, bool]]:
         """Yields the folder for the recording, and whether to overwrite there.
 
         If only the page must be made, an existing recording is not changed.
@@ -182,12 +184,13 @@ class Record(Step):
         assert self.page is not None
         return Part(self.page.parent / "parts" / f"{self.page.stem}.data")
 
-    def _is_shown(self) -> bool:
+    def _is_page_current(self) -> bool:
         return self.page is None or (
-            self.page.is_file() and self._page_part.is_current(self._shown())
+            self.page.is_file()
+            and self._page_part.is_current(self._page_inputs())
         )
 
-    def _shown(self) -> dict[str, object]:
+    def _page_inputs(self) -> dict[str, object]:
         """Returns all inputs of the page."""
         beside, _ = other_stage(self.scenario)
         return self.made_of(

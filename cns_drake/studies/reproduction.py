@@ -89,7 +89,7 @@ def reproduce_maps(
     folders = [recordable_map(name) for name in maps or recordable_maps()]
     drives, controls, pictures = [], [], []
     for folder in folders:
-        of_map = _drives(folder)
+        of_map = _recordable_drives(folder)
         drives += of_map
         controls += control_drives(of_map)
         if with_recordings:
@@ -100,20 +100,12 @@ def reproduce_maps(
         jobs = plan_recordings(
             [*drives, *controls], output, pages=pages if with_pages else {}
         )
-    recordings = []
-    for scenario in (*drives, *controls):
-        is_waiting = not is_recorded(scenario, output)
-        info = recording_info(scenario, output, is_waiting and with_recordings)
-        if is_waiting and not with_recordings:
-            info = replace(info, made_by=SimulationSource(scenario))
-        recordings.append(info)
-    # The order is that of `cns-eval report`.
-    recordings.sort(key=lambda recording: recording.name)
-    report = output / "report"
     make_folder(output)
     study = StagesReport(
-        recordings,
-        report,
+        _recordings(
+            [*drives, *controls], output, with_recordings=with_recordings
+        ),
+        output / "report",
         chosen,
         protocol,
         with_costs,
@@ -121,12 +113,12 @@ def reproduce_maps(
     )
     doing("planning the jobs")
     planned = [*jobs, *study.jobs(), *pictures]
-    shown = len(drives) if with_pages and with_recordings else 0
-    frames = usual_frames([*drives, *controls])
-    kept = shown * _PAGE_BYTES + frames * (
-        _KEPT_BYTES + _RECORDED_BYTES if with_recordings else _KEPT_BYTES
+    space = _expected_space(
+        usual_frames([*drives, *controls]),
+        len(drives) if with_pages and with_recordings else 0,
+        output,
+        with_recordings=with_recordings,
     )
-    space = Space(output, kept + frames * _SPENT_BYTES, kept)
     told = forecast(planned, cluster, space)
     if told is not None:
         on_note(told)
@@ -139,7 +131,30 @@ def reproduce_maps(
     return study.assemble(addresses, on_note, with_tables=with_tables)
 
 
-def _drives(folder: Path) -> list[Scenario]:
+def _recordings(
+    scenarios: Sequence[Scenario], output: Path, *, with_recordings: bool
+) -> list[RecordingInfo]:
+    """Returns the recordings to evaluate, in the order of `cns-eval report`."""
+    found = []
+    for scenario in scenarios:
+        is_waiting = not is_recorded(scenario, output)
+        info = recording_info(scenario, output, is_waiting and with_recordings)
+        if is_waiting and not with_recordings:
+            info = replace(info, made_by=SimulationSource(scenario))
+        found.append(info)
+    return sorted(found, key=lambda recording: recording.name)
+
+
+def _expected_space(
+    num_frames: int, num_pages: int, output: Path, *, with_recordings: bool
+) -> Space:
+    """Returns how much space all files need, now and in the end."""
+    of_frame = _KEPT_BYTES + (_RECORDED_BYTES if with_recordings else 0.0)
+    kept = num_pages * _PAGE_BYTES + num_frames * of_frame
+    return Space(output, kept + num_frames * _SPENT_BYTES, kept)
+
+
+def _recordable_drives(folder: Path) -> list[Scenario]:
     drives = [
         scenario_files.load_scenario(path)
         for path in MapFolder(folder).recordable_drives()

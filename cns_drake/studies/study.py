@@ -12,21 +12,15 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.progress import doing
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.conditions import Condition, conditions, num_levels
-from cns_drake.studies.experiment import (
-    FLEET,
-    SESSIONS,
-    Experiment,
-)
+from cns_drake.studies.distractors import distracting_drives
+from cns_drake.studies.experiment import FLEET, SESSIONS, Experiment
 from cns_drake.studies.experiment_maps import ExperimentMaps, MapPairs
 from cns_drake.studies.frozen_drives import (
     check_frozen,
+    drives_fingerprint,
     frozen_drives,
-    frozen_print,
 )
-from cns_drake.studies.made_maps import (
-    MadeMaps,
-    distracting_drives,
-)
+from cns_drake.studies.made_maps import MadeMaps
 from cns_drake.studies.map_task import DrivenMapTask
 from cns_drake.studies.method_choices import choose_variants
 from cns_drake.studies.protocol_fields import condition_protocol
@@ -289,7 +283,7 @@ class Study:
                     if self.experiment.frozen is not None:
                         place = one.map_name, one.factors.get(LEVEL, 0)
                         drawn = prints.setdefault(place, [])
-                        drawn.append(frozen_print(compared, worlds))
+                        drawn.append(drives_fingerprint(compared, worlds))
             if not found:
                 self.on_note(f"{some.map_name}: no two drives to compare")
             jobs: Callable[..., Jobs] = Jobs

@@ -58,16 +58,16 @@ class Limb(NamedTuple):
     shapes: tuple[BodyShape, ...]
 
 
-def _mesh(name: str, mesh: str, rgb: Rgb) -> BodyShape:
+def _mesh_shape(name: str, mesh: str, rgb: Rgb) -> BodyShape:
     shape = Mesh(str(OBJECT_MESHES / f"{mesh}.obj"))
     return BodyShape(name, shape, RigidTransform(), rgb)
 
 
-def _box(name: str, size: Point, middle: Point, rgb: Rgb) -> BodyShape:
+def _box_shape(name: str, size: Point, middle: Point, rgb: Rgb) -> BodyShape:
     return BodyShape(name, Box(*size), RigidTransform(middle), rgb)
 
 
-def _round(
+def _round_shape(
     name: str,
     radius: float,
     start: Point,
@@ -100,11 +100,11 @@ def vehicle_limbs(
     else:
         name = kind.name
         found = [
-            _mesh("body", f"{name}_body", paint),
-            _mesh("trim", f"{name}_trim", TRIM),
+            _mesh_shape("body", f"{name}_body", paint),
+            _mesh_shape("trim", f"{name}_trim", TRIM),
         ]
         if name == "box_truck":
-            found.append(_mesh("box", f"{name}_box", WHITE))
+            found.append(_mesh_shape("box", f"{name}_box_shape", WHITE))
         shapes = tuple(found)
     return (Limb("body", (0.0, 0.0, 0.0), 0.0, shapes),)
 
@@ -119,7 +119,7 @@ def _two_wheeler(
     axle = 0.72 if heavy else 0.52
     seat = 0.82 if heavy else 0.95
     shapes = [
-        _round(
+        _round_shape(
             f"wheel_{k}", radius, (x, -width / 2, radius),
             (x, width / 2, radius), TRIM, Cylinder,
         )
@@ -127,9 +127,9 @@ def _two_wheeler(
     ]  # fmt: skip
     if heavy:
         shapes += [
-            _box("engine", (0.6, 0.32, 0.4), (0.0, 0.0, 0.45), _METAL),
-            _box("tank", (0.55, 0.3, 0.22), (0.2, 0.0, 0.76), paint),
-            _box("seat", (0.7, 0.26, 0.12), (-0.38, 0.0, 0.74), TRIM),
+            _box_shape("engine", (0.6, 0.32, 0.4), (0.0, 0.0, 0.45), _METAL),
+            _box_shape("tank", (0.55, 0.3, 0.22), (0.2, 0.0, 0.76), paint),
+            _box_shape("seat", (0.7, 0.26, 0.12), (-0.38, 0.0, 0.74), TRIM),
         ]
     else:
         bars = (
@@ -139,15 +139,15 @@ def _two_wheeler(
             ((-0.12, 0, 0.3), (0.4, 0, 0.82)),
         )
         shapes += [
-            _round(f"frame_{k}", 0.02, start, end, paint)
+            _round_shape(f"frame_{k}", 0.02, start, end, paint)
             for k, (start, end) in enumerate(bars)
         ]
     hip, shoulder = (-0.25, 0.0, seat + 0.08), (0.0, 0.0, seat + 0.5)
     skin = _SKIN[int(rng.integers(len(_SKIN)))]
     head = (0.06, 0.0, seat + 0.75)
     shapes += [
-        _round("torso", 0.15, hip, shoulder, coat),
-        _round(
+        _round_shape("torso", 0.15, hip, shoulder, coat),
+        _round_shape(
             "head", 0.1, head, (0.06, 0, seat + 0.8), TRIM if heavy else skin
         ),
     ]  # fmt: skip
@@ -156,9 +156,9 @@ def _two_wheeler(
         knee, foot = (0.15, y, seat - 0.12), (0.0, y, 0.4)
         hip_joint = (-0.2, y, seat)
         shapes += [
-            _round(f"{side}_thigh", 0.07, hip_joint, knee, TRIM),
-            _round(f"{side}_shank", 0.055, knee, foot, TRIM),
-            _round(f"{side}_arm", 0.045, shoulder, hand, coat),
+            _round_shape(f"{side}_thigh", 0.07, hip_joint, knee, TRIM),
+            _round_shape(f"{side}_shank", 0.055, knee, foot, TRIM),
+            _round_shape(f"{side}_arm", 0.045, shoulder, hand, coat),
         ]
     return tuple(shapes)
 
@@ -175,8 +175,10 @@ def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
     )
     skin = _SKIN[int(rng.integers(len(_SKIN)))]
     trunk = (
-        _round("torso", 0.16 * h, (0, 0, 1.0 * h), (0, 0, 1.27 * h), coat),
-        _round(
+        _round_shape(
+            "torso", 0.16 * h, (0, 0, 1.0 * h), (0, 0, 1.27 * h), coat
+        ),
+        _round_shape(
             "head", 0.095 * h, (0.01, 0, 1.53 * h), (0.01, 0, 1.58 * h), skin
         ),
     )
@@ -184,13 +186,13 @@ def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         knee, ankle = (0.03, 0.0, -0.42 * h), (0.0, 0.0, -0.82 * h)
         leg = (
-            _round("thigh", 0.075 * h, (0, 0, 0), knee, trousers),
-            _round("shank", 0.055 * h, knee, ankle, trousers),
+            _round_shape("thigh", 0.075 * h, (0, 0, 0), knee, trousers),
+            _round_shape("shank", 0.055 * h, knee, ankle, trousers),
         )
         elbow, hand = (-0.02, 0.0, -0.29 * h), (0.06, 0.0, -0.52 * h)
         arm = (
-            _round("upper", 0.045 * h, (0, 0, 0), elbow, coat),
-            _round("lower", 0.038 * h, elbow, hand, coat),
+            _round_shape("upper", 0.045 * h, (0, 0, 0), elbow, coat),
+            _round_shape("lower", 0.038 * h, elbow, hand, coat),
         )
         hip, shoulder = (
             (0.0, 0.09 * sign, 0.9 * h),

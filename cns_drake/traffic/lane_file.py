@@ -97,7 +97,7 @@ def lane_text(
                 "way": piece.is_way,
                 "after": list(piece.after),
                 "junction": piece.junction,
-                **_known(piece, "left", "right", "phase"),
+                **_numbers_except_none(piece, "left", "right", "phase"),
             }
             for piece in graph.pieces
         ],
@@ -107,7 +107,7 @@ def lane_text(
                 "half_width": round(way.half_width, 3),
                 "start": way.start,
                 "end": way.end,
-                **_known(way, "crossing"),
+                **_numbers_except_none(way, "crossing"),
             }
             for way in walkways
         ],
@@ -128,7 +128,7 @@ def lane_text(
     return json.dumps(content, separators=(",", ":")) + "\n"
 
 
-def _known(one: Piece | Walkway, *names: str) -> dict[str, int]:
+def _numbers_except_none(one: Piece | Walkway, *names: str) -> dict[str, int]:
     """Returns the fields of an object with these names, except those of -1."""
     values = {name: getattr(one, name) for name in names}
     return {name: value for name, value in values.items() if value != -1}

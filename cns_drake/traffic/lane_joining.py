@@ -50,7 +50,7 @@ def join_lanes(
         right_of: number of a lane -> number of the next lane on its right with
             the same direction. None if vehicles do not change lanes.
     """
-    merged, after, beside = _merge(lanes, links, right_of or {})
+    merged, after, beside = _merged_lanes(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]
     long = [
         k
@@ -115,7 +115,7 @@ def usual_limit(limits: ArrayLike, lengths: ArrayLike) -> float:
     return float(np.asarray(limits)[order][middle])
 
 
-def _merge(
+def _merged_lanes(
     lanes: Sequence[DirectedLane],
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int],

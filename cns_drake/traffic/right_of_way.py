@@ -14,22 +14,12 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.streets import (
-    MERGE,
-    SPLIT,
-    STEP,
-    WAIT,
-    Streets,
-    is_ego_far,
-)
-from cns_drake.traffic.vehicles import (
-    CURRENT,
-    Traffic,
-    choose_way,
-    is_walked,
-    lane_over,
-    rear_on_way,
-)
+from cns_drake.traffic.conflicts import MERGE, SPLIT
+from cns_drake.traffic.ego_car import STEP
+from cns_drake.traffic.giving_way import is_walked, lane_over, rear_on_way
+from cns_drake.traffic.streets import WAIT, Streets, is_ego_far
+from cns_drake.traffic.vehicle_records import CURRENT, Traffic
+from cns_drake.traffic.vehicle_steps import choose_way
 
 # Where there is no signal, a driver stops before the line for this time [s].
 _STOP_TIME = 3.0

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.polylines import SPACING
-from cns_drake.traffic.streets import STEP
 
 # Relaxation time [s].
 _RELAXATION = 0.5
@@ -213,7 +213,7 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
                 new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stopping_place(new_x, new_y, new_vx, new_vy)
             yaw = one.yaw
-            row = _nearest(paths, one, new_x, new_y)
+            row = _nearest_row(paths, one, new_x, new_y)
             tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
             if paths.narrow[row] or speed > STANDING_SPEED:
                 turn = np.arctan2(new_vy, new_vx) - yaw
@@ -250,7 +250,7 @@ def _stopping_place(
 
 
 @compiled
-def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
+def _nearest_row(paths: Paths, walker: Any, x: float, y: float) -> int:
     """Returns the row of the point of a path that is nearest to a place."""
     path, points = paths.paths[walker.path], paths.points
     best = np.inf
@@ -268,7 +268,7 @@ def _nearest(paths: Paths, walker: Any, x: float, y: float) -> int:
 def _distance_to_path(paths: Paths, walker: Any, x: float, y: float) -> float:
     """Returns the distance from a place to a pedestrian's path [m]."""
     path, points = paths.paths[walker.path], paths.points
-    row = _nearest(paths, walker, x, y)
+    row = _nearest_row(paths, walker, x, y)
     nearest = row - path.first
     low, high = paths.limits[row]
     tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]

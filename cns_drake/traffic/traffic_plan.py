@@ -12,16 +12,29 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.traffic import vehicles as motion
+from cns_drake.traffic.car_following import accelerations
+from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.follower import Follower
+from cns_drake.traffic.lane_changes import change_lanes
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
-from cns_drake.traffic.streets import STEP, EgoBox, Streets, make_streets
+from cns_drake.traffic.streets import Streets, make_streets
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
-from cns_drake.traffic.vehicles import Traffic
+from cns_drake.traffic.vehicle_placement import (
+    place_vehicles,
+    room_for_vehicles,
+)
+from cns_drake.traffic.vehicle_poses import vehicle_poses
+from cns_drake.traffic.vehicle_records import (
+    Traffic,
+    begin_traffic,
+    find_occupants,
+    make_crossings,
+)
+from cns_drake.traffic.vehicle_steps import advance
 from cns_drake.traffic.walkers import Crowd
 
 # A pedestrian's box, which contains swinging limbs [m].
@@ -149,7 +162,7 @@ def plan_traffic(
     for attempt in range(_TRIES):
         if best is not None and drive is not None and best.positions is None:
             best = None
-        best = _try(task, np.random.default_rng([seed, attempt]), best)
+        best = _better_plan(task, np.random.default_rng([seed, attempt]), best)
         has_arrived = drive is None or best.positions is not None
         if has_arrived and best.left_out == 0:
             break
@@ -157,10 +170,10 @@ def plan_traffic(
     return best
 
 
-def _try(
+def _better_plan(
     task: _Task, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
-    """Returns a new plan, or the best one so far if the new is no better."""
+    """Returns the plan of a new trial, or `best` if that is no worse."""
     trial = begin_trial(task, rng)
     num_steps = len(task.streets.until)
     for first in range(0, num_steps, _PART):
@@ -233,16 +246,16 @@ class Trial:
         for row, k in enumerate(steps):
             past_cars[row] = cars[: len(self._kinds)]
             past_walkers[row] = crowd.walkers
-            motion.find_occupants(traffic, k)
+            find_occupants(traffic, k)
             grant_ways(traffic, k)
-            wanted = motion.accelerations(traffic)
+            wanted = accelerations(traffic)
             if self._follower is not None:
                 self._follower.step(traffic, k)
-            motion.change_lanes(traffic, k)
-            motion.advance(traffic, wanted)
+            change_lanes(traffic, k)
+            advance(traffic, wanted)
             crowd.step(k * STEP, self._seed + 1)
         rows = slice(steps.start, steps.stop)
-        self._vehicles[rows] = motion.vehicle_poses(traffic.streets, past_cars)
+        self._vehicles[rows] = vehicle_poses(traffic.streets, past_cars)
         self._walkers[rows] = crowd.poses(past_walkers)
         # From the step before, because of the half step in between.
         first = max(steps.start - 1, 0)
@@ -315,11 +328,11 @@ def begin_trial(task: _Task, rng: np.random.Generator) -> Trial:
     """Returns a trial in which vehicles and pedestrians have random places."""
     number = min(
         _with_spare(task.vehicles),
-        max(task.vehicles, motion.room_for_vehicles(task.graph)),
+        max(task.vehicles, room_for_vehicles(task.graph)),
     )
     kinds = [KINDS[k] for k in draw_kinds(number, rng)]
-    cars, found = motion.place_vehicles(kinds, task.streets, rng)
-    crossings = motion.make_crossings(task.graph)
+    cars, found = place_vehicles(kinds, task.streets, rng)
+    crossings = make_crossings(task.graph)
     walkers = _with_spare(task.walkers)
     crowd = Crowd(walkers, task.walkways, crossings, rng)
     seed = int(rng.integers(2**31))
@@ -327,7 +340,7 @@ def begin_trial(task: _Task, rng: np.random.Generator) -> Trial:
     if task.drive is not None:
         follower = Follower(task.graph, task.drive, task.ego_box, _FIRST)
         cars = np.append(cars, follower.record(task.streets))
-    traffic = motion.begin_traffic(task.streets, cars, crossings, seed)
+    traffic = begin_traffic(task.streets, cars, crossings, seed)
     return Trial(
         task, [kinds[k] for k in found], crowd, traffic, follower, seed
     )

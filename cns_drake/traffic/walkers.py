@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.lane_graph import Walkway
 from cns_drake.traffic.polylines import SPACING, length_of
 from cns_drake.traffic.random_numbers import uniform
@@ -22,7 +23,6 @@ from cns_drake.traffic.social_force import (
     move_walkers,
     social_forces,
 )
-from cns_drake.traffic.streets import STEP
 
 # Mean of the model's wanted speed [m/s].
 _MEAN_SPEED = 1.34

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cns_drake.traffic.vehicles import CURRENT, VEHICLE
+from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
 
 
 def make_vehicles(*states, **fields):

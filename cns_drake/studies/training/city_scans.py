@@ -47,7 +47,7 @@ def scan_city(
         the place of each other scan.
     """
     images, xy, numbers = [], [], []
-    taken: list[_Taken] = []
+    taken: list[_TakenScan] = []
     try:
         drawn.write(folder)
         for number, scenario in enumerate(drawn.drives(folder)):
@@ -66,7 +66,9 @@ def scan_city(
                 images.append(polar_image(points, height))
                 xy.append(drive.X_WS[frame, :2, 3])
                 numbers.append(number)
-                taken.append(_Taken(drive, int(frame), _few(points)))
+                taken.append(
+                    _TakenScan(drive, int(frame), _overlap_sample(points))
+                )
         found = {"overlaps": _overlaps(taken, reporter)} if drawn.graded else {}
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -79,7 +81,7 @@ def scan_city(
 
 
 @dataclass(frozen=True)
-class _Taken:
+class _TakenScan:
     """A scan of a drive, with some of its points in the LiDAR's frame."""
 
     drive: SimulatedDrive
@@ -87,11 +89,11 @@ class _Taken:
     points: np.ndarray
 
 
-def _few(points: np.ndarray) -> np.ndarray:
+def _overlap_sample(points: np.ndarray) -> np.ndarray:
     return points[:: max(1, len(points) // _OVERLAP_POINTS)].astype(float)
 
 
-def _overlaps(scans: Sequence[_Taken], reporter: Reporter) -> np.ndarray:
+def _overlaps(scans: Sequence[_TakenScan], reporter: Reporter) -> np.ndarray:
     """Returns which share of each scan is visible from every other scan.
 
     The share is exact (see `exact_overlap`). It is 0 for two scans of one drive

@@ -48,7 +48,9 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     stages: dict[str, dict] = {}
     gone: set[str] = set()
     for stage in reversed(STAGES[:-1]):
-        cleared = set(_nearest(buildings, float(rng.uniform(0.1, 0.5)), rng))
+        cleared = set(
+            _clustered_names(buildings, float(rng.uniform(0.1, 0.5)), rng)
+        )
         absent = [
             *(s.name for s in buildings if s.name in cleared),
             *(
@@ -56,18 +58,20 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
                 for s, k in zip(beside, near, strict=True)
                 if k < len(buildings) and buildings[k].name in cleared
             ),
-            *_some(trees, float(rng.uniform(0.0, 0.4)), rng),
+            *_random_names(trees, float(rng.uniform(0.0, 0.4)), rng),
         ]
         absent = [name for name in dict.fromkeys(absent) if name not in gone]
         gone.update(absent)
         lower = {
             "houses": {
                 "height": float(rng.uniform(4.0, 9.0)),
-                "structures": _some(buildings, rng.uniform(0.0, 0.1), rng),
+                "structures": _random_names(
+                    buildings, rng.uniform(0.0, 0.1), rng
+                ),
             },
             "trees": {
                 "height": float(rng.uniform(3.0, 6.0)),
-                "structures": _some(trees, rng.uniform(0.0, 0.2), rng),
+                "structures": _random_names(trees, rng.uniform(0.0, 0.2), rng),
             },
         }
         stages[stage] = {
@@ -81,14 +85,14 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     }
 
 
-def _some(
+def _random_names(
     structures: Sequence[Any], share: float, rng: np.random.Generator
 ) -> list[str]:
     chosen = rng.random(len(structures)) < share
     return [s.name for s, one in zip(structures, chosen, strict=True) if one]
 
 
-def _nearest(
+def _clustered_names(
     structures: Sequence[Any], share: float, rng: np.random.Generator
 ) -> list[str]:
     """Returns a share of structures: half at random, half near a place."""
@@ -96,4 +100,4 @@ def _nearest(
     center = xy[int(rng.integers(len(xy)))]
     order = np.argsort(np.linalg.norm(xy - center, axis=1), kind="stable")
     near = [structures[k].name for k in order[: int(0.5 * share * len(order))]]
-    return sorted({*near, *_some(structures, 0.5 * share, rng)})
+    return sorted({*near, *_random_names(structures, 0.5 * share, rng)})

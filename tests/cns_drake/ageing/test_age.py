@@ -1,7 +1,6 @@
 """A small city that ages: nested, repeatable, sound; and its faults."""
 
 import csv
-import itertools
 import os
 import re
 
@@ -13,16 +12,12 @@ import shapely
 
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.ageing_city import AgeingCity
-from cns_drake.ageing.new_buildings import new_building
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.plots import Plot
+from cns_drake.ageing.past_city import structures_in
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
-    Tally,
-    poisson_p,
-    read_rates,
 )
-from cns_drake.ageing.sections import greatest_y, horizontal_section
+from cns_drake.ageing.sections import horizontal_section
 from cns_drake.ageing.standing_structures import structure_triangles
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
@@ -413,48 +408,17 @@ def test_the_past_lacks_younger_buildings(town, tmp_path):
                 built = 2020 if row["name"] == houses[0] else 1950
             table.writerow({**row, "built": built})
     world = OldWorld(MapFolder(folder))
-    before, events = world.structures_in(-10)
+    before, events = structures_in(world, -10)
     assert houses[0] not in before
     assert houses[1] in before
     assert not events[0].year
-    after, _ = world.structures_in(0)
+    after, _ = structures_in(world, 0)
     assert houses[0] in after
     age_map(folder, [-10, 0, 2], 1, _BUSY, tmp_path / "old")
     text = (tmp_path / "old" / "stage_02.sdf").read_text()
     assert f'"{houses[0]}/' not in text
     assert f'"{houses[1]}/' in text
     assert not (tmp_path / "old" / "stage_04.sdf").exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "fault"),
-    [
-        ("eaten: 0.1", "eaten: unknown event"),
-        ("built: 1.5", "built: 1.5 is no rate"),
-        ("built: -0.1", "built: -0.1 is no rate"),
-        ("built: true", "built: True is no rate"),
-        ("built: yes", "quote it"),
-        ("moved: 20.1", "moved: 20.1 is no length"),
-        ("moved: -1", "moved: -1 is no length"),
-        ("- built", "not a mapping"),
-    ],
-)
-def test_faulty_rates(tmp_path, text, fault):
-    path = tmp_path / "rates.yaml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=fault):
-        read_rates(path)
-
-
-def test_rates_of_a_file_and_a_factor(tmp_path):
-    path = tmp_path / "rates.yaml"
-    path.write_text("felled: 0.04")
-    rates = read_rates(path, 2.0)
-    assert rates["felled"] == 0.08
-    assert rates["moved"] == DEFAULT_RATES["moved"]  # A length has no factor.
-    assert rates["built"] == 2 * DEFAULT_RATES["built"]
-    with pytest.raises(InputError, match="--rate"):
-        read_rates(path, 100.0)
 
 
 @pytest.mark.slow
@@ -480,62 +444,6 @@ def test_faulty_maps(town, tmp_path):
     with pytest.raises(InputError, match="without lots"):
         age(bare)
     assert not (tmp_path / "new").exists()
-
-
-def test_poisson_p():
-    # P(N >= 9 | 4) = 0.02136, by summing the series.
-    terms = [4.0**0]
-    for k in range(1, 9):
-        terms.append(terms[-1] * 4 / k)
-    tail = 1.0 - np.exp(-4.0) * sum(terms)
-    assert poisson_p(9, 4.0) == pytest.approx(2 * tail)
-    assert poisson_p(4, 4.0) == 1.0
-    tally = Tally({"lamps": 0.5})
-    tally.count("lamps", 0.5, True, 1)
-    assert "lamps,0.5,1,0.500,1,1.000000" in tally.to_csv()
-
-
-def test_section_of_a_roof():
-    """A triangle from (0, 0, 0) and (4, 0, 0) to (0, 2, 2), cut at height 1."""
-    triangle = np.array([[[0, 0, 0], [4, 0, 0], [0, 2, 2]]], float)
-    cut = horizontal_section(triangle, 1.0)
-    ends = cut[0][np.argsort(cut[0][:, 0])]
-    np.testing.assert_allclose(ends, [[0, 1], [2, 1]], atol=1e-3)
-    assert greatest_y(cut, 1.0) == pytest.approx(1.0, abs=1e-3)
-    assert np.isnan(greatest_y(cut, 3.0))
-
-
-def test_a_plot_faces_its_street():
-    street = shapely.box(-50, -20, 50, -10)
-    for angle in (0.0, 40.0):
-        area, way = (
-            shapely.affinity.rotate(one, angle, origin=(0, 0))
-            for one in (shapely.box(-8, -6, 8, 6), street)
-        )
-        plot = Plot.facing(area, way, 1.0)
-        assert plot.yaw == pytest.approx(np.radians(angle), abs=1e-4)
-        np.testing.assert_allclose(
-            plot.inside(way).bounds, (-50, -20, 50, -10), atol=0.01
-        )
-
-
-def test_new_buildings_stay_on_their_plot():
-    area = shapely.affinity.rotate(shapely.box(0, 0, 20, 14), 30)
-    street = shapely.affinity.rotate(
-        shapely.box(-20, -8, 40, -3), 30, origin=area.centroid
-    )
-    plot = Plot.facing(area, street, 0.0)
-    made = [
-        new_building(plot, 11.0, "walk_up", [], np.random.default_rng(k), "x")
-        for k in range(6)
-    ]
-    kinds = {one.tags[0] for one in made}
-    assert len(kinds) > 1
-    assert "walk_up" not in kinds
-    for one, other in itertools.pairwise(made):
-        assert area.buffer(0.05).contains(one.footprint_W)
-        assert one.name == f"{one.tags[0]}_x"
-        assert other.semantic_class == "building"
 
 
 def names_in(folder, stage):

@@ -1,6 +1,8 @@
 """Values that a list contains twice."""
 
-from cns_drake.base.repetitions import repeated
+import pytest
+
+from cns_drake.base.repetitions import check_once, repeated
 
 
 def test_what_is_there_twice():
@@ -11,3 +13,9 @@ def test_what_is_there_twice():
     ]
     # Linear in their number: a comparison of all pairs would take minutes.
     assert repeated(range(100_000)) == []
+
+
+def test_a_value_that_is_there_twice_is_named():
+    check_once(["a", 1, {"b": 2}])
+    with pytest.raises(ValueError, match=r"^'a' is there twice$"):
+        check_once(["a", "b", "a"])

@@ -15,13 +15,13 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.studies import map_step
-from cns_drake.studies.redrawing import (
+from cns_drake.studies.frozen_redraws import (
     RedrawFrozen,
     frozen_redraws,
     kept_names,
     redraw_frozen,
-    turned_content,
 )
+from cns_drake.studies.turned_inputs import turned_content
 
 
 def test_five_versions_of_each_map_of_which_two_are_off_the_axes():

@@ -15,8 +15,8 @@ from cns_drake.studies.comparisons import Compared
 from cns_drake.studies.experiment_files import load_experiment
 from cns_drake.studies.frozen_drives import (
     check_frozen,
+    drives_fingerprint,
     frozen_drives,
-    frozen_print,
 )
 from cns_drake.studies.study import Study
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
@@ -51,7 +51,7 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     worlds = {}
     for one, compared in itertools.chain(*map(study._simulated.pairs, maps)):
         key = one.map_name, one.factors["level"]
-        found.setdefault(key, []).append(frozen_print(compared, worlds))
+        found.setdefault(key, []).append(drives_fingerprint(compared, worlds))
     assert frozen == {
         key: fingerprint({"drives": prints}) for key, prints in found.items()
     }
@@ -81,22 +81,22 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     values = scenario_values(write_small_map(tmp_path / "small"))
     drive = make_scenario(values, "test")
     compared = Compared(drive, drive, RECORDED_PROTOCOL)
-    before = frozen_print(compared, {})
-    assert frozen_print(compared, {}) == before
+    before = drives_fingerprint(compared, {})
+    assert drives_fingerprint(compared, {}) == before
     known = compared.fingerprint()
     world = drive.world_file
     world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
-    assert frozen_print(compared, {}) != before
+    assert drives_fingerprint(compared, {}) != before
     # The drives alone do not show it.
     assert compared.fingerprint() == known
     # Neither does the city of another session hide behind the first one's.
     former = drive.replaced(stage="01" if drive.stage != "01" else "04")
     several = Compared(drive, drive, RECORDED_PROTOCOL, beside=(former,))
-    before = frozen_print(several, {})
+    before = drives_fingerprint(several, {})
     world = former.world_file
     assert world != drive.world_file
     world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
-    assert frozen_print(several, {}) != before
+    assert drives_fingerprint(several, {}) != before
 
 
 def test_maps_of_ones_own_are_not_frozen():

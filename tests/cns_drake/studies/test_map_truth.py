@@ -17,14 +17,10 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
 from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.studies.exact_labels import NEAR, is_there
+from cns_drake.studies.labelled_drive import open_labelled, simulate_labelled
 from cns_drake.studies.map_task import TRUTH, measure_maps
-from cns_drake.studies.map_truth import (
-    NEAR,
-    is_there,
-    open_labelled,
-    simulate_labelled,
-    write_truth,
-)
+from cns_drake.studies.map_truth import write_truth
 from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_pair, read_truth

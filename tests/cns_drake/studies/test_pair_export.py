@@ -12,12 +12,12 @@ import pytest
 from cns_drake.__main__ import main
 from cns_drake.base.errors import InputError
 from cns_drake.studies import pair_export
-from cns_drake.studies.pair_export import (
+from cns_drake.studies.pair_export import ExportOptions, export_pairs
+from cns_drake.studies.pointnetvlad_files import (
     ExportedDrive,
-    ExportOptions,
     evaluation_sets,
-    export_pairs,
     training_tuples,
+    write_pickles,
 )
 
 
@@ -160,7 +160,7 @@ def test_clouds_without_positives_are_counted(tmp_path):
     alone = sum(len(one.positives) == 0 for one in found.values())
     assert 0 < alone < len(found) == 24
     notes = []
-    pair_export._write_pickles(tmp_path, runs, runs, notes.append)
+    write_pickles(tmp_path, runs, runs, notes.append)
     assert f"training: {alone} of 24 clouds have no other" in notes[0]
 
 
@@ -184,7 +184,7 @@ def line(name, number, city=0, start=0.0):
 )
 def test_cities_that_cannot_be_evaluated(tmp_path, tested, note):
     notes = []
-    pair_export._write_pickles(tmp_path, tested, tested, notes.append)
+    write_pickles(tmp_path, tested, tested, notes.append)
     written = (tmp_path / "oxford_evaluation_query.pickle").exists()
     assert written == (note is None)
     assert (note is None) or note in notes[-1]
@@ -200,7 +200,7 @@ def test_evaluation_files_have_the_names_of_minkloc(tmp_path):
     ):
         tested = [run for city in cities[:number] for run in city]
         notes = []
-        pair_export._write_pickles(tmp_path, tested, tested, notes.append)
+        write_pickles(tmp_path, tested, tested, notes.append)
         assert len(notes) == (number == 5)
         for name, city in zip(names, shown, strict=True):
             database, queries = (

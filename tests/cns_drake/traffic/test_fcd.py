@@ -7,10 +7,11 @@ from pydrake.geometry import SceneGraph
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.traffic import fcd_traffic
-from cns_drake.traffic.fcd_traffic import play_trace, read_fcd
+from cns_drake.traffic import fcd_trace
+from cns_drake.traffic.ego_car import EgoBox
+from cns_drake.traffic.fcd_trace import read_fcd
+from cns_drake.traffic.fcd_traffic import play_trace
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
-from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_motion import make_traffic
 from cns_drake.traffic.walkers import gait_rate
 
@@ -284,7 +285,7 @@ def test_what_jumps_is_absent_meanwhile(tmp_path, tag, kind, fastest, dt):
 
 
 def test_a_trace_of_jumps_has_other_units(tmp_path, monkeypatch):
-    monkeypatch.setattr(fcd_traffic, "_MOST_JUMPS", 3)
+    monkeypatch.setattr(fcd_trace, "_MOST_JUMPS", 3)
     for number in (4, 5):
         xs = [1000.0 * k for k in range(number)]
         path = write_moves(tmp_path / "a.xml", "vehicle", "", 1.0, xs)

@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from cns_drake.traffic import traffic_plan
+from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.queues import plan_queues
-from cns_drake.traffic.streets import EgoBox
 from cns_drake.traffic.traffic_plan import plan_traffic
 
 BOX = EgoBox(-1.0, 3.0, 1.0)

@@ -7,18 +7,20 @@ from helpers.vehicle_records import make_vehicles
 import numpy as np
 import pytest
 
+from cns_drake.traffic.car_following import accelerations
+from cns_drake.traffic.conflicts import MERGE, SPLIT
+from cns_drake.traffic.ego_car import STEP, EgoBox
+from cns_drake.traffic.giving_way import find_prior
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
 from cns_drake.traffic.right_of_way import grant_ways
-from cns_drake.traffic.streets import MERGE, SPLIT, STEP, EgoBox, make_streets
-from cns_drake.traffic.vehicles import (
+from cns_drake.traffic.streets import make_streets
+from cns_drake.traffic.vehicle_records import (
     CURRENT,
-    accelerations,
-    advance,
     begin_traffic,
     find_occupants,
-    find_prior,
     make_crossings,
 )
+from cns_drake.traffic.vehicle_steps import advance
 
 C = np.cos(0.4)
 S = np.sin(0.4)

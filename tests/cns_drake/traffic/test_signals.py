@@ -7,9 +7,11 @@ import pytest
 
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.traffic.conflicts import find_conflicts
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.streets import find_conflicts, make_signals, way_shares
+from cns_drake.traffic.signals import make_signals
+from cns_drake.traffic.traffic_flow import way_shares
 
 AHEAD = np.array([0.8, 0.6, 0.0])
 ASIDE = np.array([-0.6, 0.8, 0.0])

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 import shapely
 
+from cns_drake.traffic.conflicts import find_conflicts, swept_hulls
+from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
 from cns_drake.traffic.streets import (
-    STEP,
-    EgoBox,
-    find_conflicts,
     is_ego_far,
     make_streets,
     places_on,
     speed_on,
-    swept_hulls,
 )
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 

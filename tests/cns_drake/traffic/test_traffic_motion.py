@@ -14,13 +14,15 @@ from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_motion import (
+from cns_drake.traffic.body_states import (
     MOVING_SPEED,
     BodyStates,
     LimbTable,
-    add_traffic,
     bodies_at,
+)
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_motion import (
+    add_traffic,
     connect_traffic,
     make_traffic,
     traffic_structures,

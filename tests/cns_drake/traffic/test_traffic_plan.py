@@ -13,17 +13,20 @@ from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.traffic import traffic_plan
+from cns_drake.traffic.conflicts import find_conflicts
+from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.lane_graph import (
     LaneGraph,
     Piece,
     Walkway,
     make_crossing,
 )
-from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
-from cns_drake.traffic.streets import EgoBox, find_conflicts
+from cns_drake.traffic.road_lanes import make_lane_graph
+from cns_drake.traffic.road_walkways import make_walkways
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
-from cns_drake.traffic.vehicles import make_crossings, room_for_vehicles
+from cns_drake.traffic.vehicle_placement import room_for_vehicles
+from cns_drake.traffic.vehicle_records import make_crossings
 from cns_drake.traffic.walkers import Crowd
 from cns_drake.traffic.walkway_clearing import kept_clear
 

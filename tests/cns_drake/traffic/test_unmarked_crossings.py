@@ -8,6 +8,9 @@ import shapely.affinity
 
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.traffic.car_following import accelerations
+from cns_drake.traffic.ego_car import EgoBox
+from cns_drake.traffic.giving_way import find_prior
 from cns_drake.traffic.lane_graph import (
     LaneGraph,
     Piece,
@@ -15,18 +18,17 @@ from cns_drake.traffic.lane_graph import (
     make_crossing,
 )
 from cns_drake.traffic.right_of_way import grant_ways
-from cns_drake.traffic.road_lanes import make_lane_graph, make_walkways
-from cns_drake.traffic.streets import EgoBox, make_streets
+from cns_drake.traffic.road_lanes import make_lane_graph
+from cns_drake.traffic.road_walkways import make_walkways
+from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
 from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
-from cns_drake.traffic.vehicles import (
-    accelerations,
-    advance,
+from cns_drake.traffic.vehicle_records import (
     begin_traffic,
     find_occupants,
-    find_prior,
     make_crossings,
 )
+from cns_drake.traffic.vehicle_steps import advance
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
 TURN = 0.4

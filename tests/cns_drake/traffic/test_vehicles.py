@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from cns_drake.traffic.streets import PIECE, Streets
-from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
-from cns_drake.traffic.vehicles import (
-    CURRENT,
+from cns_drake.traffic.car_following import (
     HARDEST_BRAKING,
-    VEHICLE,
     free_acceleration,
     interaction,
-    vehicle_poses,
 )
+from cns_drake.traffic.streets import PIECE, Streets
+from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
+from cns_drake.traffic.vehicle_poses import vehicle_poses
+from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
 
 # Wanted speed [m/s], headway [s], acceleration and deceleration [m/s^2].
 V0 = 13.9

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
+from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway, make_crossing
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
-from cns_drake.traffic.streets import STEP
-from cns_drake.traffic.vehicles import make_crossings
+from cns_drake.traffic.vehicle_records import make_crossings
 from cns_drake.traffic.walkers import Crowd
 
 # Where all walkways begin [m].

@@ -1,0 +1,276 @@
+"""Reads a SUMO trace: floating-car data at even times.
+
+Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.traffic.vehicle_kinds import KINDS
+
+# Greatest deviation of times from even spacing, because of rounding in the file
+# [s].
+_TIME_TOLERANCE = 2e-3
+# A person this close to a vehicle's front is in the vehicle [m].
+_RIDING = 0.1
+# Part of the name of a type -> kind; the first one that matches applies.
+_KINDS_BY_WORD = (
+    ("bicycle", "bicycle"),
+    ("bike", "bicycle"),
+    ("motorcycle", "motorcycle"),
+    ("moped", "motorcycle"),
+    ("bus", "bus"),
+    ("coach", "bus"),
+    ("truck", "box_truck"),
+    ("trailer", "box_truck"),
+    ("van", "van"),
+    ("delivery", "van"),
+)
+# No vehicle or person is faster [m/s]. A faster body was moved by SUMO, which
+# teleports a vehicle that has waited for too long.
+_FASTEST = 80.0
+_FASTEST_OF = {"bicycle": 20.0, "person": 12.0}
+# A trace with more jumps has other units. Each would need a track of its own.
+_MOST_JUMPS = 1000
+
+
+@dataclass(frozen=True)
+class TracedObject:
+    """A vehicle or a person in a trace.
+
+    Attributes:
+        name: id of the object.
+        type_name: type of the object; "" if the trace has no types.
+        steps: (M,) numbers of the time steps at which the object exists,
+            ascending.
+        xy: (M, 2) position of a vehicle's front, or of a person's middle [m].
+        yaw: (M,) heading, from x towards y [rad].
+        slope: (M,) slope of the road, positive upwards [rad].
+        z: (M,) heights in the trace [m]; NaN without heights.
+    """
+
+    name: str
+    type_name: str
+    steps: np.ndarray
+    xy: np.ndarray
+    yaw: np.ndarray
+    slope: np.ndarray
+    z: np.ndarray
+
+
+@dataclass(frozen=True)
+class FcdTrace:
+    """A trace of SUMO with evenly spaced times.
+
+    Attributes:
+        begin: the first time [s].
+        dt: time between two entries [s].
+        num_steps: number of times.
+        vehicles, persons: the vehicles and the persons of the trace, each in
+            the order in which they appear.
+        notes: notes for the user on what is left out.
+    """
+
+    begin: float
+    dt: float
+    num_steps: int
+    vehicles: tuple[TracedObject, ...]
+    persons: tuple[TracedObject, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last entry [s]."""
+        return self.dt * (self.num_steps - 1)
+
+
+def read_fcd(path: Path) -> FcdTrace:
+    """Reads a SUMO trace from a file.
+
+    Raises:
+        InputError: the file cannot be read or is not a trace, or the trace is
+            empty or has times that are not evenly spaced.
+    """
+    root = read_elements(path, "fcd-export")
+    steps = list(root.all("timestep"))
+    with value_errors(path):
+        times = np.array([step.number("time") for step in steps])
+        begin, dt = _sampling_times(path, times)
+        vehicles = _traced_objects(steps, "vehicle")
+        notes = _without_riders(path, steps)
+        persons = _traced_objects(steps, "person")
+    jumps: list[str] = []
+    vehicles = _without_jumps(
+        vehicles, [kind_name(one) for one in vehicles], times, jumps
+    )
+    persons = _without_jumps(persons, ["person"] * len(persons), times, jumps)
+    if len(jumps) > _MOST_JUMPS:
+        raise InputError(
+            f"{path}: {len(jumps)} jumps from one timestep to the next, such as"
+            f" that of {jumps[0]}; times must be in seconds, places in metres"
+        )
+    if jumps:
+        notes += (
+            f"{path}: left out: {len(jumps)} jumps from one timestep to the"
+            f" next, such as that of {jumps[0]}",
+        )
+    if not vehicles and not persons:
+        raise InputError(
+            f"{path}: the trace has no vehicle and no person in any timestep"
+        )
+    return FcdTrace(begin, dt, len(times), vehicles, persons, notes)
+
+
+def _without_riders(path: Path, steps: list[Element]) -> tuple[str, ...]:
+    """Removes persons while they ride in vehicles; returns notes about it.
+
+    SUMO writes a rider at the front of the vehicle. Newer versions also name
+    the vehicle.
+
+    Raises:
+        ValueError: an object lacks a value.
+    """
+    riders, others = set(), set()
+    for step in steps:
+        fronts = {
+            (one.number("x"), one.number("y")) for one in step.all("vehicle")
+        }
+        places = np.reshape(list(fronts), (-1, 2))
+        for one in list(step.all("person")):
+            away = places - (one.number("x"), one.number("y"))
+            apart = np.hypot(*away.T).min(initial=np.inf)
+            if one.value("vehicle", "") or apart < _RIDING:
+                riders.add(one.value("id"))
+                step.remove(one)
+        others |= {
+            (one.tag, one.value("id", ""))
+            for one in step.all("*")
+            if one.tag not in ("vehicle", "person")
+        }
+    found = [(riders, "persons, while they ride in vehicles")] + [
+        ({one for one in others if one[0] == tag}, f"elements {tag}")
+        for tag in sorted({tag for tag, _ in others})
+    ]
+    return tuple(
+        f"{path}: left out: {len(names)} {what}"
+        for names, what in found
+        if names
+    )
+
+
+def _sampling_times(path: Path, times: np.ndarray) -> tuple[float, float]:
+    """Returns the first of evenly spaced times, and their distance [s].
+
+    Raises:
+        InputError: they are not evenly spaced.
+    """
+    if len(times) < 2:
+        raise InputError(
+            f"{path}: {len(times)} timesteps are too few; at least two are "
+            "needed"
+        )
+    dt = (times[-1] - times[0]) / (len(times) - 1)
+    expected = times[0] + dt * np.arange(len(times))
+    wrong = np.abs(times - expected) > _TIME_TOLERANCE
+    if dt <= _TIME_TOLERANCE or wrong.any():
+        where = times[int(wrong.argmax())]
+        raise InputError(
+            f"{path}: timestep {where:g}: times are not even; record every "
+            "step of SUMO, without --fcd-output.skip or device.fcd.period"
+        )
+    return float(times[0]), float(dt)
+
+
+def _traced_objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
+    """Returns the vehicles or persons, by the tag of their elements.
+
+    Raises:
+        ValueError: one lacks a value, or is there twice at the same time.
+    """
+    found: dict[str, list[tuple[float, ...]]] = {}
+    types: dict[str, str] = {}
+    for number, step in enumerate(steps):
+        for one in step.all(tag):
+            name = one.value("id")
+            rows = found.setdefault(name, [])
+            if rows and rows[-1][0] == number:
+                raise ValueError(
+                    f"line {one.line}: {tag} {name[:40]!r} is there twice"
+                )
+            types.setdefault(name, one.value("type", ""))
+            place = [one.number(key) for key in ("x", "y", "angle")]
+            z = one.number("z") if "z" in one.attrib else np.nan
+            rows.append((number, *place, one.number("slope", 0.0), z))
+    objects = []
+    for name, rows in found.items():
+        number, x, y, angle, slope, z = np.transpose(rows)
+        # In the file, angles are in degrees, clockwise from north, where y is
+        # north.
+        yaw = np.unwrap(np.pi / 2 - np.radians(angle))
+        at, xy = number.astype(int), np.column_stack([x, y])
+        objects.append(
+            TracedObject(name, types[name], at, xy, yaw, np.radians(slope), z)
+        )
+    return tuple(objects)
+
+
+def _without_jumps(
+    objects: Sequence[TracedObject],
+    kinds: Sequence[str],
+    times: np.ndarray,
+    jumps: list[str],
+) -> tuple[TracedObject, ...]:
+    """Returns objects without the steps that are too fast for their kind.
+
+    An object that jumps ends there, and another one with the same name begins.
+    A text on each jump is added to `jumps`.
+
+    Args:
+        objects: vehicles or persons.
+        kinds: kind of each object.
+        times: times of the trace [s].
+        jumps: list to which texts are added.
+    """
+    found = []
+    for one, kind in zip(objects, kinds, strict=True):
+        steps = np.diff(one.steps)
+        speeds = np.linalg.norm(np.diff(one.xy, axis=0), axis=1) / np.diff(
+            times[one.steps]
+        )
+        is_jump = (steps == 1) & (speeds > _FASTEST_OF.get(kind, _FASTEST))
+        ends = np.flatnonzero(is_jump) + 1
+        jumps += [
+            f"{one.name[:40]!r} at {times[one.steps[k]]:g} s, by"
+            f" {speeds[k - 1]:.0f} m/s"
+            for k in ends
+        ]
+        for begin, end in pairwise([0, *ends, len(one.steps)]):
+            part = slice(begin, end)
+            found.append(
+                replace(
+                    one,
+                    **{
+                        name: getattr(one, name)[part]
+                        for name in ("steps", "xy", "yaw", "slope", "z")
+                    },
+                )
+            )
+    return tuple(found)
+
+
+def kind_name(one: TracedObject) -> str:
+    """Returns the name of a vehicle's kind; "" if its type does not state it.
+
+    The result is one of `KINDS`.
+    """
+    text = one.type_name.lower().replace("default_biketype", "bicycle")
+    for word, name in _KINDS_BY_WORD:
+        if word in text:
+            return name
+    return text if text in {kind.name for kind in KINDS} else ""

@@ -1,0 +1,59 @@
+"""How vehicles spread over a lane graph, if each takes random directions."""
+
+import numpy as np
+
+from cns_drake.traffic.lane_graph import LaneGraph
+
+# Number of steps of a vehicle that takes random ways.
+_WANDERS = 200
+# For each driver who turns, this many go straight on.
+_STRAIGHT_SHARE = 3.0
+# For each driver who turns, this many turn round.
+_TURN_ROUND_SHARE = 0.02
+# Cosine of the angle between straight on and a turn; its negative lies between
+# a turn and turning round.
+_TURN_COSINE = 0.7
+
+
+def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
+    """Returns how drivers divide among the paths that follow a lane.
+
+    Args:
+        graph: the lane graph.
+        lane: number of the lane, which leads to a junction.
+
+    Returns:
+        Share of the drivers on each path in `graph.pieces[lane].after`; the sum
+        is 1.
+    """
+    after = graph.pieces[lane].after
+    likes = []
+    for way in after:
+        steps = np.diff(graph.pieces[way].points[:, :2], axis=0)[[0, -1]]
+        a, b = steps / np.linalg.norm(steps, axis=1)[:, None]
+        turn = a @ b
+        likes.append(
+            _STRAIGHT_SHARE
+            if turn > _TURN_COSINE
+            else 1.0
+            if turn > -_TURN_COSINE
+            else _TURN_ROUND_SHARE
+        )
+    return np.array(likes) / sum(likes)
+
+
+def flows(graph: LaneGraph) -> np.ndarray:
+    """Returns (P,) the share of vehicles on each piece, over a long time.
+
+    At each junction, vehicles choose any way, with the shares of `way_shares`.
+    """
+    pieces = graph.pieces
+    step = np.zeros((len(pieces), len(pieces)))
+    for k, piece in enumerate(pieces):
+        step[k, list(piece.after)] = way_shares(graph, k)
+    flow = np.full(len(pieces), 1.0 / len(pieces))
+    mean = np.zeros(len(pieces))
+    for _ in range(_WANDERS):
+        flow = flow @ step
+        mean += flow / _WANDERS
+    return mean

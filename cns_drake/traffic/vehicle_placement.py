@@ -1,0 +1,87 @@
+"""Where vehicles begin: at random places in lanes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.streets import Streets, is_ego_far
+from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
+from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
+
+# At the start, a vehicle needs this length of lane in addition to its own [m].
+_SPACE = 9.0
+# At the start, a vehicle drives at this share of the allowed speed.
+_PART_OF_SPEED = 0.5
+# Number of random places that are tried for a vehicle.
+_TRIES = 200
+
+
+def room_for_vehicles(graph: LaneGraph) -> int:
+    """Returns the number of vehicles that can move in the lanes of a graph."""
+    mean = sum(kind.share * kind.size[0] for kind in KINDS)
+    mean /= sum(kind.share for kind in KINDS)
+    return int(
+        sum(graph.pieces[k].length // (mean + 2 * _SPACE) for k in graph.lanes)
+    )
+
+
+def place_vehicles(
+    kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
+) -> tuple[np.ndarray, list[int]]:
+    """Places vehicles in lanes at random, away from the ego car's first place.
+
+    Args:
+        kinds: kind of each vehicle.
+        streets: arrays of all lanes, with the ego car.
+        rng: the random generator.
+
+    Returns:
+        Records of dtype `VEHICLE` of the vehicles for which a place was found;
+        and the index of each of these vehicles in `kinds`.
+    """
+    free = np.flatnonzero(~streets.pieces["is_way"])
+    lengths = streets.pieces["length"]
+    share = lengths[free] / lengths[free].sum()
+    taken: dict[int, list[tuple[float, float]]] = {}
+    found, paths, places = [], [], []
+    for number, kind in enumerate(kinds):
+        for _ in range(_TRIES):
+            lane = int(rng.choice(free, p=share))
+            length = lengths[lane]
+            low = kind.size[0] + 1.0
+            if length < low + 1.0:
+                continue
+            s = float(rng.uniform(low, length - 1.0))
+            span = (s - kind.size[0] - _SPACE / 2, s + _SPACE / 2)
+            if any(span[0] < b and a < span[1] for a, b in taken.get(lane, [])):
+                continue
+            if streets.until[0, lane] == 0.0 or not is_ego_far(
+                streets, 0, lane, s
+            ):
+                continue
+            taken.setdefault(lane, []).append(span)
+            found.append(number)
+            paths.append(lane)
+            places.append(s)
+            break
+    cars = np.zeros(len(found), VEHICLE)
+    for name in ("held", "left_lane", "path"):
+        cars[name] = -1
+    cars["since"], cars["change_length"] = np.inf, 1.0
+    cars["path"][:, CURRENT], cars["s"] = paths, places
+    for car, kind in zip(cars, (kinds[k] for k in found), strict=True):
+        car["length"], car["large"] = kind.size[0], kind.is_large
+        car["rear_axle"], car["front_axle"] = kind.axles
+        car["top"], car["factor"] = kind.top_speed, kind.speed_factor
+        car["a"], car["b"] = kind.acceleration, kind.deceleration
+        car["headway"] = kind.headway
+    cars["factor"] *= rng.uniform(0.9, 1.1, len(cars))
+    lanes = streets.pieces[paths]
+    points = lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
+    allowed = streets.speed[points]
+    v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
+    # Vehicles must be able to stop before the line or behind the vehicle ahead.
+    left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
+    cars["v"] = np.minimum(v, np.sqrt(1.5 * left))
+    return cars, found
