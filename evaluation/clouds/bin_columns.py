@@ -79,8 +79,8 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
     if columns is not None:
         return BinLayout(columns)
     files = [files[k] for k in sorted({0, len(files) // 2, len(files) - 1})]
-    values, places, sizes = _read_windows(files)
-    found = _find_period(values, places)
+    values, positions, sizes = _read_windows(files)
+    found = _find_period(values, positions)
     wanted = found or _USUAL
     for path, size in zip(files, sizes, strict=True):
         if size % (4 * wanted):
@@ -109,7 +109,7 @@ def find_layout(files: Sequence[Path], columns: int | None = None) -> BinLayout:
             # Impossible coordinates are refused later, when points are read.
             return layout
         # No LiDAR measures a negative intensity.
-        is_contrary = (values[places % _USUAL == 3] < 0.0).any()
+        is_contrary = (values[positions % _USUAL == 3] < 0.0).any()
     if is_contrary:
         raise InputError(
             f"{files[0]}: its values do not show how many columns it has; give"
@@ -141,23 +141,23 @@ def _read_windows(
             for k in np.unique(np.linspace(0, last, _WINDOWS).astype(int)):
                 stream.seek(4 * _WINDOW * int(k))
                 windows.append(np.fromfile(stream, "<f4", _WINDOW))
-    places = np.concatenate([np.arange(len(one)) for one in windows])
-    return np.concatenate(windows), places, sizes
+    positions = np.concatenate([np.arange(len(one)) for one in windows])
+    return np.concatenate(windows), positions, sizes
 
 
-def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
+def _find_period(values: np.ndarray, positions: np.ndarray) -> int | None:
     """Returns the number of columns found from the values, or None.
 
     Args:
         values: (N,) in the order of the file.
-        places: (N,) positions of the values, see `_read_windows`.
+        positions: (N,) positions of the values, see `_read_windows`.
     """
     # Beams without a return are stored as zeros or NaN, alike in all columns.
     is_value = np.isfinite(values) & (values != 0.0)
-    shown = _period_of_zeros(is_value, places)
+    shown = _period_of_zeros(is_value, positions)
     if shown is not None:
         return shown
-    values, places = values[is_value], places[is_value]
+    values, positions = values[is_value], positions[is_value]
     num_bins = min(_MOST_BINS, len(values) // _FILLED)
     candidates = [k for k in _CANDIDATES if k * _FILLED <= len(values)]
     if num_bins < 2 or not candidates:
@@ -167,7 +167,7 @@ def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
     bins = np.searchsorted(edges, values, side="right")
     tables = {
         k: np.histogram2d(
-            places % k, bins, (np.arange(k + 1), np.arange(len(edges) + 2))
+            positions % k, bins, (np.arange(k + 1), np.arange(len(edges) + 2))
         )[0]
         for k in candidates
     }
@@ -193,18 +193,18 @@ def _find_period(values: np.ndarray, places: np.ndarray) -> int | None:
     return found
 
 
-def _period_of_zeros(is_value: np.ndarray, places: np.ndarray) -> int | None:
+def _period_of_zeros(is_value: np.ndarray, positions: np.ndarray) -> int | None:
     """Returns the number of columns if some hold zeros alone, others none.
 
     Args:
         is_value: (N,) whether a value is neither zero nor NaN.
-        places: (N,) positions of the values.
+        positions: (N,) positions of the values.
     """
     for k in _CANDIDATES:
-        if k * _FILLED > len(places):
+        if k * _FILLED > len(positions):
             break
-        counts = np.bincount(places % k, minlength=k)
-        filled = np.bincount(places % k, weights=is_value, minlength=k)
+        counts = np.bincount(positions % k, minlength=k)
+        filled = np.bincount(positions % k, weights=is_value, minlength=k)
         zero = filled == 0
         if not (zero.any() and (filled > 0).any()):
             continue

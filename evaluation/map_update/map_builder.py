@@ -54,8 +54,8 @@ class MapBuilder:
         keys, first = np.unique(keys, return_index=True)
         is_new = np.ones(len(keys), bool)
         for part in self._parts:
-            places = np.minimum(np.searchsorted(part, keys), len(part) - 1)
-            is_new &= part[places] != keys
+            positions = np.minimum(np.searchsorted(part, keys), len(part) - 1)
+            is_new &= part[positions] != keys
         if not is_new.any():
             return
         # The order of the points follows the order of the scans.

@@ -72,14 +72,15 @@ def verdicts(
     """
     unobserved, kept, changed = SIDES[side]
     rows = np.flatnonzero(instances)
-    numbers, places = np.unique(instances[rows], return_inverse=True)
+    numbers, number_of = np.unique(instances[rows], return_inverse=True)
     chosen = (
         np.ones(len(rows), bool),
         np.isin(labels[rows], (kept, changed)),
         labels[rows] == changed,
     )
     count = np.stack(
-        [np.bincount(places[c], minlength=len(numbers)) for c in chosen], axis=1
+        [np.bincount(number_of[c], minlength=len(numbers)) for c in chosen],
+        axis=1,
     )
     found = np.where(2 * count[:, 2] > count[:, 1], changed, kept)
     return numbers, count, np.where(count[:, 1] == 0, unobserved, found)

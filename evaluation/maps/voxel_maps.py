@@ -124,9 +124,9 @@ class VoxelMap:
         weights = np.array([spans[1] * spans[2], spans[2], 1])
         keys = (self.indices - low) @ weights
         sought = (wanted - low) @ weights
-        places = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
+        rows = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
         inside = ((wanted >= low) & (wanted <= high)).all(axis=1)
-        return np.where(inside & (keys[places] == sought), places, -1)
+        return np.where(inside & (keys[rows] == sought), rows, -1)
 
 
 class VoxelAccumulator:

@@ -76,9 +76,9 @@ def _locate(
     p: tuple[float, float, float], X: np.ndarray, voxel_size: float
 ) -> tuple[float, float, float]:
     """Returns a coordinate, its voxel, and its offset in the voxel [m]."""
-    place = X[0] * p[0] + X[1] * p[1] + X[2] * p[2] + X[3]
-    cell = np.floor(place / voxel_size)
-    return place, cell, place - cell * voxel_size
+    coordinate = X[0] * p[0] + X[1] * p[1] + X[2] * p[2] + X[3]
+    cell = np.floor(coordinate / voxel_size)
+    return coordinate, cell, coordinate - cell * voxel_size
 
 
 @compiled

@@ -135,12 +135,12 @@ def height_image(
             y -= height * axes[2, 1]
             z -= height * axes[2, 2]
             for axis in range(2):
-                place = (
+                along_axis = (
                     axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
                 )
-                near[num_near, axis] = place
-                low[axis] = min(low[axis], place)
-                high[axis] = max(high[axis], place)
+                near[num_near, axis] = along_axis
+                low[axis] = min(low[axis], along_axis)
+                high[axis] = max(high[axis], along_axis)
             near[num_near, 2] = height
             num_near += 1
     shape = (_SEGMENT, _SEGMENT)

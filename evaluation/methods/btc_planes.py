@@ -211,12 +211,12 @@ def _moments_of_voxels(
         times their number.
     """
     num_points = len(points)
-    places = np.empty(3 * num_points, dtype=np.int64)
+    cells = np.empty(3 * num_points, dtype=np.int64)
     for i, coordinate in enumerate(points.ravel()):
         scaled = coordinate / voxel_size
         # As in the public program: truncated, and one less below zero,
         # so that a negative multiple belongs to the voxel below it.
-        places[i] = int(scaled - 1.0 if scaled < 0.0 else scaled)
+        cells[i] = int(scaled - 1.0 if scaled < 0.0 else scaled)
     members = np.empty(num_points, dtype=np.int32)
     index = np.empty((num_points, 3), dtype=np.int64)
     counts = np.empty(num_points, dtype=np.int64)
@@ -228,7 +228,7 @@ def _moments_of_voxels(
         size *= 2
     table = np.full(size, -1, dtype=np.int32)
     for i in range(num_points):
-        x, y, z = places[3 * i], places[3 * i + 1], places[3 * i + 2]
+        x, y, z = cells[3 * i], cells[3 * i + 1], cells[3 * i + 2]
         # Large odd factors spread neighbouring voxels; products wrap around.
         slot = (x * 73856093 ^ y * 19349669 ^ z * 83492791) & (size - 1)
         voxel = table[slot]

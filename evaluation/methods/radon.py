@@ -32,15 +32,17 @@ def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
     row, column = np.divmod(pixels, size)
     cosines, sines = np.cos(angles), np.sin(angles)
     width = np.maximum(np.abs(cosines), np.abs(sines))
-    place = (
+    projected = (
         centre
         + (column - centre)[:, None] * cosines
         - (row - centre)[:, None] * sines
     )
     # width <= 1, so that at most two rays pass near enough.
-    left = np.floor(place)
+    left = np.floor(projected)
     rays = np.stack([left, left + 1.0], axis=1)
-    share = np.maximum(1.0 - np.abs(rays - place[:, None]) / width, 0.0) / width
+    share = (
+        np.maximum(1.0 - np.abs(rays - projected[:, None]) / width, 0.0) / width
+    )
     share[(rays < 0.0) | (rays >= size)] = 0.0
     cells = np.arange(len(angles)) * size + np.clip(rays, 0.0, size - 1.0)
     # A column for each pixel, with two rays of each angle.

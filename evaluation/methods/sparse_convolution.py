@@ -39,9 +39,9 @@ def convolve(
         offset = np.unravel_index(number, (size, size, size), "F")
         offset = step * (np.array(offset) - size // 2 * (size % 2))
         wanted = packed_cells(at + offset)
-        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        known = keys[place] == wanted
-        result[known] += features[order[place[known]]] @ weights
+        position = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        known = keys[position] == wanted
+        result[known] += features[order[position[known]]] @ weights
     return result
 
 

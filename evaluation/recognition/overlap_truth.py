@@ -142,7 +142,7 @@ def compared_frames(
     )
 
 
-def best_overlaps(
+def overlaps_with_best_match(
     place_scans: list[np.ndarray],
     X_WPs: np.ndarray,
     query_scans: list[np.ndarray],

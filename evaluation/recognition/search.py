@@ -62,7 +62,7 @@ class Search:
             InputError: the method returns something other than scores.
         """
         self.query_ms = np.zeros(len(rows))
-        shares = self._entries_by_group(query, rows, is_known)
+        entries = self._entries_by_group(query, rows, is_known)
         scores = np.empty(is_known.shape)
         for number, group in self._groups_in_memory():
             for k in self._tracked(query, rows):
@@ -72,7 +72,7 @@ class Search:
                     rows[k],
                     is_known[k],
                     group,
-                    None if shares is None else int(shares[k, number]),
+                    None if entries is None else int(entries[k, number]),
                 )
                 self.query_ms[k] += (process_time_ns() - start) * 1e-6
         return scores
@@ -124,7 +124,7 @@ class Search:
         most = method.num_shortlisted
         if len(self._groups) == 1 or most is None:
             return None
-        lists: list[list[np.ndarray]] = [
+        shortlists: list[list[np.ndarray]] = [
             [np.empty(0)] * len(self._groups) for _ in rows
         ]
         for number, _ in self._groups_in_memory():
@@ -132,17 +132,17 @@ class Search:
                 if not is_known[k].all():
                     continue
                 start = process_time_ns()
-                lists[k][number] = method.shortlist(
+                shortlists[k][number] = method.shortlist(
                     query.queries.descriptors[rows[k]], self._database
                 )
                 self.query_ms[k] += (process_time_ns() - start) * 1e-6
-        shares = np.zeros((len(rows), len(self._groups)), np.int64)
-        for k, some in enumerate(lists):
+        entries = np.zeros((len(rows), len(self._groups)), np.int64)
+        for k, some in enumerate(shortlists):
             of = np.repeat(np.arange(len(some)), [len(one) for one in some])
             # Of equal entries, the entry of the first group comes first.
             best = np.argsort(-np.concatenate(some), kind="stable")[:most]
-            shares[k] = np.bincount(of[best], minlength=len(some))
-        return shares
+            entries[k] = np.bincount(of[best], minlength=len(some))
+        return entries
 
     def _scores_in_group(
         self,
@@ -150,15 +150,15 @@ class Search:
         row: int,
         is_known: np.ndarray,
         group: slice,
-        share: int | None,
+        num_entries: int | None,
     ) -> np.ndarray:
         """Returns the scores of a query in a group; see `_entries_by_group`."""
         queries = query.queries
         method = self._method
         is_whole = bool(is_known.all())
-        if share is not None and is_whole:
+        if num_entries is not None and is_whole:
             found = method.score_best(
-                queries.descriptors[row], self._database, share
+                queries.descriptors[row], self._database, num_entries
             )
             number = group.stop - group.start
             return checked_scores(method, "score_best", found, number)

@@ -17,7 +17,7 @@ from evaluation.recognition.costs import query_ms
 from evaluation.recognition.describing import Role
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.kept_places import KEEP_ALL
-from evaluation.recognition.overlap_truth import best_overlaps
+from evaluation.recognition.overlap_truth import overlaps_with_best_match
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import (
@@ -113,7 +113,7 @@ def shown_overlaps(
                 for frame in database.places.frames[of].tolist()
             ]
         for radius in radii:
-            shown = best_overlaps(
+            shown = overlaps_with_best_match(
                 chosen,
                 database.places.X_WS[of],
                 asked,
@@ -286,7 +286,7 @@ def _overlaps_of_matches(
         matches: (Q, D) which places match the queries within the radius.
     """
     if radius not in overlaps:
-        overlaps[radius] = best_overlaps(
+        overlaps[radius] = overlaps_with_best_match(
             place_scans,
             database.places.X_WS,
             query_scans,
