@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Polygon, box
 
 from cns_drake.city.facades import Assembly, add_chimney, equip_roof
-from cns_drake.city.geometry import Finish, upper_sides
+from cns_drake.city.geometry import Finish, long_normals, upper_sides
 from cns_drake.imports.dressing.styles import Style
 
 # A roof is level if the z of its unit normal is greater than this.
@@ -47,7 +47,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
 
     `roof` contains the triangles (M, 3, 3) of the roof [m].
     """
-    above = np.abs(upper_sides.long_normals(roof)[:, 2])
+    above = np.abs(long_normals(roof)[:, 2])
     level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL_COSINE
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 
