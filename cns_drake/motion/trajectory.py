@@ -132,7 +132,7 @@ class Trajectory:
     def poses(self, t: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at times (N,)."""
         jet = self.path.evaluate(self.path_parameter(t)[0])
-        R_WF = _rotations(jet)
+        R_WF = _path_rotations(jet)
         if self._ride is None:
             return R_WF, jet.p
         ride = ride_motion(self._ride.at(t))
@@ -166,7 +166,7 @@ def poses_and_motion(
     return X_WBs, motion
 
 
-def _rotations(jet: PathJet) -> np.ndarray:
+def _path_rotations(jet: PathJet) -> np.ndarray:
     yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
     # Capital letters: one after the other, about the axes of the vehicle.
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
@@ -185,7 +185,7 @@ def _path_motion(
     turning = (yaw_rate * pitch_rate)[:, None] * cross(_UP, left)
     rate, acceleration = rate[:, None], acceleration[:, None]
     return FrameMotion(
-        R=_rotations(jet),
+        R=_path_rotations(jet),
         p=jet.p,
         w=yaw_rate[:, None] * _UP + pitch_rate[:, None] * left,
         v=jet.dp * rate,

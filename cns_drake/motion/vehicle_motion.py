@@ -108,7 +108,7 @@ class VehicleMotion(LeafSystem):
         self._default = plant.CreateDefaultContext()
         self._block = functools.lru_cache(maxsize=4)(self._calc_block)
         self._joints = [
-            (joint, *self._joint_motion(joint))
+            (joint, *self._find_joint_motion(joint))
             for joint in map(plant.get_joint, plant.GetJointIndices(vehicle))
             if joint.num_velocities() > 0
             and joint.child_body().index() != self._base.index()
@@ -135,11 +135,11 @@ class VehicleMotion(LeafSystem):
             self.DeclareAbstractOutputPort(
                 name,
                 lambda element=element: AbstractValue.Make([element]),
-                functools.partial(self._calc_bodies, name),
+                functools.partial(self._calc_body_list, name),
                 prerequisites,
             )
 
-    def _joint_motion(
+    def _find_joint_motion(
         self, joint: Joint
     ) -> tuple[Callable[[Moments], JointMotion], float]:
         """Returns the function for the motion of a joint, and its sign."""
@@ -168,7 +168,7 @@ class VehicleMotion(LeafSystem):
         period = self._period
         tick = round(time / period) if period else 0
         if period is None or tick * period != time:
-            states = self._states(np.array([time]))
+            states = self._calc_states(np.array([time]))
             row = 0
         else:
             number, row = divmod(tick, _BLOCK)
@@ -181,9 +181,9 @@ class VehicleMotion(LeafSystem):
 
     def _calc_block(self, number: int, period: float) -> _State:
         ticks = number * _BLOCK + np.arange(_BLOCK)
-        return self._states(ticks * period)
+        return self._calc_states(ticks * period)
 
-    def _states(self, times: np.ndarray) -> _State:
+    def _calc_states(self, times: np.ndarray) -> _State:
         """Returns the states at times (N,); each depends only on its time."""
         plant = self._plant
         base = self._base
@@ -210,7 +210,7 @@ class VehicleMotion(LeafSystem):
         now, _ = self._state.Eval(context)
         output.SetFromVector(self._plant.GetPositions(now))
 
-    def _calc_bodies(
+    def _calc_body_list(
         self, name: str, context: Context, output: AbstractValue
     ) -> None:
         plant = self._plant

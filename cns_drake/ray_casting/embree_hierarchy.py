@@ -75,7 +75,9 @@ class EmbreeHierarchy:
             self._device = previous._device
             self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
-        weakref.finalize(self, _release, self._lib, self._device, self._scenes)
+        weakref.finalize(
+            self, _release_scenes, self._lib, self._device, self._scenes
+        )
         # Groups of the same shapes share their scene.
         before = {} if previous is None else previous._by_content
         self._by_content: dict[tuple, _Built] = {}
@@ -85,7 +87,7 @@ class EmbreeHierarchy:
             if content not in self._by_content:
                 built = before.get(content)
                 if built is None:
-                    built = self._build(list(merge(group)))
+                    built = self._build_scene(list(merge(group)))
                 elif built.scene:
                     self._lib.rtcRetainScene(built.scene)
                     self._scenes.append(built.scene)
@@ -218,7 +220,7 @@ class EmbreeHierarchy:
         self._scenes.append(scene)
         return scene
 
-    def _build(self, parts: Sequence[Primitives]) -> _Built:
+    def _build_scene(self, parts: Sequence[Primitives]) -> _Built:
         if not parts:
             return _Built(0, ())
         scene = self._new_scene()
@@ -283,7 +285,9 @@ def _list_owners(scenes: Collection[_Built]) -> tuple[np.ndarray, np.ndarray]:
     return first, np.concatenate(owners)
 
 
-def _release(lib: ctypes.CDLL, device: int, scenes: Sequence[int]) -> None:
+def _release_scenes(
+    lib: ctypes.CDLL, device: int, scenes: Sequence[int]
+) -> None:
     for scene in reversed(scenes):
         lib.rtcReleaseScene(scene)
     lib.rtcReleaseDevice(device)

@@ -62,14 +62,14 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
     shapes; any other group adds a polyhedron around each curved shape instead.
     All rays are cast on the first hierarchy.
     """
-    members = _numbered(group)
+    members = _numbered_members(group)
     flat = [
         (index, X_LG, surface)
         for index, X_LG, surface in members
         if isinstance(surface, TriangleSurface)
     ]
     if flat:
-        yield _as_primitives(flat, FLAT)
+        yield _triangle_primitives(flat, FLAT)
     if group.frame_id is not None:
         yield from merge_curved(members)
         return
@@ -79,7 +79,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
         if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
     ]
     if curved:
-        yield _as_primitives(curved, PROXY)
+        yield _triangle_primitives(curved, PROXY)
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
@@ -91,10 +91,10 @@ def merge_second(group: RayGroup) -> Iterator[Primitives]:
     `merge_first`).
     """
     if group.frame_id is None:
-        yield from merge_curved(_numbered(group))
+        yield from merge_curved(_numbered_members(group))
 
 
-def _numbered(group: RayGroup) -> list[Member]:
+def _numbered_members(group: RayGroup) -> list[Member]:
     """Returns a group's members, numbered from 0 within the group.
 
     The primitives then depend only on the shapes, so that groups of the same
@@ -103,7 +103,7 @@ def _numbered(group: RayGroup) -> list[Member]:
     return [(k, X, surface) for k, (_, X, surface) in enumerate(group.members)]
 
 
-def _as_primitives(
+def _triangle_primitives(
     surfaces: Sequence[tuple[int, RigidTransform, TriangleSurface]], mask: int
 ) -> Primitives:
     merged, owners = merge_triangles(surfaces)
@@ -158,18 +158,22 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         if segments:
             ends_of = embree.INDEX_BUFFER, embree.UINT, first_ends
             yield Primitives(
-                kind, [_vertices(segments), ends_of], _owners(segments)
+                kind,
+                [_vertex_buffer(segments), ends_of],
+                _owner_numbers(segments),
             )
     if discs:
         normals = _float32(d[2] for d in discs)
         facing = embree.NORMAL_BUFFER, embree.FLOAT3, normals
-        owners = np.repeat(_owners(discs), 2)
-        yield Primitives(embree.DISC, [_vertices(discs), facing], owners)
+        owners = np.repeat(_owner_numbers(discs), 2)
+        yield Primitives(embree.DISC, [_vertex_buffer(discs), facing], owners)
     if spheres:
-        yield Primitives(embree.SPHERE, [_vertices(spheres)], _owners(spheres))
+        yield Primitives(
+            embree.SPHERE, [_vertex_buffer(spheres)], _owner_numbers(spheres)
+        )
 
 
-def _owners(shapes: Iterable[tuple]) -> np.ndarray:
+def _owner_numbers(shapes: Iterable[tuple]) -> np.ndarray:
     return np.array([owner for owner, *_ in shapes], np.int32)
 
 
@@ -188,7 +192,7 @@ def _cut_shape(
     return [joints[k : k + 2] for k in range(len(joints) - 1)]
 
 
-def _vertices(shapes: Iterable[tuple]) -> tuple[int, int, np.ndarray]:
+def _vertex_buffer(shapes: Iterable[tuple]) -> tuple[int, int, np.ndarray]:
     places = _float32(shape[1] for shape in shapes)
     return embree.VERTEX_BUFFER, embree.FLOAT4, places
 

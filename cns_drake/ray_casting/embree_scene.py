@@ -88,11 +88,11 @@ class EmbreeScene:
             rays, mask=solid | PROXY, with_normals=with_normals
         )
         if self._second.rows:
-            self._cast_again(rays, hits, with_normals, solid)
+            self._cast_on_curved_shapes(rays, hits, with_normals, solid)
         self._axes.cast(rays, hits)
         return hits
 
-    def _cast_again(
+    def _cast_on_curved_shapes(
         self, rays: Rays, hits: Hits, with_normals: bool, solid: int
     ) -> None:
         """Updates hits of rays that may meet curved shapes that never move."""

@@ -29,7 +29,7 @@ _EDGE_TOLERANCE = 1e-9
 # Additional tolerance for rounding, relative to the numbers that are rounded.
 _ROUNDING_TOLERANCE = 1e-14
 # Greatest error of a hit by rounding, as a share of the triangle's size.
-_PARALLEL = 1e-3
+_LARGEST_ERROR = 1e-3
 
 
 class ExactTriangles:
@@ -74,7 +74,7 @@ class ExactTriangles:
                 continue
             X_OL = group.X_OL_at(np.array([time]))[0]
             R_LO = np.array(inv(X_OL[:, :3]))
-            _cast(
+            _cast_on_group(
                 tree,
                 R_LO,
                 X_OL[:, 3].copy(),
@@ -110,7 +110,7 @@ def _entry_distance(
 
 
 @compiled
-def _cast(
+def _cast_on_group(
     tree: TriangleTree,
     R_LO: np.ndarray,
     p_OL: np.ndarray,
@@ -178,7 +178,7 @@ def _cast(
                 rounding = _ROUNDING_TOLERANCE * longest * far
                 # In the plane of the triangle, as far as numbers tell: the ray
                 # meets the edge of a neighbour instead.
-                if rounding >= _PARALLEL * abs(det):
+                if rounding >= _LARGEST_ERROR * abs(det):
                     continue
                 distance = (n[0] * s[0] + n[1] * s[1] + n[2] * s[2]) / det
                 if not 0.0 < distance < best:

@@ -419,7 +419,7 @@ class McapRecorder(LeafSystem):
             # Written at the first frame. A bag takes latched messages once: a
             # resumed one has this already.
             tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
-            self._write(TF_STATIC_TOPIC, tf, stamp_ns, 0)
+            self._write_message(TF_STATIC_TOPIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}
         if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._motion_messages(context, stamp_ns)
@@ -434,7 +434,7 @@ class McapRecorder(LeafSystem):
         for topic, message in outgoing.items():
             if topic.name in due:
                 number = tick // self._schedule.steps[topic.name]
-                self._write(topic, message, stamp_ns, number)
+                self._write_message(topic, message, stamp_ns, number)
         return EventStatus.Succeeded()
 
     def _motion_messages(
@@ -505,10 +505,10 @@ class McapRecorder(LeafSystem):
             if number * step == tick:
                 made[IMU_TOPIC] = message
             else:
-                self._write(IMU_TOPIC, message, stamp_ns, number)
+                self._write_message(IMU_TOPIC, message, stamp_ns, number)
         return made
 
-    def _write(
+    def _write_message(
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
     ) -> None:
         if not isinstance(message, bytes):

@@ -60,7 +60,9 @@ def _complete_frames(
     missing = {*latched, *schedule.due(tick)}
     frame: list[RecordedMessage] = []
     for message in messages:
-        if message.topic not in missing or not _is_at(message, tick, schedule):
+        if message.topic not in missing or not _is_due_at(
+            message, tick, schedule
+        ):
             return
         frame.append(message)
         missing.remove(message.topic)
@@ -77,7 +79,7 @@ def _complete_frames(
             frame = []
 
 
-def _is_at(message: RecordedMessage, tick: int, schedule: Schedule) -> bool:
+def _is_due_at(message: RecordedMessage, tick: int, schedule: Schedule) -> bool:
     """Returns whether a message has the time and the number of a tick."""
     step = schedule.steps.get(message.topic, 1)
     return (

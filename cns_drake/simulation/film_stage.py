@@ -74,7 +74,7 @@ class FilmStage(Step):
                 pixels = _image_with_points(
                     diagram, context, name, camera, points
                 )
-                _titled(pixels, title).save(
+                _with_title(pixels, title).save(
                     self.folder / f"{first + k:06d}.png", compress_level=1
                 )
             doing("filming", k + 1, len(self.times), "images")
@@ -134,7 +134,7 @@ def _draw_points(
     pixels[row[seen], column[seen]] = rgb
 
 
-def _titled(pixels: np.ndarray, title: str) -> Image.Image:
+def _with_title(pixels: np.ndarray, title: str) -> Image.Image:
     image = Image.fromarray(pixels)
     size = max(image.height // 16, 8)
     ImageDraw.Draw(image).text(

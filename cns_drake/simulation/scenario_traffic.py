@@ -95,7 +95,7 @@ def plan_scenario_traffic(
             ego=ego,
             ego_box=EGO_BOX,
         )
-    _check_room(wanted, _source(scenario), graph, walkways)
+    _check_room(wanted, _error_source(scenario), graph, walkways)
     if wanted.walkers:
         world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
         things = _sidewalk_obstacles(world)
@@ -118,7 +118,7 @@ def _ego_path(trajectory: Trajectory) -> EgoPath:
     return ego
 
 
-def _source(scenario: Scenario) -> str:
+def _error_source(scenario: Scenario) -> str:
     """Returns the start of the message of an error in the traffic's fields."""
     return f"{scenario.source}: traffic"
 
@@ -154,7 +154,7 @@ def _plan_moving_traffic(
     )
     if wanted.vehicles and not plan.kinds:
         raise InputError(
-            f"{_source(scenario)}: the car leaves no room for vehicles"
+            f"{_error_source(scenario)}: the car leaves no room for vehicles"
         )
     if follows and plan.positions is None:
         raise InputError(

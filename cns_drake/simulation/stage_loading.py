@@ -32,7 +32,7 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
     """
     scenario = plan.scenario
     doing("reading the stage")
-    in_the_way = _in_the_way(scenario)
+    in_the_way = _structures_on_lanes(scenario)
     world = load_world(
         scenario.world_file,
         vehicle=vehicle_file() if with_vehicle else None,
@@ -53,7 +53,7 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
     return change_world(world, scenario.transient, drive, driven)
 
 
-def _in_the_way(scenario: Scenario) -> Sequence[str]:
+def _structures_on_lanes(scenario: Scenario) -> Sequence[str]:
     """Returns the names of structures that stand where traffic drives."""
     if scenario.traffic.is_off or scenario.map is None:
         return ()

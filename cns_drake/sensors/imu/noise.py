@@ -102,7 +102,7 @@ class ImuErrors:
         white, walk, turn_on, self._range = np.repeat(pairs, 3, axis=1)
         self._white = white * np.sqrt(rate)
         self._walk = walk / np.sqrt(rate)
-        self._turn_on = turn_on * self._draw(_TURN_ON, 0, 1)[0]
+        self._turn_on = turn_on * self._draw_normals(_TURN_ON, 0, 1)[0]
         # Threads may share the errors.
         self._block = lru_cache(maxsize=4)(self._calc_block)
 
@@ -137,14 +137,14 @@ class ImuErrors:
         if self._walk.any():
             errors += self._walk * self._walk_in_block(number)
         if self._white.any():
-            errors += self._white * self._draw(_WHITE, number, _BLOCK)
+            errors += self._white * self._draw_normals(_WHITE, number, _BLOCK)
         return errors
 
     def _walk_in_block(self, number: int) -> np.ndarray:
         """Returns a block (1024, 6) of a walk with standard normal steps."""
         start = self._walk_at_block(number)
         end = self._walk_at_block(number + 1)
-        steps = self._draw(_WALK_STEPS, number, _BLOCK)
+        steps = self._draw_normals(_WALK_STEPS, number, _BLOCK)
         free = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
         # The walk has given values at both ends of the block: a straight line
         # is added to a free walk so that it ends at the right value.
@@ -155,21 +155,23 @@ class ImuErrors:
         """Returns the walk (6,) at the start of a block."""
         low, high = 0, _MOST_BLOCKS if number > 0 else -_MOST_BLOCKS
         at_low = np.zeros(6)
-        at_high = np.sqrt(_BLOCK * _MOST_BLOCKS) * self._node(high)
+        at_high = np.sqrt(_BLOCK * _MOST_BLOCKS) * self._walk_node(high)
         while number != low:
             middle = (low + high) // 2
             spread = 0.5 * np.sqrt(_BLOCK * abs(high - low))
-            at_middle = (at_low + at_high) / 2 + spread * self._node(middle)
+            node = self._walk_node(middle)
+            at_middle = (at_low + at_high) / 2 + spread * node
             if abs(number) < abs(middle):
                 high, at_high = middle, at_middle
             else:
                 low, at_low = middle, at_middle
         return at_low
 
-    def _node(self, block: int) -> np.ndarray:
-        return self._draw(_WALK_AT_BLOCK, block, 1)[0]
+    def _walk_node(self, block: int) -> np.ndarray:
+        """Returns the standard normal numbers (6,) of the start of a block."""
+        return self._draw_normals(_WALK_AT_BLOCK, block, 1)[0]
 
-    def _draw(self, purpose: int, index: int, count: int) -> np.ndarray:
+    def _draw_normals(self, purpose: int, index: int, count: int) -> np.ndarray:
         """Returns (count, 6) standard normal numbers."""
         generator = noise_generator(
             self._noise.seed, self._noise.sensor_name, purpose, index

@@ -156,7 +156,7 @@ class VehicleImu(LeafSystem):
         if is_sample_time(time, self._rate):
             sample = self._samples_between(number, number + 1)
         else:
-            sample = self._measure(number, np.array([time]))
+            sample = self._measure_at(number, np.array([time]))
         output.SetFromVector(getattr(sample, name)[0])
 
     def _calc_samples(self, context: Context, output: AbstractValue) -> None:
@@ -174,9 +174,9 @@ class VehicleImu(LeafSystem):
 
     def _calc_block(self, number: int) -> ImuSamples:
         start = number * _BLOCK
-        return self._measure(start, (start + np.arange(_BLOCK)) / self._rate)
+        return self._measure_at(start, (start + np.arange(_BLOCK)) / self._rate)
 
-    def _measure(self, first: int, times: np.ndarray) -> ImuSamples:
+    def _measure_at(self, first: int, times: np.ndarray) -> ImuSamples:
         """Returns samples number `first` onwards, taken at (N,) times [s]."""
         # Before the start the vehicle rests, as after the end.
         motion = self._trajectory.body_motion(np.maximum(times, 0.0))

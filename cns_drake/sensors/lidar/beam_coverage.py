@@ -36,7 +36,7 @@ class BeamCoverage:
         from scipy.ndimage import maximum_filter, minimum_filter
 
         hit = np.zeros((_ROWS, _COLUMNS), np.uint8)
-        hit[_cells(d_Sset)] = 1
+        hit[_cell_indices(d_Sset)] = 1
         # Azimuths go round, elevations do not.
         modes = ("constant", "wrap")
         field = maximum_filter(hit, 2 * _GAP_CELLS + 1, mode=modes)
@@ -51,10 +51,10 @@ class BeamCoverage:
         Args:
             d_Sset: (N, 3) unit directions, expressed in S.
         """
-        return self._is_covered[_cells(d_Sset)]
+        return self._is_covered[_cell_indices(d_Sset)]
 
 
-def _cells(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cell_indices(d_Sset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns row and column of the cells of unit directions (N, 3)."""
     x, y, z = d_Sset.T
     elevation_deg = np.degrees(np.arcsin(np.clip(z, -1.0, 1.0))) + 90.0

@@ -192,7 +192,7 @@ class LimitedPattern(BeamPattern):
         self.repeats = whole.repeats
         self._whole = whole
         self._limits = tuple(azimuths_deg), tuple(elevations_deg)
-        self._first = _limit(whole.beams(0), *self._limits)
+        self._first = _limited_beams(whole.beams(0), *self._limits)
         if len(self._first.column) == 0:
             raise ValueError(
                 f"no beam within azimuths {azimuths_deg} and elevations "
@@ -202,11 +202,11 @@ class LimitedPattern(BeamPattern):
     def beams(self, frame: int) -> Beams:
         if self.repeats or frame == 0:
             return self._first
-        return _limit(self._whole.beams(frame), *self._limits)
+        return _limited_beams(self._whole.beams(frame), *self._limits)
 
 
 @lru_cache(maxsize=4)
-def _limit(
+def _limited_beams(
     beams: Beams,
     azimuths_deg: tuple[float, ...],
     elevations_deg: tuple[float, ...],

@@ -138,7 +138,7 @@ class MeasurementModel:
         ranges = true_ranges
         num_beams = len(true_ranges)
         if self.range_noise > 0.0:
-            error = self._generator(_RANGE_NOISE, frame).standard_normal(
+            error = self._make_generator(_RANGE_NOISE, frame).standard_normal(
                 num_beams, np.float32
             )
             ranges = ranges + np.float32(self.range_noise) * error
@@ -150,7 +150,9 @@ class MeasurementModel:
             distance = true_ranges.take(beams)
         intensity = np.exp(-_ATTENUATION_PER_M * distance)
         if self.dropout > 0.0 or self.faint_dropout > 0.0:
-            draw = self._generator(_DROPOUT, frame).random(num_beams)[beams]
+            draw = self._make_generator(_DROPOUT, frame).random(num_beams)[
+                beams
+            ]
             survival = (1.0 - self.dropout) * (
                 1.0 - self.faint_dropout * (1.0 - intensity.astype(float))
             )
@@ -162,7 +164,7 @@ class MeasurementModel:
             intensity = np.rint(intensity / step) * step
         return Returns(beams, measured, intensity)
 
-    def _generator(self, purpose: int, frame: int) -> np.random.Generator:
+    def _make_generator(self, purpose: int, frame: int) -> np.random.Generator:
         return noise_generator(self.seed, self.sensor_name, purpose, frame)
 
 

@@ -126,12 +126,12 @@ class SeenGeometry:
         if records is None:
             records = list_geometry(inspector, self._view.role)
         if self.scene is None or records is not self._records:
-            self._read(records, inspector.world_frame_id())
+            self._read_geometry(records, inspector.world_frame_id())
         try:
             if self.scene is None or not (
-                self._is_built(calc_X_WF) and self.scene.serves(p_WS)
+                self._is_up_to_date(calc_X_WF) and self.scene.serves(p_WS)
             ):
-                self._build(inspector.world_frame_id(), calc_X_WF, p_WS)
+                self._build_scene(inspector.world_frame_id(), calc_X_WF, p_WS)
             assert self.scene is not None
             self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
         except BaseException:
@@ -158,7 +158,7 @@ class SeenGeometry:
             )
         return self._materials
 
-    def _read(self, records: GeometryList, world: FrameId) -> None:
+    def _read_geometry(self, records: GeometryList, world: FrameId) -> None:
         """Reads the geometry that is seen, from a list of all geometry."""
         unseen = self._view.unseen
         if unseen is None:
@@ -170,7 +170,9 @@ class SeenGeometry:
             if one.frame_id not in unseen and one.geometry_id not in unseen
         )
 
-    def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
+    def _is_up_to_date(
+        self, calc_X_WF: Callable[[FrameId], RigidTransform]
+    ) -> bool:
         """Returns whether the scene is up to date."""
         if self.built is not self._geometries and (
             len(self.built) != len(self._geometries)
@@ -182,7 +184,7 @@ class SeenGeometry:
             for frame_id, X_WA in self._X_WAs.items()
         )
 
-    def _build(
+    def _build_scene(
         self,
         world: FrameId,
         calc_X_WF: Callable[[FrameId], RigidTransform],

@@ -118,7 +118,7 @@ class CalibratedReturns:
         """
         return max_range + 8.0 * self.sheet.range_noise
 
-    def _receiver(self, min_range: float, max_range: float) -> Receiver:
+    def _make_receiver(self, min_range: float, max_range: float) -> Receiver:
         """Returns the receiver of the unit, with range limits [m]."""
         sheet = self.sheet
         scattering = None
@@ -174,8 +174,8 @@ class CalibratedReturns:
         met = BeamHits.of(rotate(R_WSset, unit.d_Sset), hits)
         if unit.height.any():
             every = np.arange(len(unit.height))
-            up = unit.height[:, None] * _row_value(R_WSset[:, :, 2], every)
-            p_WSset = _row_value(p_WSset, every) + up
+            up = unit.height[:, None] * _values_of_rays(R_WSset[:, :, 2], every)
+            p_WSset = _values_of_rays(p_WSset, every) + up
 
         def cast(
             p_Wset: np.ndarray,
@@ -199,7 +199,7 @@ class CalibratedReturns:
         )
         sides = find_sides(shots, unit.orders, met)
         # A single origin for all rays is faster.
-        origins = _row_value(p_WSset, sides.row)
+        origins = _values_of_rays(p_WSset, sides.row)
         when = times[sides.row % len(times)]
         side_met = BeamHits.of(
             sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
@@ -208,7 +208,7 @@ class CalibratedReturns:
         lights, ways, ways_met = start_ways(
             shots, axis_shares, met, sides, side_met
         )
-        receiver = self._receiver(pattern.min_range, pattern.max_range)
+        receiver = self._make_receiver(pattern.min_range, pattern.max_range)
         followed = follow(shots, ways, ways_met, receiver.budget.scale)
         light = with_texture(
             join([*lights, *followed]),
@@ -233,7 +233,7 @@ class CalibratedReturns:
         return make_unit_beams(beams, self.sheet, key)
 
 
-def _row_value(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def _values_of_rays(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Returns row i's value, values[i mod K]; a single value stays single."""
     return values if len(values) == 1 else values[rows % len(values)]
 

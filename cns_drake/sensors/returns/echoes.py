@@ -144,7 +144,7 @@ def report_echoes(
         pulses = join(
             [pulses, _detected_echoes(fog, receiver, key, range_error)]
         )
-    chosen = select(pulses, _choose(pulses, receiver.choice, num_beams))
+    chosen = select(pulses, _choose_echoes(pulses, receiver.choice, num_beams))
     return Reported(
         chosen.beam,
         chosen.distance.astype(np.float32),
@@ -360,7 +360,9 @@ def _detected_echoes(
     )
 
 
-def _choose(pulses: _EchoTable, choice: Echoes, num_beams: int) -> np.ndarray:
+def _choose_echoes(
+    pulses: _EchoTable, choice: Echoes, num_beams: int
+) -> np.ndarray:
     """Returns the rows of the echoes to report, in the order of the beams."""
 
     def find_greatest(values: np.ndarray) -> np.ndarray:

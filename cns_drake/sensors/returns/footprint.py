@@ -72,7 +72,7 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     number = np.concatenate(
         [np.tile([2 * k, 2 * k + 1], len(edges[k])) for k in range(len(edges))]
     )
-    toward = _find_directions(hits.d_Wset, row, neighbour)
+    toward = _directions_to_neighbours(hits.d_Wset, row, neighbour)
     share = _side_shares(len(shots.beam), row, number, toward)
     kept = share > 0.0
     row, neighbour, number = row[kept], neighbour[kept], number[kept]
@@ -86,11 +86,13 @@ def find_sides(shots: Shots, orders: np.ndarray, hits: BeamHits) -> Sides:
     d_Wset = np.empty_like(toward)
     reach = np.empty(len(row), np.float32)
     sides = Sides(row, neighbour, share, d_Wset, reach)
-    _aim(sides, toward, rest, angle, hits, shots.divergence, shots.max_range)
+    _aim_rays(
+        sides, toward, rest, angle, hits, shots.divergence, shots.max_range
+    )
     return sides
 
 
-def _find_directions(
+def _directions_to_neighbours(
     d_Wset: np.ndarray, row: np.ndarray, neighbour: np.ndarray
 ) -> np.ndarray:
     """Returns unit vectors across beams, (P, 3), to their neighbours."""
@@ -100,7 +102,7 @@ def _find_directions(
 
 
 @compiled
-def _aim(
+def _aim_rays(
     sides: Sides,
     toward: np.ndarray,
     rest: np.ndarray,
@@ -195,7 +197,7 @@ def correct_side_hits(
     for side in range(len(sides.row)):
         i, j = sides.row[side], sides.neighbour[side]
         if side_hits.geometry[side] >= 0:
-            if _touch(hits, i, side_hits, side):
+            if _planes_meet(hits, i, side_hits, side):
                 side_hits.geometry[side] = -1
             else:
                 axis_shares[i] -= sides.share[side]
@@ -250,14 +252,14 @@ def _find_edges(
         y = d_Wset[i, 1] - d_Wset[j, 1]
         z = d_Wset[i, 2] - d_Wset[j, 2]
         square = x * x + y * y + z * z
-        if 0.0 < square <= farthest**2 and not _touch(hits, i, hits, j):
+        if 0.0 < square <= farthest**2 and not _planes_meet(hits, i, hits, j):
             edges[count, 0], edges[count, 1] = i, j
             count += 1
     return edges[:count]
 
 
 @compiled
-def _touch(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
+def _planes_meet(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
     """Returns whether the planes at two hits coincide, or meet in between."""
     if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False

@@ -372,10 +372,10 @@ def test_what_did_not_change_is_not_built_anew(monkeypatch):
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
     stage.eval()
     built = []
-    build = embree_hierarchy.EmbreeHierarchy._build
+    build = embree_hierarchy.EmbreeHierarchy._build_scene
     monkeypatch.setattr(
         embree_hierarchy.EmbreeHierarchy,
-        "_build",
+        "_build_scene",
         lambda self, parts: built.append(parts) or build(self, parts),
     )
     context = stage.scene_graph.GetMyMutableContextFromRoot(stage.context)
