@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Mapping,
+    Sequence,
+)
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
 from typing import NamedTuple
@@ -78,29 +84,20 @@ class EmbreeHierarchy:
         weakref.finalize(
             self, _release_scenes, self._lib, self._device, self._scenes
         )
-        # Groups of the same shapes share their scene.
         before = {} if previous is None else previous._by_content
         self._by_content: dict[tuple, _Built] = {}
-        self._built: list[_Built] = []
-        for group in groups:
-            content = group.content()
-            if content not in self._by_content:
-                built = before.get(content)
-                if built is None:
-                    built = self._build_scene(list(merge(group)))
-                elif built.scene:
-                    self._lib.rtcRetainScene(built.scene)
-                    self._scenes.append(built.scene)
-                self._by_content[content] = built
-            self._built.append(self._by_content[content])
+        self._built = [
+            self._scene_of_group(group, merge, before) for group in groups
+        ]
         self.rows = [k for k, built in enumerate(self._built) if built.scene]
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
-        # Row of a group -> its instance. Then the rows of disabled groups, and
-        # of groups that move during a cast.
+        # Row of a group -> handle of its instance.
         self._instances: dict[int, int] = {}
+        # Rows of groups that rays cannot meet.
         self._disabled: set[int] = set()
+        # Rows of groups that move during a revolution.
         self._in_motion: set[int] = set()
         if moving:
             self._top = self._new_scene()
@@ -213,6 +210,31 @@ class EmbreeHierarchy:
         for helper in helpers:
             helper.result()
         return hits
+
+    def _scene_of_group(
+        self,
+        group: RayGroup,
+        merge: Callable[[RayGroup], Iterable[Primitives]],
+        before: Mapping[tuple, _Built],
+    ) -> _Built:
+        """Returns the scene of a group; groups of the same shapes share it.
+
+        Args:
+            group: the group.
+            merge: returns the primitives of a group, possibly none.
+            before: content of a group -> its scene in an earlier hierarchy,
+                which is reused.
+        """
+        content = group.content()
+        if content not in self._by_content:
+            built = before.get(content)
+            if built is None:
+                built = self._build_scene(list(merge(group)))
+            elif built.scene:
+                self._lib.rtcRetainScene(built.scene)
+                self._scenes.append(built.scene)
+            self._by_content[content] = built
+        return self._by_content[content]
 
     def _new_scene(self) -> int:
         scene = self._lib.rtcNewScene(self._device)
