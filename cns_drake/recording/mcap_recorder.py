@@ -30,7 +30,7 @@ from cns_drake.base.drives.sensor_names import (
     BASE_FRAME,
     IMU_FRAME,
     MAP_FRAME,
-    check_sensor_name,
+    check_sensor_names,
 )
 from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.background_writer import BackgroundWriter
@@ -201,15 +201,14 @@ class McapRecorder(LeafSystem):
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
         own_depth = [name for name, one in cameras.items() if one.depth]
-        taken: list[str] = []
-        for name in (
-            *X_BSs,
-            *cameras,
-            *map(depth_frame, own_depth),
-            *dict.fromkeys(s.frame or n for n, s in further.items()),
-        ):
-            check_sensor_name(name, taken)
-            taken.append(name)
+        check_sensor_names(
+            (
+                *X_BSs,
+                *cameras,
+                *map(depth_frame, own_depth),
+                *dict.fromkeys(s.frame or n for n, s in further.items()),
+            )
+        )
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:

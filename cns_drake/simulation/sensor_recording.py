@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
 
-from cns_drake.base.drives.sensor_names import check_sensor_name
+from cns_drake.base.drives.sensor_names import check_sensor_names
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
 from cns_drake.recording.messages import ENCODINGS
@@ -101,9 +101,7 @@ def add_mcap_recorder(
                 "began a turn before, and a recording stamps it with the time"
             )
     check_unused_names(builder, name)
-    names = [*(lidar.get_name() for lidar in lidars), *cameras]
-    for k, one in enumerate(names):
-        check_sensor_name(one, names[:k])
+    check_sensor_names((*(lidar.get_name() for lidar in lidars), *cameras))
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }

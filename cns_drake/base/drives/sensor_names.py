@@ -1,6 +1,6 @@
 """Names of sensors, which are also the names of their frames and topics."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 import re
 
 # Frames of every recording: the world, the vehicle and its IMU.
@@ -44,3 +44,16 @@ def check_sensor_name(
     check_topic_part(name)
     if name in taken or (name != own and name in RESERVED_NAMES):
         raise ValueError(f"'{name}' is the name of another frame or topic")
+
+
+def check_sensor_names(names: Iterable[str]) -> None:
+    """Checks the names of all sensors and frames of a recording.
+
+    Raises:
+        ValueError: a name occurs twice, cannot be a part of a ROS 2 topic, or
+            is reserved.
+    """
+    taken: list[str] = []
+    for name in names:
+        check_sensor_name(name, taken)
+        taken.append(name)
