@@ -73,11 +73,11 @@ class CapsuleAxes:
             row, group, index, X_LC, size = seen[k]
             times = rays.times if group.motion else rays.times[:1]
             axes = product(group.X_OL_at(times), X_LC)[:, :, 2]
-            turn = np.arange(np.lcm(len(axes), len(R_SOset)))
+            cycle = np.arange(np.lcm(len(axes), len(R_SOset)))
             axes_S = rotated(
-                R_SOset[turn % len(R_SOset)], axes[turn % len(axes)]
+                R_SOset[cycle % len(R_SOset)], axes[cycle % len(axes)]
             )
-            d_Sset = rays.d_Sset.reshape(-1, len(turn), 3)
+            d_Sset = rays.d_Sset.reshape(-1, len(cycle), 3)
             # A sum over the last axis takes twenty times as long.
             d_along = sum(d_Sset[:, :, n] * axes_S[:, n] for n in range(3))
             ray = np.flatnonzero(d_along**2 >= 1.0 - _LARGEST_SINE**2)
@@ -100,7 +100,7 @@ class CapsuleAxes:
 
 
 def _greatest_motion(motion: Motion | None) -> tuple[float, float]:
-    """Returns how far a frame turns [rad] and moves [m] at most in a scan."""
+    """Returns the greatest rotation [rad] and displacement [m] of a frame."""
     if motion is None:
         return 0.0, 0.0
     time = motion.duration + abs(motion.start)

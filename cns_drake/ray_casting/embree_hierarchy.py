@@ -316,7 +316,7 @@ def _release_scenes(
 
 
 def _decompose_motion(group: RayGroup) -> np.ndarray:
-    """Returns the poses of a moving group at evenly spaced times of a turn.
+    """Returns the poses of a moving group at evenly spaced times.
 
     Embree turns from one orientation to the next at a constant rate about F's
     origin, which moves in a straight line. That is the motion of a frame with

@@ -253,12 +253,12 @@ class RayCastingScene:
     def _calc_normal_matrices(self) -> np.ndarray:
         """Returns (G, 3, 3) maps of normals from groups' frames to O."""
         if self._normal_matrices is None:
-            turns = [
+            rotations = [
                 np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
                 for group in self._groups
             ]
             # Normals transform by the inverse transpose.
-            maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
+            maps = np.linalg.inv(np.reshape(rotations, (-1, 3, 3)))
             self._normal_matrices = np.ascontiguousarray(
                 maps.transpose(0, 2, 1)
             )

@@ -458,9 +458,9 @@ class McapRecorder(LeafSystem):
 
     def _imu_message(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
         """Returns the message of the ports with the present sample, if any."""
-        turn = optional_value(self._angular_velocity, context)
+        rate = optional_value(self._angular_velocity, context)
         force = optional_value(self._specific_force, context)
-        if turn is None and force is None:
+        if rate is None and force is None:
             return {}
         odometry = optional_value(self._odometry, context)
         quat_xyzw = None
@@ -468,7 +468,7 @@ class McapRecorder(LeafSystem):
             R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
             quat_xyzw = messages.to_quat_xyzw(R_WI)
         message = messages.make_imu(
-            quat_xyzw, turn, force, stamp_ns, self._imu_variances
+            quat_xyzw, rate, force, stamp_ns, self._imu_variances
         )
         return {IMU_TOPIC: message}
 

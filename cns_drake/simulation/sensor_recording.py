@@ -97,8 +97,8 @@ def add_mcap_recorder(
     for lidar in lidars:
         if lidar.causal:
             raise ValueError(
-                f"lidars: '{lidar.get_name()}' is causal: its scan at a time "
-                "began a turn before, and a recording stamps it with the time"
+                f"lidars: '{lidar.get_name()}' is causal: its scan begins a "
+                "revolution before the time with which a recording stamps it"
             )
     check_unused_names(builder, name)
     check_sensor_names((*(lidar.get_name() for lidar in lidars), *cameras))
@@ -188,13 +188,13 @@ def _message_periods(
     imu: Imu | None,
 ) -> dict[str, float]:
     """Returns sensor name -> time between its messages [s]."""
-    turns = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
-    if period is None and not turns:
+    revolutions = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
+    if period is None and not revolutions:
         raise ValueError("period: a recording without a LiDAR needs one")
-    usual = period or next(iter(turns.values()))
-    periods = dict.fromkeys((*turns, *cameras, "imu", "odometry"), usual)
+    usual = period or next(iter(revolutions.values()))
+    periods = dict.fromkeys((*revolutions, *cameras, "imu", "odometry"), usual)
     if period is None:
-        periods |= turns
+        periods |= revolutions
     if imu is not None and imu.rate is not None:
         periods["imu"] = 1.0 / imu.rate
     for name, rate in rates.items():

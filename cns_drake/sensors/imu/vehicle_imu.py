@@ -184,8 +184,8 @@ class VehicleImu(LeafSystem):
         R_IW = R_WI.transpose(0, 2, 1)
         a_WI = motion.acceleration_at(self._X_BI.translation())
         force = rotated(R_IW, a_WI - self._gravity_W)
-        turn = rotated(R_IW, motion.w)
-        measured = self._add_errors(first, np.hstack([force, turn]))
+        rate = rotated(R_IW, motion.w)
+        measured = self._add_errors(first, np.hstack([force, rate]))
         return ImuSamples(
             first,
             Rotation.from_matrix(R_WI).as_quat(canonical=True),

@@ -70,9 +70,9 @@ class Beams:
         None if these columns repeat the sequence 0, 1, ..., C - 1.
         """
         columns = self.column[self.packet_order]
-        turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
+        num_cycles, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
         once = np.arange(len(self.column_t_ns))
-        if rest == 0 and np.array_equal(columns, np.tile(once, turns)):
+        if rest == 0 and np.array_equal(columns, np.tile(once, num_cycles)):
             return None
         return columns
 
