@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 import math
 
-# Time between frames at the paper's 20 Hz [s]. Frames are farther apart if all
-# LiDARs rotate more slowly.
+# Time between frames [s] if the first LiDAR has the paper's rate, 20 Hz.
 FRAME_PERIOD = 0.05
 # Stamp of frame 0 [ns]. Zero would mean "latest" to tf2. The clock's time would
 # give other bytes at each run.
