@@ -53,7 +53,7 @@ STEPS = {
     "motion": (
         (VehicleMotion, "_calc_state"),
         (VehicleMotion, "_calc_position"),
-        (VehicleMotion, "_calc_bodies"),
+        (VehicleMotion, "_calc_body_list"),
         (OdometrySensor, "_calc_odometry"),
     ),
     "cast": ((RayCastingScene, "cast_rays"),),
