@@ -1,5 +1,5 @@
-// The panels over the scene. `viewer` is Meshcat's; `commands` is a promise of
-// all that the page holds.
+// Connects the panels with the scene. `viewer` is Meshcat's viewer; `commands`
+// is a promise of the scene's commands.
 
 const byId = (id) => document.getElementById(id);
 const node = (...path) => viewer.scene_tree.find(path);
@@ -9,15 +9,16 @@ const marker = node("vehicle", "marker").object;
 const UP = new MeshCat.THREE.Vector3(0, 1, 0);
 const MARKER_AXIS = new MeshCat.THREE.Vector3(0, 0, 1);
 
-// Pose of the car when it was last looked at; null: the camera stands still.
+// Latest pose of the car that the camera follows; null if the camera stands
+// still.
 let followed = null;
-// Plots of the drive: where the value is said, and all values.
+// Plots of the drive: the element that shows the present value, and all values.
 const plots = [...document.querySelectorAll(".plot output")].map((output) => (
   {output, values: output.dataset.values.split(",")}));
 // Images of each camera of the car, in the order of time.
 const cameras = [...document.querySelectorAll("#cameras figure")].map(
   (figure) => [...figure.querySelectorAll("img")]);
-// Where the camera stood before.
+// Position and target of the camera before it followed the car.
 let overview = null;
 
 function show(...path) {
@@ -42,7 +43,8 @@ function look(position, target) {
 }
 
 // The marker stands above the car on the screen, whichever way the camera
-// looks, and so never hides it. From near and from afar it looks as large.
+// looks, and so never hides the car. The marker has the same size on the screen
+// at all distances.
 function placeMarker() {
   const {position} = carPose();
   const away = viewer.camera.position.distanceTo(position);
@@ -56,7 +58,8 @@ function placeMarker() {
   marker.scale.setScalar(away / 150);
 }
 
-// Camera and target move and turn with the car: a reader can go around it.
+// Camera and target move and turn with the car, so that the user can look at
+// the car from all sides.
 function follow() {
   const now = carPose();
   const moved = (point) => point.clone().sub(followed.position)
@@ -66,7 +69,8 @@ function follow() {
 }
 
 function setFollowing(on) {
-  // What helps from afar is in the way near by, and points look smaller.
+  // Near the car, the marker and the route hide other things, and points look
+  // smaller.
   show("vehicle", "marker")(!on);
   viewer.set_property(["route"], "opacity", on ? 0.4 : 1);
   node("scans").object.traverse(({material}) => {
@@ -96,7 +100,7 @@ function setChanged(on) {
   viewer.set_dirty();
 }
 
-// Parts that the other stage lacks belong to the city as well.
+// Parts that the other stage lacks are also switched with the city.
 function setCity(on) {
   for (const path of [["city"], ["stage_difference", "additional"]]) {
     show(...path)(on);
@@ -110,7 +114,7 @@ function connectSwitch(id, set) {
   });
 }
 
-// The middle of the picture is that of the part above the bar or the sheet.
+// Centres the picture in the part of the window above the bar or the sheet.
 function centre() {
   const top = byId("bar").getBoundingClientRect().top;
   const sheet = byId("sheet").getBoundingClientRect();
@@ -128,7 +132,7 @@ function fold(on) {
 }
 
 function setTime(time) {
-  // What has come to its end would stay there.
+  // An action that has ended is paused, and would stay at its end.
   for (const action of animator.actions) action.paused = false;
   animator.seek(time);
   animator.display_progress(time);
@@ -149,7 +153,7 @@ function showTime() {
   }
 }
 
-// The latest image of each camera.
+// Shows the latest image of each camera.
 function showImages() {
   for (const images of cameras) {
     const now = images.findLast(
@@ -158,7 +162,7 @@ function showImages() {
   }
 }
 
-// Meshcat calls it before it draws a picture.
+// Meshcat calls this function before it draws a picture.
 viewer.render_callback = () => {
   if (followed) follow();
   placeMarker();
@@ -166,10 +170,10 @@ viewer.render_callback = () => {
   showImages();
 };
 
-// Colours as they are, instead of a film's.
+// Colours as given, instead of the tone mapping of a film.
 viewer.renderer.toneMapping = MeshCat.THREE.NeutralToneMapping;
 
-// Pictures of half a city would only make loading slow.
+// While the scene loads, no pictures are drawn, which would slow down loading.
 const drawPicture = viewer.animate;
 viewer.animate = () => {};
 
@@ -198,14 +202,14 @@ commands.then(() => {
     fold(!document.body.classList.contains("folded"));
   });
   addEventListener("resize", centre);
-  // A control that has the focus uses the key itself.
+  // A control that has the focus handles the space bar itself.
   addEventListener("keydown", (event) => {
     if (event.key !== " " || event.target !== document.body) return;
     event.preventDefault();
     byId("play").click();
   });
   fold(innerWidth <= 640);
-  // On a narrow screen the city fits from farther away.
+  // On a narrow screen, the camera must be farther away to show the city.
   const {camera, controls} = viewer;
   const farther = Math.max(1, 1.2 / camera.aspect);
   look(camera.position.clone().sub(controls.target).multiplyScalar(farther)
