@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 import re
@@ -64,6 +64,10 @@ _FORMATS: Mapping[str, tuple[Format, ...]] = {
 }
 # Distance between two clouds of training data [m].
 _PAIR_SPACING = 10.0
+# Largest absolute coordinate of a point in clouds of training data [m].
+_CLOUD_RANGE = 50.0
+# Largest absolute coordinate of a point of which overlaps are computed [m].
+_OVERLAP_RANGE = 100.0
 # Distance between two scans of a map [m].
 _MAP_SPACING = 1.0
 
@@ -181,13 +185,7 @@ def export(
             scenario has no traffic, up to 60 vehicles, as many as the streets
             have room for.
     """
-    for name in commands.given_options(context):
-        formats = _FORMATS.get(name, (layout,))
-        if layout not in formats:
-            raise InputError(
-                f"--{name.replace('_', '-')}: not with --format {layout.value};"
-                f" only with {', '.join(one.value for one in formats)}"
-            )
+    _check_options(commands.given_options(context), layout)
     words = drives or []
     if layout in _PAIRS:
         with uninterrupted():
@@ -197,7 +195,7 @@ def export(
         learned = _learned_drives(words, vary, output, cluster)
         spacing = spacing or _PAIR_SPACING
         if layout == Format.OVERLAP_TABLE:
-            max_range = max_range or 100.0
+            max_range = max_range or _OVERLAP_RANGE
             _write_overlap_table(learned, output, spacing, max_range, json=json)
             return
         _write_training_data(
@@ -207,7 +205,7 @@ def export(
             layout,
             spacing=spacing,
             num_scans=scans,
-            max_range=max_range or 50.0,
+            max_range=max_range or _CLOUD_RANGE,
             cluster=cluster,
             json=json,
         )
@@ -226,11 +224,11 @@ def export(
         opened = _open_drives(words, lidar, columns)
         _write_sessions(opened, output, spacing or _MAP_SPACING, json=json)
     elif layout == Format.MCAP:
-        _repair(first, output, json=json)
+        _export_repaired(first, output, json=json)
     elif layout == Format.BEV_IMAGES:
         _write_images(_open_drives(words, lidar, columns)[0], output, json=json)
     elif layout == Format.FILM:
-        _film(
+        _export_film(
             first,
             output,
             seconds=seconds,
@@ -240,7 +238,7 @@ def export(
             json=json,
         )
     else:
-        _convert(
+        _export_recording(
             first,
             layout,
             output,
@@ -251,7 +249,26 @@ def export(
         )
 
 
-def _convert(
+def _check_options(names: Iterable[str], layout: Format) -> None:
+    """Refuses options that have no effect with a format.
+
+    Args:
+        names: names of the parameters that the user gave.
+        layout: the format.
+
+    Raises:
+        InputError: an option belongs to other formats.
+    """
+    for name in names:
+        formats = _FORMATS.get(name, (layout,))
+        if layout not in formats:
+            raise InputError(
+                f"--{name.replace('_', '-')}: not with --format {layout.value};"
+                f" only with {', '.join(one.value for one in formats)}"
+            )
+
+
+def _export_recording(
     recording: str,
     layout: Format,
     output: Path,
@@ -288,7 +305,7 @@ def _convert(
         )
 
 
-def _repair(file: str, output: Path, *, json: bool) -> None:
+def _export_repaired(file: str, output: Path, *, json: bool) -> None:
     """Writes the readable part of a damaged recording."""
     with uninterrupted():
         from cns_drake.recording.repair import repair_mcap
@@ -314,7 +331,7 @@ def _repair(file: str, output: Path, *, json: bool) -> None:
     show(values, line, json=json)
 
 
-def _film(
+def _export_film(
     scenario: str,
     output: Path,
     *,
