@@ -2,10 +2,10 @@
 
 An archetype is a kind of building. `archetypes.yaml` contains the limits of
 size and the colours of each archetype, and a subclass of `Building` samples and
-builds its buildings. The module of an archetype has the archetype's name; only
-family houses and row houses share a module, and landmarks come from files. To
-add an archetype, write an entry of `archetypes.yaml` and a subclass, and add
-the subclass to `BUILDERS`. `sample` returns one building:
+builds its buildings. The module of this subclass has the archetype's name; only
+landmarks share a module, since their models come from files. To add an
+archetype, write an entry of `archetypes.yaml` and a subclass, and add the
+subclass to `BUILDERS`. `sample` returns one building:
 
     footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
     model = sample("brick_block", footprint, 24.0, rng, name="block_003")
@@ -24,11 +24,12 @@ from cns_drake.city.buildings import (
     banded_tower,
     barn,
     brick_block,
+    bungalow,
     chapel,
     corner_building,
     corner_store,
     court_block,
-    family_houses,
+    detached_house,
     gallery_flats,
     garden_flats,
     gas_station,
@@ -39,12 +40,15 @@ from cns_drake.city.buildings import (
     office,
     park_pavilion,
     podium_tower,
-    row_houses,
+    row_house,
     school,
+    semi_detached,
+    shop_house,
     shop_strip,
     slab_tower,
     sports_hall,
     supermarket,
+    terrace,
     unfinished_tower,
     walk_up,
     waterfront_hall,
@@ -72,12 +76,12 @@ BUILDERS: dict[str, type[Building]] = {
     "banded_tower": banded_tower.BandedTower,
     "barn": barn.Barn,
     "brick_block": brick_block.BrickBlock,
-    "bungalow": family_houses.Bungalow,
+    "bungalow": bungalow.Bungalow,
     "chapel": chapel.Chapel,
     "corner_building": corner_building.CornerBuilding,
     "corner_store": corner_store.CornerStore,
     "court_block": court_block.CourtBlock,
-    "detached_house": family_houses.DetachedHouse,
+    "detached_house": detached_house.DetachedHouse,
     "gallery_flats": gallery_flats.GalleryFlats,
     "garden_flats": garden_flats.GardenFlats,
     "gas_station": gas_station.GasStation,
@@ -88,15 +92,15 @@ BUILDERS: dict[str, type[Building]] = {
     "office": office.Office,
     "park_pavilion": park_pavilion.ParkPavilion,
     "podium_tower": podium_tower.PodiumTower,
-    "row_house": row_houses.RowHouse,
+    "row_house": row_house.RowHouse,
     "school": school.School,
-    "semi_detached": family_houses.SemiDetached,
-    "shop_house": row_houses.ShopHouse,
+    "semi_detached": semi_detached.SemiDetached,
+    "shop_house": shop_house.ShopHouse,
     "shop_strip": shop_strip.ShopStrip,
     "slab_tower": slab_tower.SlabTower,
     "sports_hall": sports_hall.SportsHall,
     "supermarket": supermarket.Supermarket,
-    "terrace": row_houses.Terrace,
+    "terrace": terrace.Terrace,
     "unfinished_tower": unfinished_tower.UnfinishedTower,
     "walk_up": walk_up.WalkUp,
     "waterfront_hall": waterfront_hall.WaterfrontHall,

@@ -1,0 +1,232 @@
+"""The detached house, with a porch and a garage."""
+
+import numpy as np
+
+from cns_drake.city.buildings.family_house import (
+    MARGIN_M,
+    FamilyHouse,
+    add_garage,
+    add_walls_and_roof,
+    garage_wing,
+    window_rows,
+)
+from cns_drake.city.buildings.house_heights import (
+    ROOF_M,
+    STOREY_M,
+    storeys_for,
+    wall_top_for,
+)
+from cns_drake.city.facades import (
+    Roof,
+    WallFrame,
+    Wing,
+    add_chimney,
+    balconies,
+    bay_windows,
+    bays,
+    outlines,
+    porches,
+    solids,
+    wing_openings,
+    wing_roofs,
+)
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+# Plan of a detached house -> where it has wings besides the main wing.
+_WING_ENDS = {
+    "box": (),
+    "ell": ("front",),
+    "tee": ("back",),
+    "cross": ("front", "back"),
+}
+
+
+class DetachedHouse(FamilyHouse):
+    """The detached house: wings under gables or hips, a porch, a garage.
+
+    The parameter `plan` is `box` (one main wing), `ell` (with a second wing in
+    front), `tee` (with a second wing at the back) or `cross` (with both). The
+    garage is on the right and the front wing on the left; if `mirrored`, the
+    garage is on the left and the front wing on the right.
+    """
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        self.plan = self.pick(("box", "ell", "tee", "cross", "ell"))
+        self.mirrored = self.chance(0.5)
+        self.roof = self.pick(("gable", "gable", "hip", "gambrel"))
+        self.pitch_deg = self.uniform(28.0, 45.0)
+        self.wing_width = self.uniform(0.36, 0.46)
+        self.low_wing = self.chance(0.35)
+        self.floor = self.uniform(0.2, 0.6, 2)
+        self.window_pitch = self.uniform(2.6, 3.4)
+        self.window_width = self.uniform(0.95, 1.3, 2)
+        self.casing = self.pick(("frame", "sill", "sill", "shutters"))
+        self.porch = self.pick(("shed", "gable", "full", "flat"))
+        self.porch_reach = self.uniform(1.5, 2.2, 2)
+        self.garage = self.pick(("flat", "gable", "shed", "none"))
+        self.garage_width = self.uniform(3.2, 5.8, 1)
+        self.chimney = self.pick(("ridge", "breast", "ridge", "none"))
+        self.chimney_at = self.uniform(0.2, 0.8)
+        self.dormers = self.whole(0, 3)
+        self.dormer = self.pick(("gable", "shed"))
+        self.bay_window = self.chance(0.4)
+
+    def build(self) -> None:
+        """Adds all parts of the detached house, with the porch in front.
+
+        The building's site must be a rectangle.
+        """
+        self._lay_out()
+        _add_main(self)
+        for wing in self.wings:
+            _add_wing(self, wing)
+        if self.garage_box is not None:
+            add_garage(self, self.garage_box)
+        _add_chimney(self)
+
+    def _lay_out(self) -> None:
+        """Chooses the wings of the house.
+
+        The first wing is `main`, with `storeys` storeys. `free` is the stretch
+        in x of its front that no other wing hides, and `ahead` the depth of
+        free ground in front of it [m].
+        """
+        x0, y0, x1, y1 = self.site.bounds
+        left, right, back = x0 + MARGIN_M, x1 - MARGIN_M, y1 - MARGIN_M
+        ahead = self.porch_reach + 0.3 + 1.8 * self.floor
+        self.ahead = min(ahead, 0.3 * (back - y0))
+        front = y0 + self.ahead
+        main_back = front + min(back - front, 10.0)
+        deep = main_back - front
+        garage_width = min(self.garage_width, 0.36 * (right - left))
+        has_garage = self.garage != "none" and garage_width > 2.9
+        split = right - garage_width * has_garage
+        pitch_deg = 48.0 if self.roof == "gambrel" else self.pitch_deg
+        n = storeys_for(self.height, self.floor, deep, pitch_deg)
+        wall_top = wall_top_for(self.height, self.floor, deep, n)
+        slope = 2 * (self.height - wall_top - ROOF_M) / deep
+        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        area = (left, front, split, main_back)
+        boxes = [Wing.at(area, wall_top, self.height, roof)]
+        wide = max(3.2, self.wing_width * (split - left))
+        drop = STOREY_M * (n > 1 and self.low_wing)
+        top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
+        kind = "hip" if self.roof == "hip" else "gable"
+        shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
+        middle = (front + main_back) / 2
+        for end in _WING_ENDS[self.plan]:
+            if end == "front":
+                span = (left - 0.02, front - max(0.6, self.ahead - 0.6))
+                area = (*span, left + wide, middle)
+            else:
+                a = left + 0.4 * (split - left - wide)
+                area = (a, middle, a + wide, min(back, main_back + 3.0))
+            if end == "front" or back - main_back > 1.0:
+                boxes.append(Wing.at(area, wall_top - drop, top - drop, shape))
+        if has_garage:
+            boxes.append(garage_wing(
+                self.garage, split - 0.06, right, front + 0.6,
+                main_back - 0.4, self.height,
+            ))  # fmt: skip
+        taken = left + wide if "front" in _WING_ENDS[self.plan] else left
+        self.free = (taken, split)
+        self.storeys = n
+        if self.mirrored:
+            boxes = [box.mirrored(x0 + x1) for box in boxes]
+            self.free = (x0 + x1 - split, x0 + x1 - taken)
+        self.boxes = tuple(boxes)
+        self.main = boxes[0]
+        self.garage_box = boxes[-1] if has_garage else None
+        self.wings = boxes[1 : -1 if has_garage else None]
+
+
+def _add_main(p: DetachedHouse) -> None:
+    openings = window_rows(p, p.main, p.storeys)
+    a, b = (x - p.main.x0 for x in p.free)
+    door = a + 0.5 * (b - a)
+    wing_openings.add_door(openings, 0, door, p.floor, lights=0.3)
+    _add_porch(p, (a, b))
+    add_walls_and_roof(p, p.main, openings)
+    if p.roof in ("gable", "gambrel"):
+        wing_roofs.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
+
+
+def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
+    """Adds a roof over the door; a `full` porch runs along the free front."""
+    wall = p.main.wall(0)
+    a, b = free
+    door = (a + b) / 2
+    reach = min(p.porch_reach, p.ahead - 0.3)
+    eaves = p.floor + 2.3
+    top = eaves + (0.9 if p.porch == "gable" else 0.45)
+    if p.storeys == 1:
+        top = min(top, p.main.wall_top + 0.1)
+    full = p.porch == "full" and b - a > 3.5
+    x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
+    porches.add_porch(
+        p, wall, x0, x1, reach, p.floor, eaves, top,
+        roof="shed" if p.porch == "full" else p.porch,
+        posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
+    )  # fmt: skip
+    room = p.ahead - reach - 0.02
+    porches.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
+    if full and p.floor > 0.3:
+        y = reach - 0.15
+        trim = p.colours["trim"]
+        runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
+        for k, (a, b) in enumerate(runs):
+            part = f"railing_{k}"
+            balconies.add_railing(p, part, wall, (a, y), (b, y), p.floor, trim)
+
+
+def _add_wing(p: DetachedHouse, wing: Wing) -> None:
+    count = max(1, round((wing.wall_top - p.floor) / STOREY_M))
+    openings = window_rows(p, wing, count)
+    add_walls_and_roof(p, wing, openings)
+    is_front = wing.y0 < p.main.y0
+    if p.bay_window and is_front and wing.width > 3.0:
+        size = (wing.width / 2, 2.2, 0.4, 0.0, p.floor + 2.3)
+        bay_windows.add_bay_window(p, wing.wall(0), *size)
+
+
+def _add_chimney(p: DetachedHouse) -> None:
+    main = p.main
+    if p.chimney == "breast":
+        wall = main.wall(1 if p.mirrored else 3)
+        x = wall.length / 2
+        breast = _chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
+        p.add_to("base", breast)
+        spot = (*wall.point(x, 0.18), main.top - 0.9)
+        add_chimney(p, "chimney", spot, p.colours["base"], yaw=np.pi / 2)
+    elif p.chimney == "ridge":
+        x = main.x0 + p.chimney_at * main.width
+        spot = (x, main.center[1], main.top - 1.2)
+        add_chimney(p, "chimney", spot, p.kind.choices["bricks"][0])
+
+
+def _chimney_breast(
+    wall: WallFrame, x: float, width: float, reach: float, top: float
+) -> Mesh:
+    """Returns a chimney in front of a wall, which narrows at its shoulders.
+
+    Args:
+        wall: the wall.
+        x: middle of the chimney along the wall [m].
+        width: width at the foot [m].
+        reach: how far it reaches out of the wall [m].
+        top: height of its top [m].
+    """
+    a, b = x - width / 2, x + width / 2
+    neck = 0.62 * width / 2
+    shoulder = 0.5 * top
+    low = outlines.rectangle(a, -0.05, b, reach)
+    high = outlines.rectangle(x - neck, -0.05, x + neck, reach)
+    head = (x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06)
+    breast = merge_meshes(
+        solids.skirt(low, low, -solids.FOUNDATION_M, shoulder),
+        solids.skirt(low, high, shoulder, shoulder + 0.6),
+        solids.prism(high, shoulder + 0.6, top),
+        solids.box(*head, top - 0.35, top - 0.15),
+    )
+    return wall.place(breast)

@@ -1,0 +1,102 @@
+"""What houses for one or two families have in common."""
+
+from collections.abc import Sequence
+
+from cns_drake.city.buildings.house_heights import ROOF_M, STOREY_M
+from cns_drake.city.facades import (
+    Band,
+    Building,
+    Openings,
+    Roof,
+    Wing,
+    wing_openings,
+    wing_roofs,
+)
+
+# Distance between the windows of the sides [m]. The windows of the front are
+# closer together.
+_SIDE_PITCH_M = 3.8
+# Width of the free strip around the walls, for eaves and chimneys [m].
+MARGIN_M = 0.5
+
+
+class FamilyHouse(Building):
+    """The base class of family houses.
+
+    Attributes:
+        boxes: the wings, which hide parts of each other's walls.
+        floor: height of the ground floor [m].
+        window_pitch: distance between the windows of front and back [m].
+        window_width: width of a window [m].
+        casing: style of the frames around the windows in front.
+    """
+
+    boxes: Sequence[Wing]
+    floor: float
+    window_pitch: float
+    window_width: float
+    casing: str
+
+
+def window_rows(p: FamilyHouse, wing: Wing, storeys: int) -> Openings:
+    """Returns openings of a wing with the windows of all storeys.
+
+    Args:
+        p: the building.
+        wing: the wing.
+        storeys: number of storeys.
+    """
+    openings = Openings(p, wing, p.boxes)
+    width = p.window_width
+    for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
+        wing_openings.add_window_storeys(
+            openings, edges, p.floor, STOREY_M, storeys, step, width
+        )
+    return openings
+
+
+def add_walls_and_roof(p: FamilyHouse, wing: Wing, openings: Openings) -> None:
+    """Adds the walls of a wing around its openings, and its roof.
+
+    The windows of the front get casings, and each gable gets a window.
+    """
+    wing_openings.add_casings(openings, (0,), p.casing)
+    bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
+    low = wing.wall_top + 0.4
+    attic = wing_roofs.attic_window(0.9, low, low + 1.0, wing_openings.GLASS_M)
+    openings.enclose((wing_openings.GLASS_M,), bands, attic=attic)
+
+
+def garage_wing(
+    kind: str, x0: float, x1: float, y0: float, y1: float, most: float
+) -> Wing:
+    """Returns a garage that is at most 6.5 m deep.
+
+    Args:
+        kind: kind of roof: `flat`, `gable`, `shed` or `hip`.
+        x0: left end [m].
+        x1: right end [m].
+        y0: front [m].
+        y1: back, unless the garage would be too deep [m].
+        most: greatest height of the roof [m].
+    """
+    wall_top = 2.65
+    span = x1 - x0
+    rise = {"flat": 0.5, "gable": 0.3 * span, "shed": 0.2 * span,
+            "hip": 0.25 * span}[kind]  # fmt: skip
+    shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
+    top = min(wall_top + ROOF_M + rise, most)
+    return Wing.at((x0, y0, x1, min(y1, y0 + 6.5)), wall_top, top, shape)
+
+
+def add_garage(p: FamilyHouse, garage: Wing) -> None:
+    """Adds a garage whose door is in front."""
+    openings = Openings(p, garage, p.boxes)
+    length = garage.x1 - garage.x0
+    wing_openings.add_garage_door(
+        openings, 0, length / 2, min(length - 0.7, 4.9)
+    )
+    openings.add_bays(
+        (1, 3), 1.0, 3.4, [wing_openings.sash(0.9, 0.0, 1.1, 2.0)]
+    )
+    openings.enclose((wing_openings.GLASS_M,))

@@ -1,0 +1,60 @@
+"""The row house: one house between its neighbours."""
+
+from cns_drake.city.buildings.house_in_row import (
+    HouseInRow,
+    add_house,
+    front_of_site,
+)
+from cns_drake.city.facades import Openings, Roof, Wing, wing_openings
+
+_ROOFS = ("gable", "gambrel", "flat")
+# A narrow house can also have a roof with a gable to the street.
+_NARROW_ROOFS = (*_ROOFS, "front", "stepped")
+# A house deeper than this gets a lower wing at its back [m].
+_MOST_DEPTH_M = 10.5
+
+
+class RowHouse(HouseInRow):
+    """The row house: one narrow house between its neighbours, with a stoop."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        width = self.site.width
+        self.draw_house(width, _NARROW_ROOFS if width < 9.5 else _ROOFS)
+        self.stoop = 1.3
+        self.floor = self.plinth
+        # Size and side of the lower wing behind the house.
+        self.annex_height = self.uniform(2.8, 3.6, 2)
+        self.annex_width = self.uniform(0.45, 0.65)
+        self.annex_left = self.chance(0.5)
+
+    def build(self) -> None:
+        """Adds all parts of the row house.
+
+        The building's site must be a rectangle.
+        """
+        _, y0, _, y1 = self.site.bounds
+        left, right, blind = front_of_site(self)
+        front, back = y0 + self.stoop, y1 - 0.35
+        deep = min(back - front, _MOST_DEPTH_M)
+        if back - front - deep < 1.5:
+            deep = back - front
+        main = add_house(self, (left, front, right, front + deep), blind)
+        if back - main.y1 > 1.0:
+            _add_annex(self, main, back)
+
+
+def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
+    """Adds a low wing behind the house, on one side."""
+    width = p.annex_width * main.width
+    x0 = main.x0 if p.annex_left else main.x1 - width
+    blind = main.blind & {3 if p.annex_left else 1}
+    top = min(p.annex_height + 0.9, main.wall_top)
+    wall_top = min(p.annex_height, top - 0.4)
+    area = (x0, main.y1 - 0.06, x0 + width, back)
+    roof = Roof("shed", True, 0.0, 0.2, 0.18)
+    openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
+    openings.add_bays(
+        (1, 2, 3), 0.9, 2.6, [wing_openings.sash(1.1, 0.1, 0.9, 2.1)]
+    )
+    openings.enclose((wing_openings.GLASS_M,))

@@ -1,0 +1,162 @@
+"""The pair of semi-detached houses."""
+
+import numpy as np
+
+from cns_drake.city.buildings.family_house import (
+    MARGIN_M,
+    FamilyHouse,
+    add_garage,
+    add_walls_and_roof,
+    garage_wing,
+    window_rows,
+)
+from cns_drake.city.buildings.house_heights import (
+    ROOF_M,
+    STOREY_M,
+    storeys_for,
+    wall_top_for,
+)
+from cns_drake.city.facades import (
+    Openings,
+    Roof,
+    Wing,
+    add_chimney,
+    bay_windows,
+    porches,
+    wing_openings,
+)
+
+
+class SemiDetached(FamilyHouse):
+    """The pair of semi-detached houses: mirrored halves under one roof."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        self.roof = self.pick(("gable", "hip"))
+        # Wanted pitch of the roof.
+        self.pitch_deg = self.uniform(30.0, 45.0)
+        self.floor = self.uniform(0.15, 0.45, 2)
+        self.window_pitch = self.uniform(2.4, 3.2)
+        self.window_width = self.uniform(1.0, 1.4, 2)
+        self.casing = self.pick(("frame", "sill", "sill", "shutters"))
+        # `gabled` (through all storeys, under a gable of its own), `canted`
+        # or `none`.
+        self.bay = self.pick(("gabled", "canted", "gabled", "none"))
+        self.bay_width = self.uniform(2.6, 3.2, 2)
+        self.bay_reach = self.uniform(0.6, 1.0, 2)
+        self.doors_inside = self.chance(0.5)
+        self.porch_reach = self.uniform(1.1, 1.5, 2)
+        # Roof of the two garages, one on either side, or `none`.
+        self.garages = self.pick(("none", "flat", "shed", "hip"))
+        self.garage_width = self.uniform(2.9, 3.4, 2)
+        self.chimneys = self.pick(("middle", "ends"))
+
+    def build(self) -> None:
+        """Adds all parts of the two semi-detached houses.
+
+        The building's site must be a rectangle.
+        """
+        x0, y0, x1, y1 = self.site.bounds
+        left, right, back = x0 + MARGIN_M, x1 - MARGIN_M, y1 - MARGIN_M
+        front = y0 + min(2.4, 0.25 * (y1 - y0))
+        deep = min(back - front, 10.0)
+        has_garages = self.garages != "none" and right - left > 17.0
+        side = self.garage_width * has_garages
+        n = storeys_for(self.height, self.floor, deep, self.pitch_deg)
+        wall_top = wall_top_for(self.height, self.floor, deep, n)
+        shape = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        area = (left + side, front, right - side, front + deep)
+        main = Wing.at(area, wall_top, self.height, shape)
+        bays = _gabled_bays(self, main) if self.bay == "gabled" else ()
+        garages = []
+        if has_garages:
+            for a, b in ((left, main.x0 + 0.06), (main.x1 - 0.06, right)):
+                area = (a, b, front + 1.5, main.y1 - 0.3)
+                garages.append(garage_wing(self.garages, *area, self.height))
+        self.boxes = (main, *bays, *garages)
+        openings = window_rows(self, main, n)
+        _add_entrances(self, main, openings, y0)
+        add_walls_and_roof(self, main, openings)
+        for wing in bays:
+            rows = Openings(self, wing, self.boxes)
+            wing_openings.add_window_storeys(
+                rows, (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+            )
+            add_walls_and_roof(self, wing, rows)
+        for garage in garages:
+            add_garage(self, garage)
+        _add_chimneys(self, main)
+
+
+def _bay_middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+    """Returns the middles of the two bays along the main wall [m]."""
+    half = (main.x1 - main.x0) / 2
+    # Doors take the middle or the ends; bays take the rest of each half.
+    u = 0.6 * half if p.doors_inside else 0.36 * half
+    offset = half - u if not p.doors_inside else u
+    return half - offset, half + offset
+
+
+def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
+    width = min(p.bay_width, 0.45 * (main.x1 - main.x0) / 2)
+    if width < 1.8:
+        return ()
+    rise = min(0.5 * width, main.top - main.wall_top - ROOF_M - 0.2)
+    top = main.wall_top + ROOF_M + rise
+    shape = Roof("gable", True, 0.2, 0.25, ROOF_M)
+    middle = (main.y0 + main.y1) / 2
+    fronts = (
+        (main.x0 + x - width / 2, main.x0 + x + width / 2)
+        for x in _bay_middles(p, main)
+    )
+    y0 = main.y0 - p.bay_reach
+    return tuple(
+        Wing.at((a, y0, b, middle), main.wall_top, top, shape)
+        for a, b in fronts
+    )
+
+
+def _add_entrances(
+    p: SemiDetached, main: Wing, openings: Openings, y0: float
+) -> None:
+    """Adds the doors under one or two roofs, and bays on the ground floor."""
+    wall = main.wall(0)
+    half = wall.length / 2
+    room = main.y0 - y0 - 0.1
+    reach = min(p.porch_reach, room - 0.3)
+    offset = 0.75 if p.doors_inside else half - 0.95
+    eaves = p.floor + 2.35
+    size = (reach, p.floor, eaves, eaves + 0.4)
+    for x in (half - offset, half + offset):
+        wing_openings.add_door(openings, 0, x, p.floor)
+        if not p.doors_inside:
+            porches.add_porch(p, wall, x - 0.85, x + 0.85, *size)
+    if p.doors_inside:
+        porches.add_porch(
+            p, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
+        )
+    for x in _bay_middles(p, main) if p.bay == "canted" else ():
+        width = min(2.4, 0.5 * half)
+        ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
+        openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
+        bay_windows.add_bay_window(
+            p, wall, x, width, min(0.7, room - 0.1), 0.0,
+            round(p.floor + 2.3, 2),
+        )  # fmt: skip
+    if p.doors_inside:
+        step = (half - 1.4, half + 1.4, reach, reach + 0.28, 0.12)
+        p.add_to("base", wall.standing(*step, bottom=True))
+
+
+def _add_chimneys(p: SemiDetached, main: Wing) -> None:
+    x, y = main.center
+    spots = [x]
+    if p.chimneys != "middle":
+        side = 0.7 if p.roof == "gable" else 0.35 * main.width
+        spots = [main.x0 + side, main.x1 - side]
+    for k, x in enumerate(spots):
+        add_chimney(
+            p, f"chimney_{k}", (x, y, main.top - 1.1),
+            p.kind.choices["bricks"][0], item="chimney_row",
+            yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
+        )  # fmt: skip

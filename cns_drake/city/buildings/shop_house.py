@@ -1,0 +1,125 @@
+"""The shop house: flats above shops."""
+
+from cns_drake.city.buildings.house_in_row import (
+    HouseInRow,
+    add_roof,
+    add_roof_chimney,
+    front_of_site,
+    wing_and_storeys,
+)
+from cns_drake.city.facades import (
+    Band,
+    Openings,
+    Wing,
+    bay_windows,
+    bays,
+    equip_roof,
+    wing_openings,
+)
+
+_ROOFS = ("flat", "gable", "gambrel")
+# A narrow house can also have a roof with a gable to the street.
+_NARROW_ROOFS = (*_ROOFS, "front", "stepped")
+
+
+class ShopHouse(HouseInRow):
+    """The shop house: shops on the ground floor, flats above them."""
+
+    def draw(self) -> None:
+        """Samples sizes and style."""
+        width, depth = self.site.width, self.site.depth
+        roofs = _NARROW_ROOFS if width < min(10.0, depth) else _ROOFS
+        self.draw_house(width, roofs if depth <= 14.0 else ("flat",))
+        self.window_pitch = max(self.window_pitch, (width + depth) / 22)
+        self.stoop = 0.35
+        # Height of the shops. A low house contains nothing but shops.
+        self.floor = self.uniform(3.5, 4.2, 2)
+        if self.height - self.floor < 3.2:
+            self.roof = "flat"
+            self.floor = round(min(3.4, self.height - 1.6), 2)
+        self.shop_width = self.uniform(4.5, 7.5)
+        # Share of the shops with an awning.
+        self.awnings = self.uniform(0.2, 0.9)
+        # Greatest number of bay windows above the shops.
+        self.oriels = self.whole(0, 3)
+        # How far the band above the shops sticks out.
+        self.course = self.uniform(0.08, 0.2, 2)
+        self.roof_items = self.draw_roof_items(
+            "stair_house vents ac_unit skylight", 1, 5
+        )
+
+    def build(self) -> None:
+        """Adds all parts of the shop house.
+
+        The building's site must be a rectangle.
+        """
+        _, y0, _, y1 = self.site.bounds
+        left, right, blind = front_of_site(self)
+        area = (left, y0 + self.stoop, right, y1 - 0.35)
+        wing, storeys = wing_and_storeys(self, area, blind)
+        openings = Openings(self, wing)
+        ground = self.floor
+        room = wing.wall_top - 0.25 - ground
+        upper = storeys if room > 2.4 else 0
+        step = room / max(upper, 1)
+        sides = [k for k in (1, 3) if k not in blind]
+        head = min(2.25, step - 0.4)
+        width = self.window_width
+        for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
+            wing_openings.add_window_storeys(
+                openings, edges, ground, step, upper, pitch, width, head=head
+            )
+        _add_ground(self, wing, openings)
+        _add_oriels(self, wing, openings, upper, step)
+        wing_openings.add_casings(openings, (0,), self.casing)
+        bands = [Band(round(ground - 0.3, 2), ground, -self.course)]
+        if self.roof == "flat" and room > 0.8:
+            z = round(wing.wall_top - 0.45, 2)
+            bands.append(Band(z, wing.wall_top, -0.25))
+        glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
+        openings.add_walls(glass, bands)
+        add_roof(self, wing)
+        if self.roof == "flat":
+            equip_roof(self, wing.outline, wing.floor, self.roof_items)
+        elif self.chimney:
+            add_roof_chimney(self, wing, "chimney")
+
+
+def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
+    """Adds the shops, the door to the flats, service doors at the back."""
+    wall = wing.wall(0)
+    door = 1.7 * (p.floor < p.height - 3.0)
+    length = wall.length
+    left = p.door_left
+    start, end = (door, length) if left else (0.0, length - door)
+    wing_openings.add_shops(openings, 0, start, end, p.floor,
+        width=p.shop_width, awnings=p.awnings,
+    )  # fmt: skip
+    if door:
+        x = 0.9 if left else length - 0.9
+        wing_openings.add_door(openings, 0, x, 0.0, height=2.3)
+    back = [wing_openings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+    openings.add_bays((2,), 0.5, 4.5, back, 0.8)
+
+
+def _add_oriels(
+    p: ShopHouse, wing: Wing, openings: Openings, upper: int, step: float
+) -> None:
+    if upper < 1 or step < 2.5 or p.oriels == 0:
+        return
+    wall = wing.wall(0)
+    low = round(p.floor + 0.15, 2)
+    high = round(p.floor + max(1, upper - 1) * step - 0.15, 2)
+    high = min(high, wing.wall_top - 0.7)
+    for a, b in bays.stretches(wall.length, wall.length / p.oriels, 0.4):
+        width = min(2.4, b - a - 1.2)
+        if width < 1.5:
+            continue
+        x = (a + b) / 2
+        openings.clear(
+            0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
+        )
+        bay_windows.add_bay_window(
+            p, wall, x, width, 0.6, low, high,
+            storeys=max(1, upper - 1), canted=p.bay != "box",
+        )  # fmt: skip
