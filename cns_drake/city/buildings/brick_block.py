@@ -112,7 +112,7 @@ def _add_shops(p: BrickBlock) -> float:
         for a, b in bays.stretches(front.length, 2 * p.pitch, 0.6)
         if b < middle - 1.7 or a > middle + 1.7
     ]
-    shape = (0.4, 1.2, 2.6, h - 0.9)
+    shape = canopies.AwningShape(0.4, 1.2, 2.6, h - 0.9)
     shades = canopies.awnings(front, cells, p.rng, 0.6, shape)
     canopies.add_awnings(p, shades)
     roof = canopies.front_canopy(outline, 1.5, 1.3, 3.1)

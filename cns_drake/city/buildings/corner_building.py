@@ -113,7 +113,7 @@ def _add_shops(
     bands = (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15))
     front = WallFrame(plan, 0)
     cells = bays.stretches(front.length, 2 * p.pitch, 0.35)
-    shape = (0.3, 1.3, 2.7, h - 1.2)
+    shape = canopies.AwningShape(0.3, 1.3, 2.7, h - 1.2)
     canopies.add_awnings(p, canopies.awnings(front, cells, p.rng, 0.5, shape))
     return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.4,), blind))
 

@@ -118,7 +118,7 @@ def _add_shop(
         for a, b in cells:
             spot = (a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7)
             boards.append(wall.box(*spot))
-        shape = (0.2, 0.95, 2.4, head + 0.05)
+        shape = canopies.AwningShape(0.2, 0.95, 2.4, head + 0.05)
         shades += canopies.awnings(wall, cells, p.rng, p.awnings, shape)
     canopies.add_awnings(p, shades)
     p.add("boards", *boards, finish=p.colours["sign"])

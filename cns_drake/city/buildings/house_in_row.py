@@ -215,7 +215,7 @@ def _add_bay(
 
 
 def add_roof(p: HouseInRow, wing: Wing) -> None:
-    """Adds the roof of a house, with its dormers, firewalls or stepped gables."""
+    """Adds the roof of a house with its dormers, firewalls or steps."""
     low = wing.wall_top + 0.45
     attic = wing_roofs.attic_window(0.8, low, low + 1.1, wing_openings.GLASS_M)
     wing_roofs.add_roof(p, wing, None if p.roof == "stepped" else attic)

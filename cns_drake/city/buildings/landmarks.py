@@ -57,7 +57,7 @@ class _Model(BaseModel):
     parts: list[_Part]
 
 
-def _folders() -> dict[str, list[Path]]:
+def _folders_by_archetype() -> dict[str, list[Path]]:
     folders = defaultdict(list)
     for path in sorted(_MODELS.glob("*/model.yaml")):
         folders[path.parent.name.rsplit("_", 1)[0]].append(path.parent)
@@ -65,7 +65,7 @@ def _folders() -> dict[str, list[Path]]:
 
 
 # Archetype -> folders of its models.
-LANDMARKS = _folders()
+LANDMARKS = _folders_by_archetype()
 
 
 class Landmark(Building):
@@ -82,7 +82,7 @@ class Landmark(Building):
         building's site, which must be a rectangle.
         """
         x0, y0, x1, y1 = self.site.bounds
-        model = _read(self.folder)
+        model = _read_model(self.folder)
         lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
         # On a lot wider than the model, overhanging parts keep their reach.
         reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
@@ -108,7 +108,7 @@ class Landmark(Building):
 
 
 @cache
-def _read(folder: Path) -> _Model:
+def _read_model(folder: Path) -> _Model:
     text = (folder / "model.yaml").read_text(encoding="utf-8")
     return _Model.model_validate(parse_yaml(text))
 

@@ -89,7 +89,7 @@ def _add_ground(p: Office) -> float:
     bands = (Band(0.0, 0.35, -0.06), Band(h - 0.9, h - 0.1, -0.15))
     ground = Facade(h, bands, layout, (0.5,), p.site.blind_edges)
     cells = bays.stretches(front.length, pitch, 0.7)
-    shape = (0.3, 1.3, 2.7, h - 1.1)
+    shape = canopies.AwningShape(0.3, 1.3, 2.7, h - 1.1)
     shades = canopies.awnings(front, cells, p.rng, p.awnings, shape, 2.6)
     canopies.add_awnings(p, shades)
     roof = canopies.front_canopy(outline, 2.6, 1.45, 3.4)

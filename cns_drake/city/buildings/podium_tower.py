@@ -94,7 +94,7 @@ def _add_shops(p: PodiumTower) -> float:
     layout = bays.by_edge({0: main, 2: service}, shops)
     bands = (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2))
     cells = bays.stretches(front.length, pitch, 0.8)
-    shape = (0.4, 1.35, 2.7, h - 1.3)
+    shape = canopies.AwningShape(0.4, 1.35, 2.7, h - 1.3)
     shades = canopies.awnings(front, cells, p.rng, p.awnings, shape, 3.2)
     canopies.add_awnings(p, shades)
     roof = canopies.front_canopy(outline, 3.2, 1.45, 4.0)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,9 +33,13 @@ def front_canopy(
 ) -> Mesh:
     """Returns a canopy above a door in the middle of the front wall.
 
-    The mesh is in the building's frame. `outline` contains the corners of the
-    walls, `half` is half the canopy's width, `reach` is how far the canopy
-    extends out of the wall, and `z` is the height of the canopy [m].
+    The mesh is in the building's frame.
+
+    Args:
+        outline: (N, 2) corners of the walls [m]; the front is the first edge.
+        half: half the width of the canopy [m].
+        reach: how far the canopy extends out of the wall [m].
+        z: height of the canopy's underside [m].
     """
     front = WallFrame(outline, 0)
     middle = front.length / 2
@@ -62,12 +67,28 @@ def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     return Mesh(np.array(vertices), tuple(faces)).inside_out()
 
 
+class AwningShape(NamedTuple):
+    """The lengths of the awnings along a wall [m].
+
+    Attributes:
+        narrower: how much narrower an awning is than its shop, on each side.
+        reach: how far an awning reaches out of the wall.
+        z0: height of the lower edge.
+        z1: height at the wall.
+    """
+
+    narrower: float
+    reach: float
+    z0: float
+    z1: float
+
+
 def awnings(
     wall: WallFrame,
     cells: Iterable[bays.Span],
     rng: np.random.Generator,
     share: float,
-    shape: tuple[float, float, float, float],
+    shape: AwningShape,
     door: float = -math.inf,
 ) -> list[Mesh]:
     """Returns awnings above some of the shops along a wall.
@@ -77,9 +98,7 @@ def awnings(
         cells: start and end of each shop along the wall [m].
         rng: random generator that chooses the shops with an awning.
         share: probability that a shop has an awning.
-        shape: four lengths of an awning [m]: how much narrower the awning is
-            than its shop on each side; how far the awning reaches out of the
-            wall; height of the lower edge; height of the upper edge.
+        shape: lengths of the awnings.
         door: half the width of the stretch for the door in the middle of the
             wall [m]. Shops that reach into this stretch get no awning. By
             default there is no stretch for a door.

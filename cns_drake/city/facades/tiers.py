@@ -25,12 +25,12 @@ class StoreyGroups(NamedTuple):
     """Equal storeys, in groups of which each becomes one part.
 
     Attributes:
-        count: number of groups.
+        groups: number of groups.
         per_group: number of storeys in a group.
         storey: height of a storey [m].
     """
 
-    count: int
+    groups: int
     per_group: int
     storey: float
 

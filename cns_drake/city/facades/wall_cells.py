@@ -64,7 +64,7 @@ class WallCells:
     arches: tuple[Arch, ...]
 
     @staticmethod
-    def painted(
+    def from_reliefs(
         length: float,
         zs: list[float],
         groups: np.ndarray,

@@ -120,7 +120,7 @@ def single_wall(
     """
     zs = breaks(height, [v for r in reliefs for v in (r.z0, r.z1)])
     rows = np.zeros(len(zs) - 1, dtype=int)
-    grid = WallCells.painted(length, zs, rows, (), reliefs)
+    grid = WallCells.from_reliefs(length, zs, rows, (), reliefs)
     left_out = tuple(itertools.chain(*fronts))
     found = [wall_quads(grid, left_out)]
     found += [glass_quads(grid, tuple(depths)) for depths in fronts]
@@ -183,20 +183,13 @@ def _panel(
     reliefs = () if is_plain else facade.layout(edge, length)
     bounds = [v for r in (*reliefs, *facade.bands) for v in (r.z0, r.z1)]
     zs = breaks(facade.height, bounds)
-    # The depths at the ends of the neighbouring walls, row by row. Above and
-    # below the wall, every cell is closed back to depth 0.
-    ends = np.zeros((2, len(zs) + 1))
-    for row, z in enumerate((np.array(zs[1:]) + zs[:-1]) / 2, start=1):
-        inside = [band for band in facade.bands if band.z0 < z < band.z1]
-        for end, neighbour in enumerate((before, after)):
-            if inside and neighbour not in facade.plain:
-                ends[end, row] = inside[-1].depth
+    ends = _neighbour_depths(facade, zs, (before, after))
     rows = np.zeros(len(zs) - 1, dtype=int)
     if {before, edge, after} & facade.plain:
         steps = (np.diff(ends[:, 1:-1], axis=1) != 0).any(axis=0)
         rows[1:] = np.cumsum(steps)
     bands = () if is_plain else facade.bands
-    grid = WallCells.painted(length, zs, rows, bands, reliefs)
+    grid = WallCells.from_reliefs(length, zs, rows, bands, reliefs)
 
     def place(corners: Sequence[Corner]) -> np.ndarray:
         x, _, depth, row = np.array(corners).T
@@ -207,6 +200,24 @@ def _panel(
         return points[edge] + np.outer(x, along) + np.outer(depth, inward)
 
     return grid, place
+
+
+def _neighbour_depths(
+    facade: Facade, zs: list[float], neighbours: tuple[int, int]
+) -> np.ndarray:
+    """Returns the depths of the two neighbouring walls, row by row [m].
+
+    The result (2, R + 2) contains the depths in the R rows between the heights
+    `zs`. The first and the last number of each wall are 0, because all cells
+    are closed back to depth 0 below and above a wall.
+    """
+    depths = np.zeros((2, len(zs) + 1))
+    for row, z in enumerate((np.array(zs[1:]) + zs[:-1]) / 2, start=1):
+        inside = [band for band in facade.bands if band.z0 < z < band.z1]
+        for end, neighbour in enumerate(neighbours):
+            if inside and neighbour not in facade.plain:
+                depths[end, row] = inside[-1].depth
+    return depths
 
 
 def _corner_shift(

@@ -66,7 +66,7 @@ def find_renaming(
     Raises:
         InputError: a file cannot be read.
     """
-    before = {row.name: row for row in _read(table)}
+    before = {row.name: row for row in _read_rows(table)}
     today = [
         _Row(one.name, one.semantic_class, one.xyz[:2], " ".join(one.tags))
         for one in structures
@@ -99,7 +99,7 @@ def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
     Raises:
         InputError: the file cannot be read.
     """
-    text = _text(stages)
+    text = _read_text(stages)
     nodes = _name_nodes(stages)
     for node in sorted(nodes, key=lambda node: -node.start_mark.index):
         if node.value in renamed:
@@ -111,7 +111,7 @@ def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
     return text
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         return read_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -122,7 +122,7 @@ def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
     """Returns the YAML scalars in a file of stages that name structures."""
     read_yaml(path)  # Errors in one line.
     # Only this slower loader records where in the text a node is.
-    root = yaml.compose(_text(path), MarkedYamlLoader)
+    root = yaml.compose(_read_text(path), MarkedYamlLoader)
     lists = [
         node
         for _, stage in _items(root, "stages")
@@ -196,7 +196,7 @@ def _has_changed(
     }
 
 
-def _read(table: Path) -> list[_Row]:
+def _read_rows(table: Path) -> list[_Row]:
     rows = []
     for line, row in read_records(table, _COLUMNS):
         xy = to_number(row["x"]), to_number(row["y"])

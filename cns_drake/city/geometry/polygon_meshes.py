@@ -35,11 +35,14 @@ def surface_mesh(
         shapes += (
             [piece] if isinstance(piece, np.ndarray) else polygons_of(piece)
         )
-    rings = [s if isinstance(s, np.ndarray) else _quad(s) for s in shapes]
+    rings = [
+        s if isinstance(s, np.ndarray) else _rectangle_corners(s)
+        for s in shapes
+    ]
     halves = triangulate(box(0, 0, spacing, spacing))
     corners: list[np.ndarray] = []
     faces: list[tuple[int, ...]] = []
-    for shape, plane in zip(shapes, _planes(rings, height), strict=True):
+    for shape, plane in zip(shapes, _plane_rings(rings, height), strict=True):
         own: Iterable[np.ndarray]
         if plane is not None:
             own = [plane]
@@ -129,7 +132,7 @@ def _heights(xy: np.ndarray, height: HeightMap | float) -> np.ndarray:
     return np.full(len(xy), float(height))
 
 
-def _quad(polygon: Polygon) -> np.ndarray | None:
+def _rectangle_corners(polygon: Polygon) -> np.ndarray | None:
     """Returns the corners (4, 2) of a polygon that is an axis-aligned box.
 
     It is None for any other polygon. The corners are counter-clockwise.
@@ -145,7 +148,7 @@ def _quad(polygon: Polygon) -> np.ndarray | None:
     return np.array(shapely.normalize(polygon).exterior.coords[3::-1])
 
 
-def _planes(
+def _plane_rings(
     rings: Sequence[np.ndarray | None], height: HeightMap | float
 ) -> list[np.ndarray | None]:
     """Returns the rings (4, 2) whose corners lie in one plane.

@@ -25,7 +25,7 @@ def triangulate(polygon: Polygon) -> np.ndarray:
         ValueError: the polygon turns out not to be valid.
     """
     polygon = shapely.orient_polygons(shapely.normalize(polygon))
-    rings = [_ring(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    rings = [_corners(ring) for ring in (polygon.exterior, *polygon.interiors)]
     if len(rings[0]) < 3:
         return np.zeros((0, 3, 2))
     outer, *holes = rings
@@ -35,13 +35,13 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     fixed = {
         frozenset(edge) for ring in (outer, *holes) for edge in _edges(ring)
     }
-    ring = _bridge(outer, holes)
+    ring = _joined_ring(outer, holes)
     ears = ([ring[k] for k in ear] for ear in cut_ears(ring))
-    triangles = _flip(ears, fixed)
+    triangles = _delaunay(ears, fixed)
     return np.array(triangles, dtype=float).reshape(-1, 3, 2) / _MM_PER_M
 
 
-def _ring(ring: LinearRing) -> list[_Point]:
+def _corners(ring: LinearRing) -> list[_Point]:
     """Returns a ring's corners without repetitions, the smallest one first."""
     xy = np.array(ring.coords)[:-1, :2]
     points = [tuple(p) for p in np.rint(xy * _MM_PER_M).astype(int).tolist()]
@@ -87,7 +87,9 @@ def _cross(a: _Point, b: _Point, c: _Point) -> int:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _bridge(outer: list[_Point], holes: list[list[_Point]]) -> list[_Point]:
+def _joined_ring(
+    outer: list[_Point], holes: list[list[_Point]]
+) -> list[_Point]:
     """Returns one ring that leads into every hole and back again."""
     ring = outer
     left = sorted(holes, key=lambda hole: max(hole), reverse=True)
@@ -219,7 +221,7 @@ def _any_inside(
     return bool((inside & ~is_corner).any())
 
 
-def _flip(
+def _delaunay(
     triangles: Iterable[Sequence[_Point]],
     fixed: set[frozenset[_Point]],
 ) -> list[tuple[_Point, _Point, _Point]]:

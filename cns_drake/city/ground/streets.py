@@ -101,11 +101,15 @@ def street_surfaces(
     road_part, green = paved.difference(covered), medians.difference(kerbs)
     walks = Covering("sidewalks", "sidewalk", sidewalks, _SIDEWALK_RGB)
     structures = [
-        _surface(Covering("carriageway", "road", road_part, _ROAD_RGB), road),
-        *(_surface(one, road) for one in coverings),
+        _surface_with_edging(
+            Covering("carriageway", "road", road_part, _ROAD_RGB), road
+        ),
+        *(_surface_with_edging(one, road) for one in coverings),
         _kerb_structure(kerbs, paved, road, walk),
-        _surface(walks, walk, outer),
-        _surface(Covering("medians", "terrain", green, _MEDIAN_RGB), walk),
+        _surface_with_edging(walks, walk, outer),
+        _surface_with_edging(
+            Covering("medians", "terrain", green, _MEDIAN_RGB), walk
+        ),
     ]
     return [structure for structure in structures if structure.model.parts]
 
@@ -142,7 +146,7 @@ def kerb_height(network: RoadNetwork) -> float:
     return max(road.kerb_height for road in network.roads.values())
 
 
-def _surface(
+def _surface_with_edging(
     ground: Covering,
     height: HeightMap | float,
     edge: BaseGeometry | None = None,

@@ -149,7 +149,7 @@ def ground_structures(
 
 def _slope(ground: Covering, shape: GroundShape) -> Structure:
     """Returns ground that slopes between level pads, with one part per tile."""
-    is_gentle = _fall(ground.area, shape.base) < _GENTLE
+    is_gentle = _height_difference(ground.area, shape.base) < _GENTLE
     spacing = _SPACING if is_gentle else _FINE_SPACING
     pieces = {}
     for part, piece in ground.tiles():
@@ -166,7 +166,7 @@ def _slope(ground: Covering, shape: GroundShape) -> Structure:
     return ground.structure(pieces)
 
 
-def _fall(area: BaseGeometry, base: Ground) -> float:
+def _height_difference(area: BaseGeometry, base: Ground) -> float:
     """Returns the difference of height along the outline of an area [m]."""
     outline = shapely.segmentize(area, _SPACING)
     return float(np.ptp(base(*shapely.get_coordinates(outline).T)))

@@ -72,16 +72,16 @@ def place_buildings(draft: Draft, district: District) -> None:
         rng = draft.rng(name, "building", index)
         fault_at = f"{draft.source}: districts.{name}.buildings.{index}"
         house = _single_house(draft, district, plan, fault_at)
-        _build(draft, name, plan.kind, house, rng, fault_at)
+        _add_house(draft, name, plan.kind, house, rng, fault_at)
     for index, row in enumerate(district.plan.rows):
         fault_at = f"{draft.source}: districts.{name}.rows.{index}"
         rng = draft.task(name, "row", index)
         for k, house in enumerate(_row_houses(draft, district, row, rng)):
             rng = draft.rng(name, "row", index, k)
-            _build(draft, name, row.kind, house, rng, fault_at)
+            _add_house(draft, name, row.kind, house, rng, fault_at)
 
 
-def _build(
+def _add_house(
     draft: Draft,
     district: str,
     kind: str | None,

@@ -89,7 +89,7 @@ def _place_line(
         at = station_at(line, s)
         name = pick_key(plan.objects, rng)
         yaw = at.yaw + math.radians(plan.yaw_deg)
-        _try_object(draft, district, name, plan.kind, at[:2], yaw, rng)
+        _place_if_free(draft, district, name, plan.kind, at[:2], yaw, rng)
         s += float(rng.uniform(*plan.spacing))
 
 
@@ -149,10 +149,10 @@ def _scatter(
         name = pick_key(plan.objects, rng)
         if keep:
             xy = float(dart[0]), float(dart[1])
-            _try_object(draft, district, name, plan.kind, xy, yaw, rng)
+            _place_if_free(draft, district, name, plan.kind, xy, yaw, rng)
 
 
-def _try_object(
+def _place_if_free(
     draft: Draft,
     district: District,
     name: str,

@@ -153,7 +153,7 @@ def load_stages(
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
     stages = validated(Stages, content, path)
-    _check(stages, path)
+    _check_order_and_last(stages, path)
     stages = _resolved(stages, _Names(path, structures))
     _check_absent_once(stages, path)
     return stages
@@ -219,7 +219,7 @@ def _resolved(stages: Stages, names: _Names) -> Stages:
     )
 
 
-def _check(stages: Stages, path: Path) -> None:
+def _check_order_and_last(stages: Stages, path: Path) -> None:
     names = list(stages.stages)
     if not names:
         raise InputError(f"{path}: stages: at least one stage is needed")

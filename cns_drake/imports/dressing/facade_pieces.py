@@ -303,7 +303,9 @@ def _add_signs(
         limits = (start + JAMB_WIDTH, end - JAMB_WIDTH, z, z + height)
         _add_in_wall(out, "sign", panel, boards.board(*limits, _SIGN_REACH))
     low, high = z - _AWNING_HEIGHT, z + float(panel.origin[2])
-    shape = (JAMB_WIDTH, _AWNING_REACH, high - _AWNING_HEIGHT, high)
+    shape = canopies.AwningShape(
+        JAMB_WIDTH, _AWNING_REACH, high - _AWNING_HEIGHT, high
+    )
     cells = [(o.x0, o.x1) for o in shops]
     awnings = canopies.awnings(panel.frame, cells, rng, 0.4, shape)
     if plan.is_in_the_way(low, _AWNING_REACH):
