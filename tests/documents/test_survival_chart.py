@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from docs import draw
+from docs import chart_pictures
 
 PAGE = """# Results
 
@@ -81,7 +81,9 @@ def column(name, method):
 
 def over_cities(method, gate):
     """Mean and limits by the definition: the units are cities, not pairs."""
-    rows = [one for one in draw.kept_rows()[gate] if one.method == method]
+    rows = [
+        one for one in chart_pictures.kept_rows()[gate] if one.method == method
+    ]
     values = np.array([one.value for one in rows])
     cities = np.array([one.map for one in rows])
     mean, names = values.mean(), np.unique(cities)
@@ -104,7 +106,7 @@ def test_the_table_has_the_numbers_of_the_file():
 
 
 def test_the_chart_says_who_survives(tmp_path):
-    finding = draw.survival(tmp_path / "chart.png")
+    finding = chart_pictures.survival(tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 1000
     survive = {
         gate: {n for n in KEYS.values() if over_cities(n, gate)[1] >= 0.9}
