@@ -29,7 +29,7 @@ from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.grown_city import grow
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
+from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
 from cns_drake.imports.staged_city import StagedCity, stage_city
@@ -154,7 +154,7 @@ def _write_lanes(
     """
     names = {one.structure.name for one in bare}
     added = [one for one in kept if one.structure.name not in names]
-    lanes = lanes_of_streets(
+    lanes = lane_text_of_streets(
         city.streets,
         city.street_places,
         [*bare, *added],

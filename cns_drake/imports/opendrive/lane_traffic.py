@@ -23,7 +23,7 @@ _LEAST_HALF_WIDTH = 0.3
 _SHORTEST_WALKWAY = 5.0
 
 
-def lanes_for_traffic(
+def lane_text_of_bands(
     bands: Sequence[LaneBand], kerbs: KerbHeights
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.

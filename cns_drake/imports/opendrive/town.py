@@ -28,7 +28,7 @@ from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import bridges, imported_streets
 from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_traffic import lanes_for_traffic
+from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
 from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_bands
 from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
@@ -177,7 +177,7 @@ def _build(
         city = _near_drives(city, drives, options.within, faults)
     imported = {one.name for some in of_file for one in some}
     generated = [one for one in city.structures if one.name not in imported]
-    lanes_of_traffic = lanes_for_traffic(bands, kerbs)
+    lanes_of_traffic = lane_text_of_bands(bands, kerbs)
     if lanes_of_traffic is None:
         faults.add(
             "no lanes for traffic: each comes to a dead end", source.name

@@ -34,7 +34,7 @@ _LOWEST_OBSTACLE = 0.3
 _HIGHEST_OBSTACLE = 3.5
 
 
-def lanes_of_streets(
+def lane_text_of_streets(
     streets: Sequence[Street],
     places: StreetPlaces,
     structures: Sequence[ImportedStructure],

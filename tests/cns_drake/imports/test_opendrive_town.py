@@ -32,7 +32,7 @@ from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     lane_polygon,
 )
-from cns_drake.imports.opendrive.lane_traffic import lanes_for_traffic
+from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
 from cns_drake.imports.opendrive.lanes import lane_bands
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
@@ -531,7 +531,7 @@ def test_a_ring_road_without_a_junction_has_traffic(tmp_path, pieces):
         roads.append(road(str(k), length, [piece], [lanes], more=more))
     path = write_roads(tmp_path / "ring.xodr", *roads)
     bands = bands_of(path)
-    text = lanes_for_traffic(bands, KerbHeights(bands, 0.1))
+    text = lane_text_of_bands(bands, KerbHeights(bands, 0.1))
     lanes_file = tmp_path / "lanes.json"
     lanes_file.write_text(text)
     graph_pieces = read_lanes(lanes_file).graph.pieces

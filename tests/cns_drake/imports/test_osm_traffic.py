@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.traffic import lanes_of_streets
+from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import ImportOptions
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import plan_drive
@@ -58,7 +58,7 @@ ROUTE = np.array([(-86, -71.7), (0, -71.7), (86, -71.7)])
 def lanes_of(path, tmp_path, side="right", added=()):
     city = import_openstreetmap(path, None)
     drive = WaypointRoute(ROUTE, ROUTE)
-    text = lanes_of_streets(
+    text = lane_text_of_streets(
         city.streets,
         city.street_places,
         city.structures,
@@ -297,7 +297,7 @@ def test_no_lanes_without_streets_near_the_drives(tmp_path):
     city = import_openstreetmap(write_blocks(tmp_path / "a.osm"), None)
     drive = WaypointRoute(ROUTE + 5000.0, ROUTE + 5000.0)
     for streets in ((), city.streets):
-        found = lanes_of_streets(
+        found = lane_text_of_streets(
             streets,
             city.street_places,
             city.structures,
