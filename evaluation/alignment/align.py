@@ -205,22 +205,17 @@ def align(
         InputError: if the drives have too little in common, or a scan cannot be
             read.
     """
-    if hold_first:
-        target = Submaps(first)
-        held = 0.0
-    else:
-        target, held = _without_drift(first)
-    source, moving = _without_drift(second)
-    swapped = held > moving and not hold_first
+    target, target_drift = (
+        (Submaps(first), 0.0) if hold_first else _without_drift(first)
+    )
+    source, source_drift = _without_drift(second)
+    swapped = target_drift > source_drift and not hold_first
     if swapped:
-        target, held, source, moving = source, moving, target, held
+        target, source = source, target
+        target_drift, source_drift = source_drift, target_drift
     search, guess, num_candidates = _search_from_a_guess(source, target)
     search.grow()
-    X_TK, model = _fit_poses(search)
-    for _ in range(_ROUNDS):
-        if not search.retry(_doubtful_keyframes(search, X_TK), X_TK):
-            break
-        X_TK, model = _fit_poses(search)
+    X_TK, model = _fit_with_retries(search)
     loops = list(search.loops.values())
     is_inlier = agreeing(loops, target.X_WK, X_TK)
     _check_agreement(search, int(is_inlier.sum()))
@@ -230,7 +225,7 @@ def align(
         ground = 0.0
     X_TS = source.bend(X_TK)
     frame = target.drive.world_frame
-    if ground != 0.0 or held > 0.0:
+    if ground != 0.0 or target_drift > 0.0:
         # The drive's world frame is no longer the one that its name stands for.
         frame = f"{frame}, corrected by {target.name}"
     datum = target.drive.datum
@@ -252,7 +247,7 @@ def align(
             distance_95=float(np.quantile(distances[is_inlier], 0.95)),
             angle_median_deg=float(np.degrees(np.median(angles[is_inlier]))),
             model=model,
-            straightened=(held, moving),
+            straightened=(target_drift, source_drift),
             ground=ground,
             **_motion_fields((first if swapped else second).X_WS, X_TS),
         ),
@@ -339,6 +334,16 @@ def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
     if np.quantile(distances, 0.75) < _DRIFT:
         return X_TK, "anchor"
     return fit_bent(loops, X_TL, source, X_TS), "pose graph"
+
+
+def _fit_with_retries(search: LoopSearch) -> tuple[np.ndarray, str]:
+    """Returns what `_fit_poses` does, after trying doubtful keyframes again."""
+    X_TK, model = _fit_poses(search)
+    for _ in range(_ROUNDS):
+        if not search.retry(_doubtful_keyframes(search, X_TK), X_TK):
+            break
+        X_TK, model = _fit_poses(search)
+    return X_TK, model
 
 
 def _check_agreement(search: LoopSearch, num_agreeing: int) -> None:

@@ -109,7 +109,7 @@ def track_drive(
             f"{query.name}: {len(frames)} scans, {SPACING:g} m apart, in the"
             " map; a track has two and more"
         )
-    # Between two parts the drive left the map.
+    # Between two sections, the drive left the map.
     gaps = np.add.reduceat(~is_mapped, frames)[:-1] > 0
     stretches = np.concatenate([[0], np.cumsum(gaps)])
     steps = drifting_steps(X_WS[frames], way[frames], drift, starts.seed)
@@ -126,9 +126,7 @@ def track_drive(
             offset, turn = starts.draw(frame)
         else:
             start = last @ steps[k - 1]
-            offset = start[:3, 3] - X_WS[frame, :3, 3]
-            R = X_WS[frame, :3, :3].T @ start[:3, :3]
-            turn = Rotation.from_matrix(R).as_rotvec()
+            offset, turn = _offset_and_turn(start, X_WS[frame])
         row, end = localiser.query(
             frame,
             int(query.stamps_ns[frame]),
@@ -154,6 +152,23 @@ def track_drive(
         rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
         rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
     return rows
+
+
+def _offset_and_turn(
+    X_WS0: np.ndarray, X_WS: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how an initial pose differs from the ground truth.
+
+    Args:
+        X_WS0: (4, 4) initial pose.
+        X_WS: (4, 4) ground-truth pose.
+
+    Returns:
+        (3,) offset of the position in W [m]; (3,) rotation vector in S [rad].
+    """
+    R = X_WS[:3, :3].T @ X_WS0[:3, :3]
+    turn = Rotation.from_matrix(R).as_rotvec()
+    return X_WS0[:3, 3] - X_WS[:3, 3], turn
 
 
 def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
