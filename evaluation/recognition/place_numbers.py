@@ -50,29 +50,7 @@ def place_numbers(
     for (name, value), drawn in zip(values.items(), samples, strict=True):
         yield now.number(name, value, percentile_interval(drawn))
     if before is not None:
-        drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
-        if is_paired := len(before.outcomes) == len(outcomes):
-            drawn_then = paired_samples(before.outcomes, outcomes)
-        for name, then, today, drawn, other in zip(
-            ("kept", "kept_r1", "kept_strict"),
-            before.by_mode["all"].main_metrics.values(),
-            values.values(),
-            samples,
-            drawn_then,
-            strict=True,
-        ):
-            interval = percentile_interval(kept_share(drawn, other))
-            yield now.number(name, float(kept_share(today, then)), interval)
-        if is_paired:
-            right = outcomes.is_right
-            was = before.outcomes.is_right
-            yield now.number("lost", float((was & ~right).sum()))
-            yield now.number("found", float((right & ~was).sum()))
-            added = visible_change_added(
-                now.columns["overlap"], before.columns["overlap"]
-            )
-            if not math.isnan(added):
-                yield now.number("visible_change_added", added)
+        yield from _compared_numbers(now, before)
     yield now.number("with_match", float(outcomes.has_match.sum()))
     yield now.number("places", float(outcomes.num_places))
     yield now.number(
@@ -86,6 +64,42 @@ def place_numbers(
     yield now.number("hidden", float(is_little_shown.sum()))
     if not math.isnan(shown := mean_visible_change(overlaps)[0]):
         yield now.number("visible_change", shown)
+
+
+def _compared_numbers(
+    now: PlaceOutcome, before: PlaceOutcome
+) -> Iterator[Number]:
+    """Yields the results that compare a condition with the baseline.
+
+    They are listed at `place_numbers`. If the queries differ, only `kept`,
+    `kept_r1` and `kept_strict` are known, without intervals.
+    """
+    outcomes = now.outcomes
+    values = now.by_mode["all"].main_metrics
+    samples = own_samples(outcomes)
+    drawn_then: Sequence[np.ndarray | float] = [math.nan] * len(samples)
+    if is_paired := len(before.outcomes) == len(outcomes):
+        drawn_then = paired_samples(before.outcomes, outcomes)
+    for name, then, today, drawn, other in zip(
+        ("kept", "kept_r1", "kept_strict"),
+        before.by_mode["all"].main_metrics.values(),
+        values.values(),
+        samples,
+        drawn_then,
+        strict=True,
+    ):
+        interval = percentile_interval(kept_share(drawn, other))
+        yield now.number(name, float(kept_share(today, then)), interval)
+    if is_paired:
+        right = outcomes.is_right
+        was = before.outcomes.is_right
+        yield now.number("lost", float((was & ~right).sum()))
+        yield now.number("found", float((right & ~was).sum()))
+        added = visible_change_added(
+            now.columns["overlap"], before.columns["overlap"]
+        )
+        if not math.isnan(added):
+            yield now.number("visible_change_added", added)
 
 
 def pose_numbers(
