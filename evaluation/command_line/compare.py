@@ -13,7 +13,7 @@ from cns_drake.base.terminal import number
 from evaluation.command_line import options
 
 if TYPE_CHECKING:
-    from evaluation.recognition.metrics import Interval
+    from evaluation.recognition.bootstrap import Interval
 
 
 @commands.former_options({"--gate": "--verified"})

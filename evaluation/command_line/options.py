@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
     from evaluation.drives import Drive
-    from evaluation.recognition.metrics import Interval
+    from evaluation.recognition.bootstrap import Interval
     from evaluation.study.engine import Engine
 
 

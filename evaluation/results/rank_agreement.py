@@ -10,11 +10,11 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.errors import InputError
 from evaluation.recognition.bootstrap import (
+    Interval,
     percentile_interval,
     resampled_metrics,
     weights_by_drive,
 )
-from evaluation.recognition.metrics import Interval
 from evaluation.results.compared_answers import check_same_queries, drive_number
 from evaluation.results.metric_tables import RESAMPLED_METRICS, MetricTable
 from evaluation.results.ranking import LEAST_UNITS, rank_methods

@@ -10,8 +10,11 @@ import zlib
 import numpy as np
 from scipy.special import stdtrit
 
-from evaluation.recognition.bootstrap import UNKNOWN, resampled_weights
-from evaluation.recognition.metrics import Interval
+from evaluation.recognition.bootstrap import (
+    UNKNOWN,
+    Interval,
+    resampled_weights,
+)
 from evaluation.results.ranges import Range, range_of
 from evaluation.results.table import Row
 

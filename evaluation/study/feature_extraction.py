@@ -11,7 +11,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
-from evaluation.change.drive_change import DriveMap
+from evaluation.change.drive_maps import DriveMap
 from evaluation.drives import Drive, DriveNames
 from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import sample_frames

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.points import xyz
-from evaluation.change.drive_change import DriveMap
+from evaluation.change.drive_maps import DriveMap
 from evaluation.drives import DriveNames
 from evaluation.drives.scan_clouds import within_range
 from evaluation.maps.voxel_maps import VoxelMap

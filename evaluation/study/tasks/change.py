@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from cns_drake.base.jobs.step import Reporter
 from evaluation.change.drive_change import ChangeReport, change_between
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.result_number import Number
 from evaluation.study.features import DriveSummary
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result

@@ -11,7 +11,7 @@ from evaluation.map_update.labels import Label, Labels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_labels, read_pair, read_truth
 from evaluation.map_update.structures import class_names
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.result_number import Number
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Task, check_positive

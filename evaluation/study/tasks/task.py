@@ -9,7 +9,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.repetitions import repeated
-from evaluation.recognition.place_outcome import Number
+from evaluation.recognition.result_number import Number
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 
