@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.drives.drive import SCENARIO, read_scenario
+from cns_drake.base.drives.drive_scenario import SCENARIO, read_scenario
 from cns_drake.base.drives.mulran_frames import X_BS
 from cns_drake.base.errors import InputError
 from evaluation.drives.scan_files import (

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 import re
 
-from cns_drake.base.drives.drive import SCENARIO, driven_way
+from cns_drake.base.drives.drive_scenario import SCENARIO, driven_way
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive

@@ -5,15 +5,12 @@ from __future__ import annotations
 import abc
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there
-from cns_drake.base.yaml_files import read_yaml
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
 # velocities are those of B in W, expressed in B [m/s, rad/s].
@@ -36,16 +33,8 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
-# File of a drive's folder with the scenario of an exported drive.
-SCENARIO = "scenario.yaml"
-# Fields of a scenario that give the vehicle's path.
-_PATHS = ("route", "waypoints")
-# Fields that move the vehicle beside its path, or turn it round.
-_CHANGES = ("aside", "u_turns")
 # The LiDAR of a scenario that names none.
 _DEFAULT_UNIT = "cns"
-# A drive's name also names files.
-_NAME = re.compile(r"\w[\w.-]*")
 
 
 class ImuSamples(NamedTuple):
@@ -64,47 +53,6 @@ class ImuSamples(NamedTuple):
     quat_xyzw: np.ndarray
     angular_velocity: np.ndarray
     specific_force: np.ndarray
-
-
-def driven_way(scenario: Mapping | None) -> dict | None:
-    """Returns the fields of a scenario that determine the vehicle's path.
-
-    Two drives for which these fields are equal follow the same path. The drives
-    may differ in their surroundings and their sensors.
-
-    Args:
-        scenario: the fields of a scenario; None if a drive has no scenario.
-
-    Returns:
-        Field -> value, without fields that are empty or zero. None if there is
-        no scenario, or if the scenario has neither a route nor waypoints.
-    """
-    if scenario is None or not any(scenario.get(name) for name in _PATHS):
-        return None
-    return {
-        name: scenario[name] for name in _PATHS + _CHANGES if scenario.get(name)
-    }
-
-
-def read_scenario(folder: Path) -> Mapping | None:
-    """Returns the content of `scenario.yaml` in an exported drive's folder.
-
-    The result is None if there is no such file.
-
-    Raises:
-        InputError: the file is not a mapping in YAML, or its field `name` is
-            not a valid name of a drive.
-    """
-    path = folder / SCENARIO
-    if not is_there(path):
-        return None
-    scenario = read_yaml(path)
-    if not isinstance(scenario, dict):
-        raise InputError(f"{path}: not a mapping of a scenario's fields")
-    name = scenario.get("name")
-    if name is not None and not _NAME.fullmatch(str(name)):
-        raise InputError(f"{path}: name: {name!r} is no name of a drive")
-    return scenario
 
 
 class Drive(abc.ABC):

@@ -3,7 +3,7 @@
 from helpers.small_towns import ROUTES, drive
 import pytest
 
-from cns_drake.base.drives.drive import driven_way
+from cns_drake.base.drives.drive_scenario import driven_way
 from evaluation.study.map_drives import drives_by_map
 from evaluation.study.recording_search import find_recordings
 

@@ -1,0 +1,62 @@
+"""The scenario of a recorded drive: its file, and the path that it gives."""
+
+from collections.abc import Mapping
+from pathlib import Path
+import re
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import is_there
+from cns_drake.base.yaml_files import read_yaml
+
+# Name of the file with the scenario, in the folder of an exported drive.
+SCENARIO = "scenario.yaml"
+# Fields of a scenario that give the vehicle's path.
+_PATH_FIELDS = ("route", "waypoints")
+# Fields that shift the vehicle to the side of its path, or turn the vehicle
+# round.
+_SHIFT_FIELDS = ("aside", "u_turns")
+# Pattern of a drive's name, which is also a part of file names.
+_NAME = re.compile(r"\w[\w.-]*")
+
+
+def driven_way(scenario: Mapping | None) -> dict | None:
+    """Returns the fields of a scenario that determine the vehicle's path.
+
+    Two drives for which these fields are equal follow the same path. The drives
+    may differ in their surroundings and their sensors.
+
+    Args:
+        scenario: the fields of a scenario; None if a drive has no scenario.
+
+    Returns:
+        Field -> value, without fields that are empty or zero. None if there is
+        no scenario, or if the scenario has neither a route nor waypoints.
+    """
+    if scenario is None or not any(scenario.get(name) for name in _PATH_FIELDS):
+        return None
+    return {
+        name: scenario[name]
+        for name in _PATH_FIELDS + _SHIFT_FIELDS
+        if scenario.get(name)
+    }
+
+
+def read_scenario(folder: Path) -> Mapping | None:
+    """Returns the content of `scenario.yaml` in an exported drive's folder.
+
+    The result is None if there is no such file.
+
+    Raises:
+        InputError: the file is not a mapping in YAML, or its field `name` is
+            not a valid name of a drive.
+    """
+    path = folder / SCENARIO
+    if not is_there(path):
+        return None
+    scenario = read_yaml(path)
+    if not isinstance(scenario, dict):
+        raise InputError(f"{path}: not a mapping of a scenario's fields")
+    name = scenario.get("name")
+    if name is not None and not _NAME.fullmatch(str(name)):
+        raise InputError(f"{path}: name: {name!r} is no name of a drive")
+    return scenario
