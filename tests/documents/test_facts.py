@@ -126,12 +126,12 @@ def test_the_tutorial_names_the_colours_that_its_page_shows():
     assert any("_lot_" in name for name in names)
     assert not stages.heights("01").keys() | stages.sites("01").keys()
     (said,) = re.findall(
-        r"Tick \*What\s+changed\*: ([^.]+)\.",
+        r"Tick \*What\s+changed\*\.\s+The page then\s+shows ([^.]+)\.",
         documents.read("docs/tutorial.md").text,
     )
     assert " ".join(said.split()) == (
-        "structures that stage 02 adds turn red, "
-        "and structures that stage 02 clears away turn violet"
+        "in red all structures that stage 02 adds, "
+        "and in violet all structures that stage 02 clears away"
     )
 
 
