@@ -15,9 +15,7 @@ import numpy as np
 import pytest
 
 from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.splines import make_uniform_spline
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.wheel_motion import WheelMotion
 from cns_drake.roads.lane_path import LanePath, Speeds
 
 
@@ -31,22 +29,6 @@ def motion(trajectory, t):
     along = np.sum(a * tangent, axis=1)
     across = np.linalg.norm(a - along[:, None] * tangent, axis=1)
     return np.linalg.norm(v, axis=1), along, across
-
-
-def test_the_spline_reproduces_lines_and_smooths_waves():
-    values = 3.0 + 0.7 * np.arange(20)[:, None]
-    line = make_uniform_spline(values, 0.5)
-    assert (line.start_time(), line.end_time()) == (0.0, 9.5)
-    t = np.linspace(0, 9.5, 50)
-    np.testing.assert_allclose(line.vector_values(t)[0], 3.0 + 1.4 * t)
-
-    wave = make_uniform_spline(np.cos(0.3 * np.arange(200))[:, None], 1.0)
-    t = np.linspace(20, 170, 400)
-    gain = (np.sin(0.15) / 0.15) ** 6
-    # Aliases of the wave are weaker by (0.3 / (2 pi - 0.3))^6.
-    np.testing.assert_allclose(
-        wave.vector_values(t)[0], gain * np.cos(0.3 * t), atol=3e-8
-    )
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.12])
@@ -181,39 +163,3 @@ def test_path_integrals():
     fine = path.evaluate(np.linspace(0, path.end, 40001)).p
     chords = np.linalg.norm(np.diff(fine, axis=0), axis=1).sum()
     assert travelled(path.end) == pytest.approx(chords, abs=1e-6)
-
-
-def test_wheels_of_a_steady_bend_roll_on_circles():
-    radius = 25.0
-    r = smoothed_radius(25.0)
-    trajectory = Trajectory(lane_path(helix_points(radius, 0, 100)), CAREFUL)
-    t = trajectory.duration / 2 + np.array([0.0, 0.5])
-    yaw_rate = trajectory.path_parameter(t)[1] / radius
-    for x, y in ((0.0, 0.8), (0.0, -0.8), (2.8, 0.8), (2.8, -0.8)):
-        wheel = WheelMotion(trajectory, (x, y, 0.3))
-        steering = wheel.steering(trajectory.at(t))
-        rolling = wheel.rolling(trajectory.at(t))
-        # The turning centre lies at (0, r) in the vehicle frame.
-        own_radius = np.hypot(r - y, x)
-        np.testing.assert_allclose(steering.position, np.arctan2(x, r - y))
-        np.testing.assert_allclose(steering.rate, 0.0, atol=1e-6)
-        np.testing.assert_allclose(
-            rolling.rate, yaw_rate * own_radius / 0.3, rtol=1e-8
-        )
-        rolled = rolling.position[1] - rolling.position[0]
-        assert rolled == pytest.approx(0.5 * rolling.rate[0], rel=1e-8)
-
-
-def test_wheel_rates_are_derivatives_of_the_angles():
-    trajectory = Trajectory(lane_path(wavy_points(2)), CAREFUL)
-    wheel = WheelMotion(trajectory, (2.8, -0.8, 0.33))
-    t = np.linspace(1.0, trajectory.duration - 1.0, 200)
-    step = 1e-4
-    for turn in (wheel.steering, wheel.rolling):
-        now, before, after = (
-            turn(trajectory.at(t + shift)) for shift in (0.0, -step, step)
-        )
-        rate = (after.position - before.position) / (2 * step)
-        np.testing.assert_allclose(now.rate, rate, atol=1e-5)
-        acceleration = (after.rate - before.rate) / (2 * step)
-        np.testing.assert_allclose(now.acceleration, acceleration, atol=1e-5)
