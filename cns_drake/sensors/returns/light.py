@@ -103,7 +103,7 @@ class Light(NamedTuple):
 
 
 @compiled
-def reflect(
+def reflected_light(
     beam: np.ndarray,
     share: np.ndarray,
     distance: np.ndarray,
@@ -123,12 +123,14 @@ def reflect(
     """
     energy = np.empty(len(beam))
     for k in range(len(beam)):
-        energy[k] = reflected(share[k], geometry[k], cosine[k], materials)
+        energy[k] = reflected_energy(
+            share[k], geometry[k], cosine[k], materials
+        )
     return Light(beam, distance, energy, geometry)
 
 
 @compiled
-def reflected(
+def reflected_energy(
     share: float, geometry: int, cosine: float, materials: Materials
 ) -> float:
     """Returns the light that a surface reflects along one ray.

@@ -22,8 +22,8 @@ from cns_drake.sensors.returns.light import (
     BeamHits,
     Light,
     Shots,
-    reflect,
-    reflected,
+    reflected_energy,
+    reflected_light,
 )
 from cns_drake.sensors.returns.materials import GLASS, LEAVES, SPRAYS, Materials
 from cns_drake.sensors.returns.random_numbers import cell_number
@@ -117,7 +117,7 @@ def start_ways(
     side_onto_open = is_open[side_hits.geometry[lit]]
     k, n = axes[~onto_open], lit[~side_onto_open]
     lights = [
-        reflect(
+        reflected_light(
             beam[row],
             share[among],
             met.ranges[among],
@@ -283,7 +283,7 @@ def _advance_to_hits(
             continue
         cosine = met.cosine[ray]
         beam[part], distance[part] = ways.beam[ray], length
-        energy[part] = reflected(sent, geometry, cosine, materials)
+        energy[part] = reflected_energy(sent, geometry, cosine, materials)
         reflecting[part] = geometry
         if materials.kind[geometry] == GLASS:
             mirrored, through = pane_shares(cosine)
