@@ -42,22 +42,53 @@ def add_bay_window(
         canted: whether the sides are slanted; otherwise the bay window is a
             box.
     """
-    a, b = x - width / 2, x + width / 2
-    if canted:
-        slant = min(reach, 0.28 * width)
-        plan = [(a, -0.1), (a, 0.0), (a + slant, reach), (b - slant, reach),
-                (b, 0.0), (b, -0.1)]  # fmt: skip
-        flush = frozenset({0, 4, 5})
+    corners, flush = _plan(x, width, reach, canted=canted)
+    points = np.array([wall.point(*corner) for corner in corners])
+    facade = _storeys(round(z1 - z0, 3), storeys, flush)
+    if z0 == 0.0:
+        under = solids.foundation(points)
     else:
+        under = solids.flat(points, z0, up=False)
+    out.add_to("walls", facade_mesh(points, facade, z0), under)
+    out.add_to("glass", glass_mesh(points, facade, z0))
+    reaches = [-0.12 * (k not in flush) for k in range(len(points))]
+    eaves = outlines.inset(points, reaches)
+    tip = (eaves[0] + eaves[-1]) / 2
+    out.add_to(
+        "roof",
+        solids.flat(eaves, z1, up=False),
+        solids.skirt(eaves, eaves, z1, z1 + 0.15),
+        solids.spire(eaves, tip, z1 + 0.15, z1 + 0.15 + 0.7 * reach),
+    )
+
+
+def _plan(
+    x: float, width: float, reach: float, *, canted: bool
+) -> tuple[list[outlines.Point], frozenset[int]]:
+    """Returns the corners of a bay window, and the edges inside the wall.
+
+    The corners are distances along the wall and out of the wall [m].
+    """
+    a, b = x - width / 2, x + width / 2
+    if not canted:
         plan = [(a, -0.1), (a, reach), (b, reach), (b, -0.1)]
-        flush = frozenset({3})
-    points = np.array([wall.point(*p) for p in plan])
-    height = round(z1 - z0, 3)
-    step = height / storeys
+        return plan, frozenset({3})
+    slant = min(reach, 0.28 * width)
+    plan = [(a, -0.1), (a, 0.0), (a + slant, reach), (b - slant, reach),
+            (b, 0.0), (b, -0.1)]  # fmt: skip
+    return plan, frozenset({0, 4, 5})
+
+
+def _storeys(height: float, count: int, flush: frozenset[int]) -> Facade:
+    """Returns walls with windows in each storey, except at the edges `flush`.
+
+    `height` is the height of all storeys together [m].
+    """
+    step = height / count
 
     def layout(edge: int, length: float) -> list[Relief]:
         relief: list[Relief] = []
-        for k in range(storeys if edge not in flush and length >= 0.7 else 0):
+        for k in range(count if edge not in flush and length >= 0.7 else 0):
             z = k * step
             pane = bays.window(
                 length - 0.3, round(z + 0.75, 2), round(z + step - 0.45, 2),
@@ -67,19 +98,4 @@ def add_bay_window(
         return relief
 
     bands = (Band(height - 0.2, height, -0.08),)
-    facade = Facade(height, bands, layout, (_RECESS,), flush)
-    if z0 == 0.0:
-        under = solids.foundation(points)
-    else:
-        under = solids.flat(points, z0, up=False)
-    out.add_to("walls", facade_mesh(points, facade, z0), under)
-    out.add_to("glass", glass_mesh(points, facade, z0))
-    reaches = [-0.12 * (k not in flush) for k in range(len(points))]
-    outer = outlines.inset(points, reaches)
-    tip = (outer[0] + outer[-1]) / 2
-    out.add_to(
-        "roof",
-        solids.flat(outer, z1, up=False),
-        solids.skirt(outer, outer, z1, z1 + 0.15),
-        solids.spire(outer, tip, z1 + 0.15, z1 + 0.15 + 0.7 * reach),
-    )
+    return Facade(height, bands, layout, (_RECESS,), flush)

@@ -40,57 +40,84 @@ def add_roof(
             `attic_window` makes; None for no windows.
         material: material of the gables.
     """
-    roof, outline, line = wing.roof, wing.outline, wing.roof_line
+    if wing.roof.kind == "flat":
+        _add_flat_roof(out, wing, material)
+    elif wing.roof.kind == "hip":
+        _add_hipped_roof(out, wing)
+    else:
+        _add_covering(out, wing)
+        for edge in wing.gables:
+            _add_gable(out, wing, edge, attic, material)
+        if wing.roof.kind == "shed":
+            _add_tall_side(out, wing, material)
+
+
+def _add_flat_roof(out: Assembly, wing: Wing, material: str) -> None:
+    """Adds a flat roof and its parapet."""
+    outline = wing.outline
+    floor = round(wing.top - wing.roof.parapet, 3)
+    out.add_to(
+        material,
+        solids.skirt(outline, outline, wing.wall_top, wing.top),
+        solids.roof_pan(outline, floor, wing.top, 0.25),
+    )
+
+
+def _add_hipped_roof(out: Assembly, wing: Wing) -> None:
     is_free = [k not in wing.blind for k in range(4)]
-    if roof.kind == "flat":
-        floor = round(wing.top - roof.parapet, 3)
-        out.add_to(
-            material,
-            solids.skirt(outline, outline, wing.wall_top, wing.top),
-            solids.roof_pan(outline, floor, wing.top, 0.25),
-        )
-        return
-    if roof.kind == "hip":
-        reach = np.where(is_free, roof.eaves, 0.0)
-        z = wing.wall_top - SEAT
-        solid = roofs.hip(outline, z, wing.top, reach, roof.thickness)
-        out.add_to("roof", solid)
-        return
-    low_edge, high_edge = (3, 1) if roof.along_y else (0, 2)
+    reach = np.where(is_free, wing.roof.eaves, 0.0)
+    z = wing.wall_top - SEAT
+    solid = roofs.hip(wing.outline, z, wing.top, reach, wing.roof.thickness)
+    out.add_to("roof", solid)
+
+
+def _add_covering(out: Assembly, wing: Wing) -> None:
+    """Adds the slopes of a roof with gables, with eaves and verges."""
+    roof = wing.roof
     start_edge, end_edge = wing.gables
     start, end = wing.ridge
-    start -= roof.verge * is_free[start_edge]
-    end += roof.verge * is_free[end_edge]
+    start -= roof.verge * (start_edge not in wing.blind)
+    end += roof.verge * (end_edge not in wing.blind)
     # A shed roof has no eaves at its upper end, which is at the top of the
     # wing.
-    ends = [is_free[low_edge], is_free[high_edge]]
+    ends = [edge not in wing.blind for edge in _sides(wing)]
     if roof.kind == "shed":
         ends[0 if roof.falling else 1] = False
-    covering = roofs.with_eaves(line, *(roof.eaves * e for e in ends))
-    shell = roofs.shell(
-        covering, start, end, roof.thickness, along_y=roof.along_y
-    )
+    line = roofs.with_eaves(wing.roof_line, *(roof.eaves * e for e in ends))
+    shell = roofs.shell(line, start, end, roof.thickness, along_y=roof.along_y)
     out.add_to("roof", shell)
-    for edge in wing.gables:
-        wall = wing.wall(edge)
-        under = _seen_from(wing, edge, line)
-        holes: list[Patch] = []
-        if attic is not None and is_free[edge]:
-            holes = [
-                hole
-                for hole in attic(0.0, wall.length)
-                if _fits_under(hole, under)
-            ]
-        gable = roofs.gable_wall(under, 0.0, wall.length, wing.wall_top, holes)
-        out.add_to(material, wall.place(gable))
-        if holes:
-            out.add_to("glass", wall.place(roofs.gable_glass(holes)))
-    if roof.kind == "shed":
-        # The tall side of a shed roof: the wall above the other walls.
-        wall = wing.wall(low_edge if roof.falling else high_edge)
-        top = [(x, wing.top - roof.thickness) for x in (0.0, wall.length)]
-        shield = roofs.gable_wall(top, 0.0, wall.length, wing.wall_top)
-        out.add_to(material, wall.place(shield))
+
+
+def _add_gable(
+    out: Assembly, wing: Wing, edge: int, attic: Attic | None, material: str
+) -> None:
+    """Adds the wall below the roof at one end of the ridge."""
+    wall = wing.wall(edge)
+    under = _seen_from(wing, edge, wing.roof_line)
+    holes: list[Patch] = []
+    if attic is not None and edge not in wing.blind:
+        holes = [
+            hole for hole in attic(0.0, wall.length) if _fits_under(hole, under)
+        ]
+    gable = roofs.gable_wall(under, 0.0, wall.length, wing.wall_top, holes)
+    out.add_to(material, wall.place(gable))
+    if holes:
+        out.add_to("glass", wall.place(roofs.gable_glass(holes)))
+
+
+def _add_tall_side(out: Assembly, wing: Wing, material: str) -> None:
+    """Adds the wall of a shed roof's tall side above the other walls."""
+    roof = wing.roof
+    low_edge, high_edge = _sides(wing)
+    wall = wing.wall(low_edge if roof.falling else high_edge)
+    top = [(x, wing.top - roof.thickness) for x in (0.0, wall.length)]
+    shield = roofs.gable_wall(top, 0.0, wall.length, wing.wall_top)
+    out.add_to(material, wall.place(shield))
+
+
+def _sides(wing: Wing) -> tuple[int, int]:
+    """Returns the edges where the roof line begins and ends."""
+    return (3, 1) if wing.roof.along_y else (0, 2)
 
 
 def _seen_from(
