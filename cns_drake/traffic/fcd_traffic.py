@@ -1,6 +1,7 @@
 """Traffic of a drive that replays a SUMO trace."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 import zlib
 
@@ -69,13 +70,12 @@ def play_trace(
     _check_place(trace, path, lanes)
     kinds = [_vehicle_kind(one, seed) for one in trace.vehicles]
     heights = LaneHeights(lanes)
-    heights.zero = _zero_height(trace, heights)
+    trace = _at_map_heights(trace, heights)
     pairs = zip(trace.vehicles, kinds, strict=True)
     rows = [_vehicle_rows(*pair, heights) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
     strips = [walkway.points for walkway in walkways]
     ground = LaneHeights(np.concatenate([lanes, *strips]))
-    ground.zero = heights.zero
     rows = [_person_rows(one, ground, trace.dt) for one in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
@@ -118,15 +118,23 @@ def _extent(places: np.ndarray) -> str:
     return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
 
 
-def _zero_height(trace: FcdTrace, heights: LaneHeights) -> float:
-    """Returns the height in the map where a trace has z = 0 [m]."""
+def _at_map_heights(trace: FcdTrace, heights: LaneHeights) -> FcdTrace:
+    """Returns a trace whose heights begin at the same zero as the map's.
+
+    A trace without heights stays as it is.
+    """
     some = [one for one in trace.vehicles if np.isfinite(one.z).all()]
     if not some:
-        return 0.0
+        return trace
     z = np.concatenate([one.z for one in some])
-    return float(
+    zero = float(
         np.median(heights.at(np.concatenate([o.xy for o in some])) - z)
     )
+    vehicles, persons = (
+        tuple(replace(one, z=one.z + zero) for one in traced)
+        for traced in (trace.vehicles, trace.persons)
+    )
+    return replace(trace, vehicles=vehicles, persons=persons)
 
 
 def _vehicle_kind(one: TracedObject, seed: int) -> VehicleKind:

@@ -14,13 +14,7 @@ _LEAST_COSINE = 0.7
 
 
 class LaneHeights:
-    """Heights of the ground, interpolated between points on lanes.
-
-    Attributes:
-        zero: height of the ground where a trace has z = 0 [m].
-    """
-
-    zero = 0.0
+    """Heights of the ground, interpolated between points on lanes."""
 
     def __init__(self, points: np.ndarray):
         """Takes points (N, 3) on the ground along lanes [m]."""
@@ -47,13 +41,13 @@ class LaneHeights:
         """Returns the heights (M,) of one road user at successive places [m].
 
         Where two roads cross at different heights, the road user is on the road
-        whose height is nearest to the height in the trace. Without heights in
-        the trace, the road user stays on the road on which it arrived, or else
-        is on a road with a lane in its direction.
+        that is nearest to its given height. Without given heights, the road
+        user stays on the road on which it arrived, or else is on a road with a
+        lane in its direction.
 
         Args:
             xy: (M, 2) places [m].
-            z: (M,) heights in the trace [m]; NaN without heights.
+            z: (M,) approximate heights [m]; NaN if they are unknown.
             yaw: (M,) headings [rad]; None if the direction does not count.
         """
         found = self.at(xy)
@@ -75,7 +69,7 @@ class LaneHeights:
             moved = np.hypot(*(xy[k] - xy[k - 1])) if k else np.inf
             goal = levels[k][usable[0]]
             if np.isfinite(z[k]):
-                goal = z[k] + self.zero
+                goal = z[k]
             elif moved < _REACH:
                 goal = found[k - 1]
             off = np.abs(levels[k][usable] - goal)
