@@ -1,7 +1,7 @@
 """Renders the stages, meshes and table of structures of a city as texts."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from cns_drake.base.csv_files import csv_text
@@ -176,13 +176,16 @@ def render_stages(
             f"{len(stages.heights(stage))} are lower"
         )
     files[STRUCTURES_NAME] = structure_table(growing.structures, used)
-    meshes = meshes_of(used)
-    shapes = [part.shape for one in used for part in one.model.parts]
-    names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
-    triangles = {}
-    for name in sorted(names):
-        text = meshes[name].to_obj()
-        files[f"{MESH_FOLDER}/{name}.obj"] = text
-        triangles[name] = triangles_in(text)
+    texts = _mesh_texts(used)
+    files |= {f"{MESH_FOLDER}/{name}.obj": text for name, text in texts.items()}
+    triangles = {name: triangles_in(text) for name, text in texts.items()}
     sizes = {name: stage_size(one, triangles) for name, one in stood.items()}
     return files, sizes
+
+
+def _mesh_texts(structures: Sequence[Structure]) -> dict[str, str]:
+    """Returns name -> OBJ text of the meshes of all parts, sorted by name."""
+    meshes = meshes_of(structures)
+    shapes = [part.shape for one in structures for part in one.model.parts]
+    names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}
+    return {name: meshes[name].to_obj() for name in sorted(names)}
