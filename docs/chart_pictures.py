@@ -34,6 +34,7 @@ from evaluation.results.styles import (
     INK,
     METHOD_STYLES,
     PALE,
+    method_styles,
 )
 from evaluation.results.table import Results, Row
 from evaluation.results.table_forms import title
@@ -52,12 +53,13 @@ def survival(path: Path) -> str:
     # The best method without geometric verification is on top.
     ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
     order = [one.method for one in ranked[False]][::-1]
+    styles = method_styles(order)
     figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, gate in zip(panels, (False, True), strict=True):
         for one in ranked[gate]:
             y = order.index(one.method)
-            colour = METHOD_STYLES[one.method][0]
+            colour = styles[title(one.method)][0]
             ends = 100.0 * np.array([one.interval.low, one.interval.high])
             axes.plot(ends, [y, y], color=INK, lw=2, zorder=2)
             axes.plot(100.0 * one.value, y, "|", color=INK, ms=18, mew=3.5)

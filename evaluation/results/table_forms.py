@@ -40,6 +40,11 @@ _METHOD_TITLES = {
     "btc": "BTC",
     "layered-overlap": "Layered overlap",
     "learned": "Learned",
+    "bevplace": "BEVPlace",
+    "dpa-net": "DPA-Net",
+    "map-closures": "MapClosures",
+    "probe": "PROBE",
+    "svt-net": "SVT-Net",
 }
 
 _LATEX = {

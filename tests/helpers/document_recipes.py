@@ -1031,6 +1031,8 @@ NOT_RUN = {
     "test_published_networks has some of its own",
     ".venv/bin/cns-eval pr --method bevplace": "needs weights, too; "
     "test_bevplace has some of its own",
+    ".venv/bin/cns-drake study stages --task place --method bevplace": "needs "
+    "weights, too",
     "# cns-drake study outside.yaml": "needs these weights, too",
     "for half in even odd": "needs scans that do not ship",
     "cns-drake train": "needs an extra, and minutes; test_training trains",
