@@ -1,14 +1,20 @@
 """The command `localise`."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cns_drake.base import commands, shared_options, terminal
 from evaluation.command_line import options
 from evaluation.command_line.trajectories import measure_estimate
+
+if TYPE_CHECKING:
+    from evaluation.drives import Drive
 
 # Parameters that have an effect together with `--estimate`.
 _WITH_ESTIMATE = (
@@ -101,18 +107,13 @@ def localise(
             localisation.csv contains all values of each query. With --track,
             the folder also contains a picture.
     """
-    import math
-
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.change.drive_maps import open_source
-    from evaluation.drives import Drive, check_same_world
     from evaluation.localisation import results, tracking
     from evaluation.localisation.estimators import make_estimator
     from evaluation.localisation.initial_poses import Starts
     from evaluation.localisation.localisation_map import FEWEST_POINTS
-    from evaluation.localisation.one_scan import OneScan
     from evaluation.localisation.settings import default_settings
     from evaluation.study import one_pair
     from evaluation.study.chosen_methods import method_settings
@@ -124,27 +125,14 @@ def localise(
         (truth,) = options.open_noted(place, lidar=lidar, columns=columns)
         measure_estimate(truth, estimate, frame, time_offset, json=json)
         return
-    for name in ("frame", "time_offset"):
-        if name in commands.given_options(context):
-            option = name.replace("_", "-")
-            raise InputError(f"--{option}: only together with --estimate")
     if query is None:
         raise InputError("QUERY: missing")
     if method is None:
         raise InputError("--method: missing")
+    _check_together(context, query_spacing, odometry_drift, track=track)
+    odometry_drift = 0.01 if odometry_drift is None else odometry_drift
     num_jobs = choose_cluster(jobs, None).num_workers
     Starts(start, start_turn, seed)  # It checks them.
-    if track and query_spacing is not None:
-        raise InputError("--query-spacing: not together with --track")
-    if not track and odometry_drift is not None:
-        raise InputError("--odometry-drift: only together with --track")
-    odometry_drift = 0.01 if odometry_drift is None else odometry_drift
-    if query_spacing is not None and not 0.0 < query_spacing < math.inf:
-        raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
-    if not 0.0 <= odometry_drift <= 1.0:
-        raise InputError(
-            f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
-        )
     name = Path(method).stem
     given = method_settings(parameter or [], [name])[name]
     # Faults are told before the slow work.
@@ -152,17 +140,7 @@ def localise(
         method,
         default_settings(method).with_values(given.items(), method),
     )
-    source = open_source(place, lidar, columns)
-    asked = open_source(query, lidar, columns)
-    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
-    for one in (source, drive):
-        for note in one.notes if isinstance(one, Drive) else ():
-            terminal.note(note)
-    if align == "always" and not isinstance(source, Drive):
-        raise InputError(f"--align: {place} is no drive, and stays as it is")
-    if isinstance(source, Drive):
-        source, drive = options.aligned((source, drive), align)
-        check_same_world(source, drive)
+    source, drive = _opened(place, query, align, lidar, columns)
     if output is not None:
         make_folder(output)
     settings: dict = {
@@ -220,6 +198,70 @@ def localise(
         terminal.note(f"wrote {output / 'localisation.csv'}")
         options.write_tables(engine)
     terminal.show(values, _rows(values), json=json)
+
+
+def _check_together(
+    context: typer.Context,
+    query_spacing: float | None,
+    odometry_drift: float | None,
+    *,
+    track: bool,
+) -> None:
+    """Checks options that need another one or exclude it, and their ranges.
+
+    Raises:
+        InputError: an option cannot be used.
+    """
+    from cns_drake.base.errors import InputError
+
+    for name in ("frame", "time_offset"):
+        if name in commands.given_options(context):
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: only together with --estimate")
+    if track and query_spacing is not None:
+        raise InputError("--query-spacing: not together with --track")
+    if not track and odometry_drift is not None:
+        raise InputError("--odometry-drift: only together with --track")
+    if query_spacing is not None and not 0.0 < query_spacing < math.inf:
+        raise InputError(f"--query-spacing: {query_spacing:g} is not above 0")
+    if odometry_drift is not None and not 0.0 <= odometry_drift <= 1.0:
+        raise InputError(
+            f"--odometry-drift: {odometry_drift:g} is not from 0 to 1"
+        )
+
+
+def _opened(
+    place: Path,
+    query: Path,
+    align: options.When,
+    lidar: str | None,
+    columns: int | None,
+) -> tuple[Drive | Path, Drive]:
+    """Returns the map and the drive of the queries, and shows notes on them.
+
+    Two drives are in one world. A point cloud as the map stays a path; a point
+    cloud as the query becomes a drive of one scan.
+
+    Raises:
+        InputError: a path cannot be opened, or the drives cannot be aligned.
+    """
+    from cns_drake.base.errors import InputError
+    from evaluation.change.drive_maps import open_source
+    from evaluation.drives import Drive, check_same_world
+    from evaluation.localisation.one_scan import OneScan
+
+    source = open_source(place, lidar, columns)
+    asked = open_source(query, lidar, columns)
+    drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
+    for one in (source, drive):
+        for note in one.notes if isinstance(one, Drive) else ():
+            terminal.note(note)
+    if align == "always" and not isinstance(source, Drive):
+        raise InputError(f"--align: {place} is no drive, and stays as it is")
+    if isinstance(source, Drive):
+        source, drive = options.aligned((source, drive), align)
+        check_same_world(source, drive)
+    return source, drive
 
 
 def _rows(values: dict) -> Iterator[tuple[str, str]]:
