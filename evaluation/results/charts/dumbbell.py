@@ -70,9 +70,9 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     axes.set_yticks(
         [y for _, y in heights], [escape_dollars(one) for one, _ in heights]
     )
-    for label in axes.get_yticklabels():
-        if label.get_text() in map(escape_dollars, chart.styles):
-            label.set_fontweight("bold")
+    for tick_label in axes.get_yticklabels():
+        if tick_label.get_text() in map(escape_dollars, chart.styles):
+            tick_label.set_fontweight("bold")
     axes.set_ylim(len(heights) - 0.4, -0.7)
     first, last = (
         value_words(v, over)

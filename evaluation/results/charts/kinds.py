@@ -166,17 +166,11 @@ def _add_legend(
     """Adds a legend below a figure, and makes the figure higher by its rows."""
     if not legend:
         return
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            linestyle=style,
-            marker=marker,
-            label=escape_dollars(name),
-        )
-        for name, (colour, style, marker) in legend.items()
-    ]
+    handles = []
+    for name, (colour, style, marker) in legend.items():
+        options: dict = {"linestyle": style, "marker": marker}
+        options["label"] = escape_dollars(name)
+        handles.append(Line2D([], [], color=colour, **options))
     columns = max(1, width // _LEGEND_COLUMN)
     lines = math.ceil(len(handles) / columns)
     figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
