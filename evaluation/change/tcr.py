@@ -68,10 +68,12 @@ class DirectedChange:
 
     @property
     def num_in_hull(self) -> int:
+        """Number of points in H."""
         return int(np.count_nonzero(self.in_hull))
 
     @property
     def num_unchanged(self) -> int:
+        """Number of points in O."""
         return int(np.count_nonzero(self.unchanged))
 
     @property

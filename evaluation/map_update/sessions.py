@@ -63,6 +63,7 @@ class Session:
 
     @property
     def side(self) -> str:
+        """`A` for the older drive, `B` for the newer drive."""
         return self.folder.name
 
     @property

@@ -21,8 +21,10 @@ from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.reference import Finding
 from evaluation.results.table_forms import title
 
+# Verdicts on a target.
 MET = "is met"
 MISSED = "is missed"
+# Greatest difference of TCR_sym from the paper, on every pair.
 _TCR_TOLERANCE = 0.015
 # Aim: method, greatest difference of AUC, and share of pairs that meet it.
 _AUC_AIMS = (
@@ -30,7 +32,9 @@ _AUC_AIMS = (
     ("scan-context++", 0.20, 0.7),
     ("solid", 0.20, 0.7),
 )
+# Least share of pairs on which RING++ is the best method.
 _BEST_SHARE = 0.9
+# Greatest mean difference of all AUCs from the paper.
 _MEAN_DIFFERENCE = 0.15
 
 

@@ -19,6 +19,7 @@ from evaluation.results.summaries import LEAST_POINTS
 from evaluation.results.table_forms import in_table_order, title
 
 _SIGNIFICANCE = 0.05
+# Verdicts on a finding.
 HOLDS = "holds"
 IN_PART = "holds in part"
 FAILS = "does not hold"
@@ -48,6 +49,7 @@ class Trend:
 
     @property
     def falls(self) -> bool:
+        """Whether the correlation is negative and significant."""
         return self.rho < 0.0 and self.p_value < _SIGNIFICANCE
 
 

@@ -23,7 +23,6 @@ class Search:
     `Method.divides`).
 
     Attributes:
-        build_ms: CPU time to build the database of each group so far [ms].
         query_ms: (Q,) CPU time of each query of the last call of `scores` [ms].
     """
 
@@ -40,6 +39,7 @@ class Search:
 
     @property
     def build_ms(self) -> float:
+        """CPU time to build the database of each group so far, summed [ms]."""
         return sum(self._build_ms.values())
 
     def scores(
