@@ -9,7 +9,12 @@ import shapely
 from shapely.geometry import Polygon, box
 
 from cns_drake.city.facades import Assembly, add_chimney, equip_roof
-from cns_drake.city.geometry import Finish, long_normals, upper_sides
+from cns_drake.city.geometry import (
+    Finish,
+    UpperSides,
+    long_normals,
+    unit_normals,
+)
 from cns_drake.imports.dressing.styles import Style
 
 # A roof is level if the z of its unit normal is greater than this.
@@ -48,7 +53,7 @@ def is_flat_roof(roof: np.ndarray) -> bool:
     `roof` contains the triangles (M, 3, 3) of the roof [m].
     """
     above = np.abs(long_normals(roof)[:, 2])
-    level = np.abs(upper_sides.unit_normals(roof)[:, 2]) > _LEVEL_COSINE
+    level = np.abs(unit_normals(roof)[:, 2]) > _LEVEL_COSINE
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 
 
@@ -75,7 +80,7 @@ def add_roof_pieces(
 
 def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
     """Returns the largest level part of a roof, without holes, and its z."""
-    level = roof[upper_sides.unit_normals(roof)[:, 2] > _LEVEL_COSINE]
+    level = roof[unit_normals(roof)[:, 2] > _LEVEL_COSINE]
     best: tuple[Polygon, float] | None = None
     if not len(level):
         return None
@@ -116,7 +121,7 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     end = ridge[np.linalg.norm(ridge - start, axis=1).argmax()]
     length = float(np.linalg.norm(end - start))
     yaw = math.atan2(end[1] - start[1], end[0] - start[0])
-    sides = upper_sides.UpperSides(roof)
+    sides = UpperSides(roof)
     count = 1 + int(length > 15.0)
     for k, share in enumerate(out.rng.uniform(0.12, 0.88, 2)[:count]):
         x, y, z = start + share * (end - start)
