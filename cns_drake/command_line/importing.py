@@ -75,12 +75,11 @@ def import_city(
             structure is left out.
         drive_on: Side of the street on which cars drive; by default the side
             that the file names, or right if the file names none.
-        grow: Share of the buildings that change between an added first stage
-            and today, from 0.01 to 0.9; by default 0.3. In the first stage,
-            these buildings, sampled at random, are missing or lower than today.
-            For an OpenDRIVE file, the buildings in the east are missing
-            instead, and the default is 0.35. Not with --years or --plain, which
-            add no such stage.
+        grow: Share of today's buildings, from 0.01 to 0.9, that are missing or
+            lower in the first stage, which the import adds; by default 0.3. The
+            buildings are sampled at random. For an OpenDRIVE file, the
+            buildings farthest east are missing, and the default is 0.35. Not
+            with --years or --plain, which add no such stage.
         plain: Do not add windows, lamps, parked cars and other details that the
             file does not contain. Only OpenDRIVE files, which contain no
             buildings, still get buildings along their roads.

@@ -180,9 +180,9 @@ def social_forces(
 def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
     """Moves pedestrians, as far as paths are free, by forces (N, 2) [m/s^2].
 
-    A pedestrian takes a step if the pedestrian can then still stop on its path,
-    away from the places where all other pedestrians can stop. Otherwise the
-    pedestrian brakes, and stops at a place that has been free since the
+    A pedestrian takes a step only if the pedestrian can then still stop on its
+    path without touching the stopping place of any other pedestrian. Otherwise
+    the pedestrian brakes, and stops at a place that has been free since the
     previous step.
     """
     for i in range(len(walkers)):

@@ -213,8 +213,9 @@ def _find_nearest_by_quadrant(
 def _fit_plane(
     seen: np.ndarray, corners: np.ndarray, away: np.ndarray
 ) -> tuple[float, float, float, float]:
-    """Returns the plane n p = h through the three nearest returns.
+    """Returns the plane n p = h through three points of a scan.
 
+    The points are the three of the four `corners` that are nearest, by `away`.
     The normal n need not have unit length.
 
     Returns:

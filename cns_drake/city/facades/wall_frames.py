@@ -39,7 +39,7 @@ class WallFrame:
         return Mesh(vertices, mesh.faces).inside_out()
 
     def box(self, *limits: float, bottom: bool = True) -> Mesh:
-        """Returns a box in the building's frame, given in wall coordinates.
+        """Returns a box, in the building's frame.
 
         The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m]. The
         box has a lower side if `bottom` is set.

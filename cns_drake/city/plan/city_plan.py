@@ -175,8 +175,9 @@ class ScatterPlan(_Model):
         clearance: smallest distance of the objects from buildings and streets
             [m].
         ground: kinds of ground on which the objects can stand.
-        kind: first part of the objects' names in the tables; by default the
-            object's name or a common word, such as `tree` for `lime_tree`.
+        kind: first part of the objects' names in the tables. By default, the
+            name of the object's model, or a common word for several models,
+            such as `tree` for `lime_tree`.
     """
 
     objects: Weights = Field(min_length=1)
@@ -201,8 +202,9 @@ class LinePlan(_Model):
             several objects, end to end.
         yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
-        kind: first part of the objects' names in the tables; by default the
-            object's name or a common word, such as `tree` for `lime_tree`.
+        kind: first part of the objects' names in the tables. By default, the
+            name of the object's model, or a common word for several models,
+            such as `tree` for `lime_tree`.
         parameters: settings of the objects, such as `{height: 1.1}` for a
             `garden_wall`.
     """
@@ -222,8 +224,9 @@ class ObjectPlan(_Model):
         object: name of the object to place.
         at: `[x, y]` of the object's position [m].
         yaw_deg: heading of the object [deg].
-        kind: first part of the object's name in the tables; by default the
-            object's name or a common word, such as `tree` for `lime_tree`.
+        kind: first part of the object's name in the tables. By default, the
+            name of the object's model, or a common word for several models,
+            such as `tree` for `lime_tree`.
         parameters: settings of the object, such as `{height: 1.1}` for a
             `garden_wall`.
     """
