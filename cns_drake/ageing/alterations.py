@@ -35,6 +35,8 @@ _LONGEST_SCAFFOLD = 25.0
 _HIGHEST_SCAFFOLD = 16.0
 # Thickness of an insulation layer [m].
 _INSULATION = 0.15
+# Random places at which an annex is tried.
+_ANNEX_TRIES = 6
 # Colours of plaster and of additions.
 _COLOURS: tuple[Rgb, ...] = (
     (0.93, 0.91, 0.86),
@@ -120,7 +122,7 @@ def annex_to(
     """
     cut = horizontal_section(plot.triangles(triangles), 1.3)
     x0, _, x1, _ = plot.inside(plot.area).bounds
-    for _ in range(6):
+    for _ in range(_ANNEX_TRIES):
         w = float(np.clip(rng.uniform(0.35, 0.65) * (x1 - x0), 3.0, 9.0))
         d = float(rng.uniform(2.8, 4.5))
         x = float(rng.uniform(x0 + w / 2, max(x1 - w / 2, x0 + w / 2 + 0.01)))

@@ -27,7 +27,7 @@ def with_former_buildings(
         others: structures of today, which stood in the past city as well.
     """
     others = list(others)
-    later = [one for one in others if one.kind.startswith("Building")]
+    later = [one for one in others if one.is_building]
     tree = STRtree([one.structure.model.footprint for one in later])
     stood: list[ImportedStructure] = []
     replaced: set[ImportedStructure] = set()

@@ -53,7 +53,7 @@ def grow(
         exist today.
     """
     (last,) = city.standing.values()
-    buildings = [one for one in last if one.kind.startswith("Building")]
+    buildings = [one for one in last if one.is_building]
     chosen = _choose_buildings(buildings, round(part * len(buildings)), seed)
     taken = {one.structure.name for one in city.kept}
     lower = _heights_of_lower(chosen, seed)

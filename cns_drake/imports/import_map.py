@@ -174,13 +174,7 @@ def _report_of(
 ) -> ImportReport:
     return ImportReport(
         kinds=dict(Counter(one.kind for one in staged.kept)),
-        # Structures other than buildings may share their meshes.
-        triangles=sum(
-            one.structure.model.num_triangles
-            if one.kind.startswith("Building")
-            else len(one.triangles)
-            for one in staged.kept
-        ),
+        triangles=sum(one.num_own_triangles for one in staged.kept),
         stages={stage: len(some) for stage, some in staged.standing.items()},
         undated=staged.undated,
         dated=staged.dated,

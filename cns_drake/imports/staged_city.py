@@ -205,6 +205,5 @@ def _may_be_missing(one: ImportedStructure) -> bool:
 
     Of the structures without a year, only buildings may.
     """
-    is_building = one.kind.startswith("Building")
     is_dated = one.year is not None or one.until is not None
-    return not one.is_ground and (is_dated or is_building)
+    return not one.is_ground and (is_dated or one.is_building)

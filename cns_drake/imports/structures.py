@@ -58,6 +58,23 @@ class ImportedStructure:
         return self.original or self.structure.name
 
     @property
+    def is_building(self) -> bool:
+        """Whether the object in the file is a building or a part of one."""
+        return self.kind.startswith("Building")
+
+    @property
+    def num_own_triangles(self) -> int:
+        """Number of triangles that the structure shares with no other one.
+
+        A building has its own meshes, with all details. The meshes of any other
+        structure may be shared, as those of trees are; `triangles` are counted
+        instead.
+        """
+        if self.is_building:
+            return self.structure.model.num_triangles
+        return len(self.triangles)
+
+    @property
     def is_ground(self) -> bool:
         """Whether the class of the structure is ground for cars, such as road.
 

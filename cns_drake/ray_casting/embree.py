@@ -35,6 +35,8 @@ FLOAT3 = 0x9003
 FLOAT4 = 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134
 ROBUST_SCENE = 1 << 2
+# Error of a device (`RTC_ERROR_OUT_OF_MEMORY`).
+OUT_OF_MEMORY = 4
 COHERENT_RAYS = 1 << 16
 INVALID_ID = 0xFFFFFFFF
 # Setting of a device: room for more user threads than a machine has.

@@ -68,7 +68,8 @@ class EmbreeHierarchy:
                 reused; None to build all anew.
 
         Raises:
-            MemoryError: Embree cannot build it.
+            MemoryError: Embree has no memory for the hierarchy.
+            RuntimeError: Embree cannot build the hierarchy for another reason.
         """
         self._groups = groups
         self._num_threads = num_threads
@@ -105,30 +106,12 @@ class EmbreeHierarchy:
                 scene = self._built[row].scene
                 self._instances[row] = self._new_instance(scene)
             self.place(Placed.of(groups, moving))
-        error = self._lib.rtcGetDeviceError(self._device)
-        if error:
-            raise MemoryError(f"Embree cannot build the scene: error {error}")
-        # Rows of groups in the order of `PacketScenes.first_primitive`.
-        rows = [*(fixed or [-1]), *moving]
+        self._check_device()
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
         lanes, self._intersect = embree.native_packet(self._lib, self._device)
-        nothing = _Built(0, ())
-        counts = [len(group.members) for group in groups]
-        indices = [index for group in groups for index, *_ in group.members]
-        self._packet_scenes = PacketScenes(
-            lanes,
-            self._built[fixed[0]].scene if fixed else 0,
-            self._top,
-            ctypes.addressof(self._arguments),
-            *_list_owners(
-                [self._built[k] if k >= 0 else nothing for k in rows]
-            ),
-            np.array(rows, np.int32),
-            np.cumsum([0, *counts])[rows],
-            np.array(indices, np.int32),
-        )
+        self._packet_scenes = self._make_packet_scenes(lanes, fixed, moving)
 
     def place(self, placed: Placed) -> None:
         """Moves the groups in sight to their poses, and disables all others.
@@ -210,6 +193,45 @@ class EmbreeHierarchy:
         for helper in helpers:
             helper.result()
         return hits
+
+    def _check_device(self) -> None:
+        """Raises an error if a call of Embree has failed."""
+        error = self._lib.rtcGetDeviceError(self._device)
+        if error:
+            fault = f"Embree cannot build the scene: error {error}"
+            if error == embree.OUT_OF_MEMORY:
+                raise MemoryError(fault)
+            raise RuntimeError(fault)
+
+    def _make_packet_scenes(
+        self, lanes: int, fixed: Sequence[int], moving: Sequence[int]
+    ) -> PacketScenes:
+        """Returns the scenes for `cast_packets`.
+
+        Args:
+            lanes: number of rays in a packet.
+            fixed: row of the group of static geometry; empty if there is none.
+            moving: rows of all other groups in the hierarchy.
+        """
+        # Without static geometry, the first row belongs to no group. No ray
+        # meets it, and the first members of group -1 are never read.
+        rows = [*(fixed or [-1]), *moving]
+        nothing = _Built(0, ())
+        built = [self._built[row] if row >= 0 else nothing for row in rows]
+        first_primitive, owner_of_primitive = _list_owners(built)
+        counts = [len(group.members) for group in self._groups]
+        indices = [index for g in self._groups for index, *_ in g.members]
+        return PacketScenes(
+            lanes=lanes,
+            fixed=built[0].scene,
+            instances=self._top,
+            arguments=ctypes.addressof(self._arguments),
+            first_primitive=first_primitive,
+            owner_of_primitive=owner_of_primitive,
+            groups=np.array(rows, np.int32),
+            first_member=np.cumsum([0, *counts])[rows],
+            geometries=np.array(indices, np.int32),
+        )
 
     def _scene_of_group(
         self,

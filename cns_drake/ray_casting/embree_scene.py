@@ -53,7 +53,8 @@ class EmbreeScene:
                 build all anew.
 
         Raises:
-            MemoryError: Embree cannot build it.
+            MemoryError: Embree has no memory for the scene.
+            RuntimeError: Embree cannot build the scene for another reason.
         """
         first, second = None, None
         if previous is not None:

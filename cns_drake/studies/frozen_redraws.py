@@ -129,25 +129,25 @@ class RedrawFrozen(RedrawCity):
         original driver.
         """
         source = MapFolder(self.map_folder)
-        texts = redrawn_inputs(self.map_folder, self.stage, self.seed)
-        del texts[source.stage_plan.name]
+        contents = redrawn_inputs(self.map_folder, self.stage, self.seed)
+        del contents[source.stage_plan.name]
         plan = read_yaml(source.plan) | {"seed": self.seed}
         if self.turn_deg:
             roads = turned_content(read_yaml(source.roads), self.turn_deg)
-            texts[source.roads.name] = marked_yaml(
+            contents[source.roads.name] = marked_yaml(
                 "the map's roads, turned", roads
             )
             plan = turned_content(plan, self.turn_deg)
             plan["bounds"] = turned_bounds(plan["bounds"], self.turn_deg)
-            texts[source.plan.name] = marked_yaml(
+            contents[source.plan.name] = marked_yaml(
                 "the map's plan, turned", plan
             )
         for path in source.drives():
             values = read_yaml(path) | {"map": ".", "driver": _DRIVER}
-            texts[path.name] = marked_yaml(
-                "the map's drive, by another", values
+            contents[path.name] = marked_yaml(
+                "the map's drive, by another driver", values
             )
-        return texts
+        return contents
 
     def finish_inputs(self, draft: Path) -> None:
         source = MapFolder(self.map_folder)

@@ -103,8 +103,17 @@ def read_fcd(path: Path) -> FcdTrace:
         times = np.array([step.number("time") for step in steps])
         begin, dt = _sampling_times(path, times)
         vehicles = _traced_objects(steps, "vehicle")
-        notes = _without_riders(path, steps)
+        left_out = {
+            "persons, while they ride in vehicles": _remove_riders(steps)
+        }
+        for tag, names in _other_elements(steps).items():
+            left_out[f"elements {tag}"] = names
         persons = _traced_objects(steps, "person")
+    notes = [
+        f"{path}: left out: {len(names)} {what}"
+        for what, names in left_out.items()
+        if names
+    ]
     jumps: list[str] = []
     vehicles = _without_jumps(
         vehicles, [kind_name(one) for one in vehicles], times, jumps
@@ -116,27 +125,30 @@ def read_fcd(path: Path) -> FcdTrace:
             f" that of {jumps[0]}; times must be in seconds, places in metres"
         )
     if jumps:
-        notes += (
+        notes.append(
             f"{path}: left out: {len(jumps)} jumps from one timestep to the"
-            f" next, such as that of {jumps[0]}",
+            f" next, such as that of {jumps[0]}"
         )
     if not vehicles and not persons:
         raise InputError(
             f"{path}: the trace has no vehicle and no person in any timestep"
         )
-    return FcdTrace(begin, dt, len(times), vehicles, persons, notes)
+    return FcdTrace(begin, dt, len(times), vehicles, persons, tuple(notes))
 
 
-def _without_riders(path: Path, steps: list[Element]) -> tuple[str, ...]:
-    """Removes persons while they ride in vehicles; returns notes about it.
+def _remove_riders(steps: list[Element]) -> set[str]:
+    """Removes persons from the steps at which they ride in vehicles.
 
     SUMO writes a rider at the front of the vehicle. Newer versions also name
     the vehicle.
 
+    Returns:
+        The ids of all removed persons.
+
     Raises:
         ValueError: an object lacks a value.
     """
-    riders, others = set(), set()
+    riders = set()
     for step in steps:
         fronts = {
             (one.number("x"), one.number("y")) for one in step.all("vehicle")
@@ -148,20 +160,20 @@ def _without_riders(path: Path, steps: list[Element]) -> tuple[str, ...]:
             if one.value("vehicle", "") or apart < _RIDING:
                 riders.add(one.value("id"))
                 step.remove(one)
-        others |= {
-            (one.tag, one.value("id", ""))
-            for one in step.all("*")
-            if one.tag not in ("vehicle", "person")
-        }
-    found = [(riders, "persons, while they ride in vehicles")] + [
-        ({one for one in others if one[0] == tag}, f"elements {tag}")
-        for tag in sorted({tag for tag, _ in others})
-    ]
-    return tuple(
-        f"{path}: left out: {len(names)} {what}"
-        for names, what in found
-        if names
-    )
+    return riders
+
+
+def _other_elements(steps: list[Element]) -> dict[str, set[str]]:
+    """Returns tag -> ids of all elements but vehicles and persons, by tag.
+
+    The id of an element without an id is "".
+    """
+    found: dict[str, set[str]] = {}
+    for step in steps:
+        for one in step.all("*"):
+            if one.tag not in ("vehicle", "person"):
+                found.setdefault(one.tag, set()).add(one.value("id", ""))
+    return dict(sorted(found.items()))
 
 
 def _sampling_times(path: Path, times: np.ndarray) -> tuple[float, float]:

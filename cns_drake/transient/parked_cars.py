@@ -180,19 +180,19 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
         if fate < _GONE:
             editing.remove(car, _CAUSE)
         elif fate < _GONE + _MOVED:
-            X_new = _moved_car(bay, car, around.ground, rng)
+            X_new = _random_move(bay, car, around.ground, rng)
             editing.move(car, X_new, f"parked_{car.name}", _CAUSE)
         else:
             _replace_car(around, car, bay, rng)
 
 
-def _moved_car(
+def _random_move(
     bay: Bay,
     car: LoadedStructure,
     ground: GroundSurface,
     rng: np.random.Generator,
 ) -> RigidTransform:
-    """Returns the transform X_new of a car's points to its new place in W."""
+    """Returns the rigid transform in W of a car's points to a random place."""
     own = Bay(car)
     half_size = own.reach[::2]
     middle, yaw = own.middle, own.yaw + np.pi  # At least, it turns round.
@@ -206,8 +206,9 @@ def _moved_car(
             break
     X_WC = RigidTransform(RollPitchYaw(0, 0, own.yaw), [*own.middle, 0])
     rise = ground.rise(own.middle, middle)
-    X_new = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, rise])
-    return X_new @ X_WC.inverse()
+    # N is the car's frame C at the new place.
+    X_WN = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, rise])
+    return X_WN @ X_WC.inverse()
 
 
 def _replace_car(

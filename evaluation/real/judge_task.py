@@ -37,12 +37,12 @@ class JudgeTask(Task):
     ) -> Iterator[Number]:
         if found is None:
             return
+        num_real, _ = found["patches"]
         for group, auc in found["auc"].items():
             values = {"auc": auc, "auc_control": found["control"][group]}
             for name, value in values.items():
                 if not math.isnan(value):
-                    number = found["patches"][0]
-                    yield Number(group, False, name, value, n=number)
+                    yield Number(group, False, name, value, n=num_real)
 
 
 def judge_scans(

@@ -124,8 +124,8 @@ def _share(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 
-def greatest_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
-    """Returns which methods differ significantly from the best, by AUC.
+def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
+    """Returns from which methods the best differs significantly, by AUC.
 
     Args:
         rows: rows of the metric `auc`.

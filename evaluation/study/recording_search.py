@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import os
 from pathlib import Path
 import re
@@ -78,10 +78,18 @@ def find_recordings(
 
 
 def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
-    """Returns the paths of the drives in a folder, in order.
+    """Returns the paths of the drives in a folder, in natural order.
+
+    Drives in KITTI's layout without a scenario are left out with a note. So are
+    drives that are not directly in the folder, except drives in the layouts of
+    CNS and KITTI.
+
+    Args:
+        folder: the folder, searched three levels down.
+        on_note: is called with each note.
 
     Raises:
-        InputError: there is none, or there are too many folders.
+        InputError: no drive is left, or there are too many folders.
     """
     children = listed(folder)
     drives = [path for path in children if _holds_drive(path)]
@@ -95,29 +103,47 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
                 " folder of the recordings"
             )
         if _holds_drive(path):
-            is_export = holds_cns(path) or holds_kitti(path)
-            (drives if is_export else deeper).append(path)
+            if holds_cns(path) or holds_kitti(path):
+                drives.append(path)
+            else:
+                deeper.append(path)
     for path in sorted(deeper, key=_natural):
         on_note(
             f"{path}: left out: not directly in {folder}; give its folder, or"
             " move it up"
         )
-    paths: list[Path] = []
-    unnamed: list[Path] = []
-    for path in sorted(drives, key=_natural):
-        is_placed = not holds_kitti(path) or (path / SCENARIO).is_file()
-        (paths if is_placed else unnamed).append(path)
-    if unnamed:
-        fault = (
-            f"{unnamed[0]}: no {SCENARIO}, which states map and stage of a"
-            f" drive in KITTI's layout ({len(unnamed)} drives have none)"
-        )
-        if not paths:
-            raise InputError(fault)
-        on_note(f"{fault}; left out")
-    if not paths:
+    if not drives:
         raise InputError(f"{folder}: no recorded drive in it")
-    return paths
+    return _with_scenario(sorted(drives, key=_natural), on_note)
+
+
+def _with_scenario(
+    drives: Sequence[Path], on_note: Callable[[str], None]
+) -> list[Path]:
+    """Returns drives without those in KITTI's layout that lack a scenario.
+
+    Args:
+        drives: paths of the drives, at least one.
+        on_note: is called with a note if drives are left out.
+
+    Raises:
+        InputError: no drive is left.
+    """
+    unplaced = [
+        path
+        for path in drives
+        if holds_kitti(path) and not (path / SCENARIO).is_file()
+    ]
+    if not unplaced:
+        return list(drives)
+    fault = (
+        f"{unplaced[0]}: no {SCENARIO}, which states map and stage of a"
+        f" drive in KITTI's layout ({len(unplaced)} drives have none)"
+    )
+    if len(unplaced) == len(drives):
+        raise InputError(fault)
+    on_note(f"{fault}; left out")
+    return [path for path in drives if path not in unplaced]
 
 
 def _natural(path: Path) -> tuple:

@@ -9,6 +9,8 @@ from shapely.geometry import Point, Polygon
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.geometry import Finish
 
+# Random places at which a piece is tried before it is left out.
+_PLACE_TRIES = 30
 # Radius of the free area that each piece needs [m].
 _RADIUS = {
     "ac_unit": 1.6,
@@ -82,7 +84,7 @@ def equip_roof(
         turn = heading + int(rng.integers(4)) * math.pi / 2
         radius = _RADIUS[item] * max(scale, stretch)
         free = room.buffer(-radius - clear)
-        for _ in range(30):
+        for _ in range(_PLACE_TRIES):
             x, y = rng.uniform(x0, x1), rng.uniform(y0, y1)
             fits = all(
                 math.hypot(x - a, y - b) > radius + r for a, b, r in taken

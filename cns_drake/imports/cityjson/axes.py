@@ -22,19 +22,22 @@ def settle_axes(city: CityFile, vertices: np.ndarray) -> None:
 
     Many programs write east first although the definition of the reference
     system says north first. East first is assumed if only this order brings the
-    middle vertex of the file into the system's area of use. If both orders
-    bring the vertex there, the order stays open, and `exchange_mirrored_axes`
-    decides by the faces. Assumptions are counted as faults of the city.
+    middle vertex of the file into the system's area of use.
+
+    In two cases, the order stays open, and `exchange_mirrored_axes` decides by
+    the faces: both orders bring the vertex into the area, or the system is
+    defined as east first and only north first brings the vertex there.
+
+    An exchange counts as a fault of the city. If the order is not exchanged
+    here, a vertex that the defined order leaves outside the area also counts.
 
     Args:
-        city: the city, whose objects are not read yet.
+        city: the city, whose objects are not read yet. Without a reference
+            system, the function does nothing.
         vertices: (N, 3) vertices of the file in its own coordinates, N > 0.
     """
     defined = city.system
     if not defined.name:
-        city.faults.add(
-            "no reference system; metres east, north and up assumed", "the file"
-        )
         return
     first, second, _ = vertices[len(vertices) // 2].tolist()
     is_there = defined.has_place(first, second)
@@ -44,12 +47,6 @@ def settle_axes(city: CityFile, vertices: np.ndarray) -> None:
         _exchange_axes(city)
     elif not is_there:
         city.faults.add(_BEYOND, defined.name)
-    if defined.heights_assumed and not defined.is_plain:
-        city.faults.add(
-            "reference system without heights; its horizontal unit taken for "
-            "them",
-            defined.name,
-        )
 
 
 def _exchange_axes(city: CityFile) -> None:

@@ -168,6 +168,7 @@ def _read_objects(
         city.faults.add("no transform; vertices taken as coordinates", where)
     vertices = read_vertices(document, transform, where)
     if not city.objects and len(vertices):
+        _count_assumptions(city)
         settle_axes(city, vertices)
     templates.vertices = city.system.to_metres(vertices)
     templates.system = city.system
@@ -181,6 +182,21 @@ def _read_objects(
             city.faults.add("object that is there twice, its last taken", name)
         city.objects[name] = _read_object(name, value, templates, city.faults)
     _add_parents(objects, city)
+
+
+def _count_assumptions(city: CityFile) -> None:
+    """Counts what is assumed of the reference system as faults of the city."""
+    system = city.system
+    if not system.name:
+        city.faults.add(
+            "no reference system; metres east, north and up assumed", "the file"
+        )
+    elif system.heights_assumed and not system.is_plain:
+        city.faults.add(
+            "reference system without heights; its horizontal unit taken for "
+            "them",
+            system.name,
+        )
 
 
 def _read_object(

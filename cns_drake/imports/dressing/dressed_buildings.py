@@ -95,7 +95,7 @@ def dress_buildings(
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
-    buildings = [one for one in structures if one.kind.startswith("Building")]
+    buildings = [one for one in structures if one.is_building]
     bare = split_buildings(buildings, ground, seed)
     walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:

@@ -168,9 +168,7 @@ def _laid_paving(
 def is_dense(structures: Sequence[ImportedStructure]) -> bool:
     """Returns whether buildings cover at least 12 % of their convex hull."""
     outlines = [
-        one.structure.model.footprint
-        for one in structures
-        if one.kind.startswith("Building")
+        one.structure.model.footprint for one in structures if one.is_building
     ]
     if not outlines:
         return False

@@ -16,8 +16,7 @@ from cns_drake.imports.dressing.wall_panels import Panel
 
 # Distance from the end of a wall to its first bay [m].
 _END_MARGIN = 0.5
-# Windows keep this distance from the foot of their wall, and the probe of the
-# wall's top keeps it from the top [m].
+# Windows keep this distance from the foot of their wall [m].
 _FROM_FOOT = 0.3
 # Windows keep this distance from the top of their wall [m].
 _FROM_TOP = 0.12
@@ -27,6 +26,8 @@ _FROM_GROUND = 0.4
 _LEAST_HEIGHT_SHARE = 0.7
 # Probes are this far in front of a wall [m].
 _PROBE_BEFORE = 0.4
+# The probe of a wall's top is this far below the top [m].
+_PROBE_BELOW_TOP = 0.3
 # The height of the paving is taken this far in front of a door's wall [m].
 _PAVING_BEFORE = 0.15
 # Width of the walls beside a door [m].
@@ -34,6 +35,8 @@ JAMB_WIDTH = 0.3
 # A front has one door for every such length [m].
 _DOOR_EVERY = 16.0
 _DOOR_HEIGHT = 2.2
+# Least distance from the top of a door to the windows above [m].
+_DOOR_BELOW_WINDOW = 0.2
 # Least height of a door or a shop window [m].
 _LEAST_DOOR_HEIGHT = 1.8
 DOOR_WIDTH = 1.15
@@ -42,6 +45,8 @@ GATE_WIDTH = 2.5
 _THRESHOLD = 0.04
 # Greatest height of the top of a shop window above the ground [m].
 _SHOP_TOP = 2.9
+# Least distance from the top of a shop window to the floor above [m].
+_BELOW_CEILING = 0.75
 # Least width of a shop window [m].
 _LEAST_SHOP_WIDTH = 2.2
 # Doors are this much deeper than windows [m].
@@ -130,7 +135,7 @@ class FacadePlan:
         """
         panel = self.panel
         at = [((o.x0 + o.x1) / 2, (o.z0 + o.z1) / 2) for o in self.openings]
-        at.append((panel.length / 2, panel.height - _FROM_FOOT))
+        at.append((panel.length / 2, panel.height - _PROBE_BELOW_TOP))
         x, z = np.transpose(at)
         return panel.place(x, z, _PROBE_BEFORE)
 
@@ -213,7 +218,7 @@ def with_shops(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
         plan: plan of the wall.
         paving: upper sides of the paving in front of the wall.
     """
-    top = plan.floor + plan.style.storey - 0.75
+    top = plan.floor + plan.style.storey - _BELOW_CEILING
     top = min(top, plan.ground + _SHOP_TOP)
     street = set(plan.on_street)
     openings = []
@@ -239,7 +244,7 @@ def with_doors(plan: FacadePlan, paving: upper_sides.UpperSides) -> FacadePlan:
     kind, width = ("gate", GATE_WIDTH) if is_gate else ("door", DOOR_WIDTH)
     # A door must not extend into the windows above.
     above = min((o.z0 for o in plan.openings if o.row > 0), default=np.inf)
-    most = min(plan.panel.height - JAMB_WIDTH, above - 0.2)
+    most = min(plan.panel.height - JAMB_WIDTH, above - _DOOR_BELOW_WINDOW)
     number = max(1, round(plan.panel.length / _DOOR_EVERY))
     wanted = (np.arange(number) + 0.5) * plan.panel.length / number
     middles = np.array([(o.x0 + o.x1) / 2 for o in street])

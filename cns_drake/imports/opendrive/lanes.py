@@ -35,9 +35,9 @@ SAG = 0.002
 LEAST_WIDTH = 0.1
 # Greatest number of places on the edges of a road.
 _MOST_STATIONS = 200_000
-# No lane is farther from the reference line than this along x or y [m].
+# No lane is farther from the origin of W than this along x or y [m].
 _FARTHEST_LANE = 50_000.0
-# No lane is farther above or below the reference line than this [m].
+# No lane is farther above or below the origin of W than this [m].
 _HIGHEST_LANE = 10_000.0
 # Distances along the road that differ by less than this are the same [m].
 _JOINT_TOLERANCE = 1e-6
@@ -195,6 +195,16 @@ def _at_own_height(band: LaneBand) -> LaneBand:
 
 
 def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
+    """Checks that a lane is near the origin of W.
+
+    Args:
+        road: the road.
+        lane: number of the lane.
+        edge: (N, 3) outer edge of the lane in W [m].
+
+    Raises:
+        ValueError: the edge is too far from the origin, or not finite.
+    """
     for reach, axes in (
         (_FARTHEST_LANE, edge[:, :2]),
         (_HIGHEST_LANE, edge[:, 2]),
@@ -203,8 +213,8 @@ def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
         # NaN counts as too far.
         if not farthest <= reach:
             raise ValueError(
-                f"road {road.name}: lane {lane}: {farthest:g} m off, more than"
-                f" {reach:g} m"
+                f"road {road.name}: lane {lane}: {farthest:g} m from the"
+                f" world's origin, more than {reach:g} m"
             )
 
 

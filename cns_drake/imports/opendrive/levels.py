@@ -42,7 +42,8 @@ def split_levels(
         is_bridge = high > low
         for run, carried in _stretches_of_one_level(is_bridge):
             parts = {name: getattr(band, name)[run] for name in _ARRAYS}
-            (bridges if carried else ground).append(replace(band, **parts))
+            level = bridges if carried else ground
+            level.append(replace(band, **parts))
     return ground, bridges
 
 

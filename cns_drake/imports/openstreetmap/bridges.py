@@ -80,7 +80,10 @@ def bridges_of(ways: Iterable[OsmWay], local: LocalMetres) -> Bridges:
             if not set(open_ways[k].nodes) & set(way.nodes)
             and _height_rank(open_ways[k]) < _height_rank(way)
         ]
-        (over if crossed else level).add(way.name)
+        if crossed:
+            over.add(way.name)
+        else:
+            level.add(way.name)
     return Bridges(over, level, tunnels)
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evaluation.results.figure_text import escape_dollars
-from evaluation.results.headlines import greatest_auc
+from evaluation.results.headlines import lead_by_auc
 from evaluation.results.ranges import range_of
 from evaluation.results.table import QueryRows, Results, Row
 
@@ -94,7 +94,7 @@ def with_significance(message: str, chart: Chart, at: object) -> str:
     if chart.metric != "auc":
         return message
     rows = [row for row in chart.rows if row[chart.keys["over"]] == at]
-    clause = greatest_auc(rows, chart.queries)
+    clause = lead_by_auc(rows, chart.queries)
     return f"{message}; {clause}" if clause else message
 
 

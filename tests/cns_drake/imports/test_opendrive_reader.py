@@ -190,11 +190,11 @@ def test_lanes_of_less_than_no_width_have_none(tmp_path):
     [
         (
             (lane(-1, "driving", (0.0, 3.0, 1e7)),), "",
-            r"road 1: lane -1: 5e\+08 m off, more than 50000 m",
+            r"lane -1: 5e\+08 m from the world's origin, more than 50000 m",
         ),
         (
             TWO_LANES, cubic("elevation", 0, 1e6, key="s"),
-            r"road 1: lane 1: 1e\+06 m off, more than 10000 m",
+            r"lane 1: 1e\+06 m from the world's origin, more than 10000 m",
         ),
     ],
 )  # fmt: skip
