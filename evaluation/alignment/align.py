@@ -86,21 +86,23 @@ class AlignmentReport:
         attempts: number of registrations that were tried.
         loops: number of registrations that fit; each is a loop.
         inliers: number of loops that agree with the result.
-        distance_median: median distance between inliers and result [m].
-        distance_95: distance below which 95 % of the inliers lie [m].
-        angle_median_deg: median angle between inliers and result [deg].
+        distance_median: median deviation of a keyframe's position from the
+            position that an inlier implies [m].
+        distance_95: 95 % quantile of this deviation [m].
+        angle_median_deg: median deviation of a keyframe's orientation from the
+            orientation that an inlier implies [deg].
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
-        move: how far the middle frame of the moved drive was moved along x, y,
-            z [m].
-        turn_deg: angle by which the middle frame was rotated about the vertical
+        move: displacement of the LiDAR at the middle scan of the moved drive,
+            along x, y, z [m].
+        turn_deg: angle by which the middle scan was rotated about the vertical
             [deg].
-        bend: greatest distance of a moved frame from where it would be if it
-            had moved rigidly with the middle frame [m].
+        bend: greatest distance of a moved scan from where it would be if the
+            whole drive had moved rigidly with its middle scan [m].
         straightened: for the fixed and the moved drive, the upper quartile of
-            the errors where the drive passes a place again, before the
-            correction [m]; 0 for a drive that was not corrected.
-        ground: height of the ground that was subtracted from both drives'
-            heights [m].
+            the position errors at places that the drive passes again, before
+            its drift was corrected [m]; 0 for a drive that was not corrected.
+        ground: ground height that was subtracted from the heights of both
+            drives [m].
     """
 
     held: str
@@ -259,8 +261,9 @@ def _search_from_a_guess(
 ) -> tuple[LoopSearch, str, int | None]:
     """Finds a guess that holds, and the first loops.
 
-    Returns the search with these loops, the source of the guess, and the number
-    of candidate pairs if places had to be recognised.
+    Returns three values: the search, which contains these loops; the source of
+    the guess; and the number of candidate pairs, or None if no place had to be
+    recognised.
 
     Raises:
         InputError: no guess fits.
@@ -409,9 +412,9 @@ def _without_drift(drive: Drive) -> tuple[Submaps, float]:
     drive passes more than once.
 
     Returns:
-        The submaps, and the upper quartile of the errors at such places [m]:
-        the greatest one before any round of the correction, and 0 without a
-        correction.
+        The submaps, and the upper quartile of the position errors at such
+        places [m]. The correction takes several rounds; of the quartiles before
+        each round, the greatest is returned. It is 0 without a correction.
 
     Raises:
         InputError: if a scan cannot be read.

@@ -117,7 +117,7 @@ class LoopSearch:
 
     Attributes:
         source: drive of the keyframes K to register.
-        target: drive of the keyframes L, with the world frame T.
+        target: drive of the keyframes L. T is its world frame.
         loops: keyframe of the source -> the loop found for it.
         tried: keyframe of the source -> (4, 4) guess X_TK from which it was
             last registered.

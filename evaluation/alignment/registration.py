@@ -1,10 +1,11 @@
 """Registration of one cloud to another, from a rough guess.
 
-Point-to-plane ICP (Chen and Medioni 1991) of small_gicp: each point is paired
-with the nearest point of the other cloud, and the distances between the points
-and the planes of their partners are minimised. The maximum correspondence
-distance shrinks from stage to stage: a large distance lets a poor initial guess
-converge, and a small distance excludes wrong pairs at changed parts.
+The method is point-to-plane ICP (Chen and Medioni 1991), by small_gicp. Each
+point is paired with the nearest point of the other cloud, and the distances
+between the points and the planes of their partners are minimised. The maximum
+correspondence distance shrinks from stage to stage: a large distance lets a
+poor initial guess converge, and a small distance excludes wrong pairs where the
+place has changed.
 """
 
 from dataclasses import dataclass
@@ -82,8 +83,8 @@ class Registration:
         X_TS: (4, 4) pose of S in T.
         fitness: share of a cloud's points that have a counterpart in the other
             cloud. Of the shares of the two clouds, the greater one counts,
-            because one cloud may show much that was built or torn down in
-            between.
+            because one cloud may show much that was built or torn down between
+            the two drives.
         structure: the same share, but only of the points on upright surfaces,
             because flat ground fits nearly everywhere.
         covariance: (6, 6) covariance of a small motion of S in T: rotation
@@ -155,8 +156,9 @@ def _nearest_pairs(
     """Pairs a sample of the points with the nearest points of the target.
 
     Returns:
-        (M,) indices of the sampled points; (M,) bool, which of them have a
-        partner; (M, 3) their positions in T; (M,) indices of the partners.
+        (M,) indices of the sampled points; (M,) bool, which of these points
+        have a partner; (M, 3) positions of the sampled points in T; (M,) index
+        of the target point that is nearest to each sampled point.
     """
     sample = source.sample()
     p_T = poses.transform(X_TS, source.points[sample])

@@ -8,12 +8,13 @@ poses at the same times, p_i and q_i their positions:
   is not changed. J. Sturm et al., A benchmark for the evaluation of RGB-D SLAM
   systems, IROS 2012; S. Umeyama, Least-squares estimation of transformation
   parameters between two point patterns, PAMI 13(4), 1991. `evo_ape --align`
-  prints it as `rmse`.
+  prints the ATE as `rmse`.
 - Drift over 100 m: the length and the angle of (Y_i^-1 Y_j)^-1 (X_i^-1 X_j),
   for every tenth pose i. Pose j is the first pose that lies more than 100 m of
   ground-truth path after pose i. A. Geiger et al., Are we ready for autonomous
-  driving?, CVPR 2012, and the development kit of KITTI odometry, which divides
-  by the 100 m and calls the mean the translation error [%].
+  driving?, CVPR 2012, and the development kit of KITTI odometry. The kit
+  divides each length by 100 m, and calls the mean of these ratios the
+  translation error [%].
 """
 
 from collections.abc import Iterator
@@ -53,8 +54,8 @@ class TrajectoryErrors:
         drift_deg: (K,) errors of orientation over 100 m [deg].
         length: length of the true path along the poses [m].
         drive_length: length of the path of the whole drive [m].
-        num_outside: number of estimated poses that are left out, before or
-            after the drive.
+        num_outside: number of estimated poses that are left out because their
+            times lie before or after the drive.
     """
 
     offsets: np.ndarray
@@ -136,7 +137,7 @@ def trajectory_errors(
 
     Args:
         drive: drive with the ground-truth poses.
-        estimate: poses of the frame in any world.
+        estimate: estimated poses of `frame`, in any world.
         frame: the frame whose poses are estimated: the LiDAR's or the
             vehicle's.
         time_offset: time to add to the times of the estimate [s].

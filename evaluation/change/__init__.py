@@ -1,6 +1,6 @@
 """Structural change between two drives or maps.
 
-`tcr` computes the temporal change ratio of two clouds, and `convex_hull` which
-points count. `drive_maps` makes these clouds of drives and of files, and
-`drive_change` reports the change.
+`tcr` computes the temporal change ratio of two clouds; `convex_hull` determines
+which points of these clouds count. `drive_maps` makes the clouds from drives or
+from files, and `drive_change` reports the change.
 """

@@ -45,7 +45,8 @@ class ChangeReport:
         source: name of A.
         target: name of B.
         change: change over the whole maps.
-        spread: least and greatest TCR_sym if the grid of voxels is shifted.
+        spread: least and greatest TCR_sym over several positions of the grid of
+            voxels.
         masked: change over the parts that both drives passed within the
             coverage radius; None if a map has no drive.
         control: apparent change between two drives in the same stage, one on
@@ -203,8 +204,8 @@ def same_stage_partner(
 def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
     """Returns the mean distance between two routes [m].
 
-    The distance is measured from each route to the nearest points of the other
-    route; the larger mean counts.
+    For each route, the distances of its points from the other route are
+    averaged; the larger of the two means is returned.
     """
     there, _ = cKDTree(second).query(first)
     back, _ = cKDTree(first).query(second)
@@ -242,8 +243,8 @@ def symmetric_changes(
 ) -> dict[tuple[str, str, str], float]:
     """Returns the symmetric temporal change ratio of pairs of stages.
 
-    The result maps (map, stage, other stage) to the ratio; each pair of stages
-    is contained in both orders.
+    The keys of the result are (map, stage, other stage); each pair of stages is
+    contained in both orders.
     """
     values = {}
     for result in changes:

@@ -31,8 +31,8 @@ class DriveMap:
         voxels: the map in voxels of 1 m, from which the larger voxels of the
             TCR are made.
         positions: (N, 3) positions of the sensor [m]; None for a map file.
-        drive: the drive, or an object with the names of its world frame and
-            map; None for a map file.
+        drive: the drive, or an object with the names of the drive's world frame
+            and map; None for a map file.
         notes: notes on how the drive or the file was read.
     """
 
@@ -63,14 +63,14 @@ def maps_in_one_world(
     Args:
         paths: paths of drives or map files; map files must be in the common
             world.
-        when: whether all other drives are aligned with the first one: `auto`
-            (if their world frames differ), `always` or `never`.
+        when: when all other drives are aligned with the first drive: `auto`
+            (only if their world frames differ), `always` or `never`.
         lidar: name of the LiDAR, for recordings with several LiDARs.
         columns: number of columns of `.bin` files; by default guessed from the
             values.
 
     Returns:
-        The maps, in the order of the paths, and reports on alignments.
+        The maps, in the order of the paths; and reports on alignments.
 
     Raises:
         InputError: if a path cannot be read, or a drive cannot be aligned.

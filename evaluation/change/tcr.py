@@ -113,7 +113,7 @@ class TemporalChange:
 
     @property
     def num_in_hull(self) -> int:
-        """Number of points of each map in the hull of the other, summed.
+        """Number of points in the other map's hull, summed over both maps.
 
         In the paper, this is the size of the union of H(S, T) and H(T, S), for
         the source S and the target T.
@@ -215,8 +215,8 @@ def covered(
 ) -> np.ndarray:
     """Returns which points lie near all of several trajectories.
 
-    Even without a change, two routes see different parts of a city. This hardly
-    affects points near both routes.
+    Even without a change, two routes see different parts of a city. This
+    difference hardly affects points near both routes.
 
     Args:
         points: (N, 3) points in the world [m].

@@ -194,7 +194,7 @@ def _find_period(values: np.ndarray, positions: np.ndarray) -> int | None:
 
 
 def _period_of_zeros(is_value: np.ndarray, positions: np.ndarray) -> int | None:
-    """Returns the number of columns if some hold zeros alone, others none.
+    """Returns the number of columns if some hold only zeros and others none.
 
     Args:
         is_value: (N,) whether a value is neither zero nor NaN.

@@ -1,16 +1,18 @@
 """Bird's-eye images that count voxels, as in the data of BEVPlace.
 
-An image is (151, 151) uint8 and shows the points within 25.2 m of the LiDAR: up
-is ahead, left is left. A pixel is a column of voxels with sides of 0.4 m. The
-value of a pixel is the number of voxels with points in its column, minus one
-(because the first of these voxels is mostly ground), and at most 10. Values are
+An image is (151, 151) uint8 and shows the points within 25.2 m of the LiDAR.
+The area ahead of the LiDAR is at the top of the image, and the area to its left
+is on the left. A pixel is a column of voxels with sides of 0.4 m. The value of
+a pixel is the number of voxels with points in this column, minus one (because
+the first of these voxels is mostly ground), and at most 10. Values are
 scaled so that the largest value in the image is 255.
 
 The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
-their images of KITTI makes different images. The rules above were found from
-the images themselves, on five scans of KITTI 00, where the correlation of
-pixels is 0.86. One of these rules is that indices are rounded towards zero, so
-that the middle row and the middle column are twice as wide as the others.
+their images of KITTI makes different images. The rules of this module were
+found from the published images themselves. On five scans of KITTI 00, the
+pixels of both programs' images have a correlation of 0.86. One rule is that
+indices are rounded towards zero, so that the middle row and the middle column
+are twice as wide as the others.
 """
 
 from collections.abc import Iterator
@@ -61,7 +63,7 @@ def image_points(image: np.ndarray) -> np.ndarray:
     A pixel that is not zero becomes a column of one point in each voxel, at
     heights of 0.2 m, 0.6 m and so on. The image that `count_image` makes is the
     same if `image` has 151 x 151 pixels. Images of other programs can have more
-    than ten different values; these are rounded.
+    than ten different values; their values are rounded.
 
     Args:
         image: (W, W) uint8, W odd; the LiDAR is at the middle pixel.
@@ -108,9 +110,8 @@ def read_image(path: Path) -> np.ndarray:
     """Returns the image (W, W) uint8 in a PNG file; W is odd.
 
     Raises:
-        InputError: the file is no image with one channel of 8 bits, is damaged,
-            or is not square, or has an even or a too large number of pixels on
-            a side.
+        InputError: the file is damaged, is not a square image with one channel
+            of 8 bits, or has an even or a too large number of pixels on a side.
     """
     with _opened_image(path) as image, _naming_damage(path):
         return np.asarray(image)

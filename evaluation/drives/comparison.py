@@ -62,7 +62,7 @@ class Driving:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """How the path of a drive B differs from that of a drive A.
+    """How the path of a drive B differs from the path of a drive A.
 
     The drives are compared at stations, which are points every
     `STATION_SPACING` along A's path. B meets a station if B's path passes
@@ -77,21 +77,23 @@ class DriveComparison:
         reverse: share of the met stations that B meets only in the opposite
             direction.
         offset_50, offset_75, offset_90, offset_95, offset_99: quantiles of the
-            absolute offset in the same direction [m].
-        other_lane: share of the stations met in the same direction at which
-            the offset exceeds `LANE_OFFSET`.
+            absolute offset at stations that B meets in A's direction [m].
+        other_lane: of the stations that B meets in A's direction, the share at
+            which the offset exceeds `LANE_OFFSET`.
         episode_50, episode_90: quantiles of the length of the stretches in
         another lane [m].
-        wander: standard deviation of the offset in the same lane [m].
-        wander_length: distance along A at which the correlation of the offset
-            in the same lane has fallen to 1/e [m].
+        wander: standard deviation of the offset where both drives are in the
+            same lane [m].
+        wander_length: distance along A at which the autocorrelation of the
+            offset in the same lane has fallen to 1/e [m].
         heading_spread_deg, heading_5_deg, heading_95_deg: standard deviation
-            and quantiles of B's heading relative to A's, in the same direction
-            [deg].
-        height_5, height_95: quantiles of B's height above A's, relative to the
-            median of this height [m].
+            and quantiles of B's heading relative to A's heading, at stations
+            that B meets in A's direction [deg].
+        height_5, height_95: quantiles of B's height above A, relative to the
+            median of this height difference [m].
         reverse_25, reverse_50, reverse_75, reverse_95: quantiles of the
-            absolute offset where B goes in the opposite direction only [m].
+            absolute offset at stations that B meets only in the opposite
+            direction [m].
     """
 
     first: Driving

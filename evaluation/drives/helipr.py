@@ -4,7 +4,7 @@
     SEQ/LiDAR_GT/{LiDAR}_gt.txt           ns x y z qx qy qz qw of X_LS
     SEQ/LiDAR_GT/global_{LiDAR}_gt.txt    the same in the UTM grid
 
-Each scan has a pose, which is that of the LiDAR itself.
+Each scan has a pose of the LiDAR itself.
 """
 
 from functools import partial
@@ -83,8 +83,8 @@ class HeliprDrive(FileDrive):
 
         Args:
             path: the folder of the drive, or `LiDAR/<name>` in it.
-            lidar: name of the LiDAR, if `path` does not contain it: by default
-                the Ouster, or else the only one there.
+            lidar: name of the LiDAR, if `path` does not contain it. By default
+                the Ouster or, in a folder without the Ouster, the only LiDAR.
 
         Raises:
             InputError: there is no such drive, or its poses cannot be used.

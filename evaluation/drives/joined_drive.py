@@ -16,8 +16,8 @@ class JoinedDrive(Drive):
     in memory.
 
     Attributes:
-        starts: (P + 1,) first frame of each of the P drives, and last the
-            number of all frames.
+        starts: (P + 1,) first frame of each of the P drives; the last entry is
+            the number of frames of all drives.
         keep: which frames are kept in a map, see
             `evaluation.recognition.kept_places.kept_places`.
     """

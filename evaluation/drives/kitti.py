@@ -6,10 +6,10 @@
     poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
 
 C is the frame of the left grey camera (x right, y down, z forward), C0 is C at
-the first scan, and S is the frame of the LiDAR. Without a `calib.txt` the poses
-are those of the LiDAR, X_S0S. If scans are missing, the numbers in the names of
-the remaining files select the rows of the tables. If scans were renumbered,
-`frames.txt` contains the old number of each scan.
+the first scan, and S is the frame of the LiDAR. Without a `calib.txt` the files
+contain poses of the LiDAR, X_S0S. If scans are missing, the numbers in the
+names of the remaining files select the rows of the tables. If scans were
+renumbered, `frames.txt` contains the old number of each scan.
 
 There may also be labels, in SemanticKITTI's form,
 
@@ -63,7 +63,7 @@ class KittiDrive(BinDrive):
     The files contain poses X_C0C of camera C, relative to the pose at the first
     scan. These poses are converted to poses of the LiDAR S, X_S0S =
     inverse(X_CS) X_C0C X_CS; `calib.txt` contains X_CS under the name `Tr`.
-    Without `calib.txt`, the poses are taken as those of the LiDAR.
+    Without `calib.txt`, the files are taken to contain poses of the LiDAR.
 
     The world frame W is S0, the LiDAR's frame at the first scan, with z up.
     With a file `first_pose.txt`, which cns-drake exports, W is the world frame

@@ -3,8 +3,9 @@
     DATE/velodyne_sync/<us>.bin     uint16 x y z, uint8 intensity, uint8 laser
     groundtruth_DATE.csv            us, x y z [m], roll pitch yaw [rad] of X_NB
 
-The table is in the drive's folder, next to that folder, or in a folder
-`ground_truth` next to it. The axes of N point north, east and down. B is the
+The table is in the drive's folder, next to the drive's folder, or in a folder
+`ground_truth` next to the drive's folder. The axes of N point north, east and
+down. B is the
 vehicle's body, with x forward, y right and z down. Points are expressed in B
 and stored as multiples of 5 mm, counted from -100 m. All sessions share N.
 """

@@ -254,7 +254,7 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
 
 
 def _without_no_returns(points: np.ndarray) -> np.ndarray:
-    """Returns the points without those at the origin: beams with no return.
+    """Returns the points except points at the origin (beams without return).
 
     Raises:
         ValueError: if a coordinate is too large for a point.

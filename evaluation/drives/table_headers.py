@@ -68,8 +68,8 @@ def find_columns(
         `names`.
 
     Raises:
-        ValueError: the header names a column twice, or names too few columns,
-            and one at another place than `names`.
+        ValueError: the header names a column twice; or it names too few
+            columns, and one of these is not at its place in `names`.
     """
     found = [_column(word) for word in words]
     if found.count("w"):

@@ -95,8 +95,8 @@ class Trajectory:
 
         Args:
             stamps_ns: (M,) int64 [ns].
-            tolerance_ns: greatest difference between a given time and that of a
-                stored pose [ns].
+            tolerance_ns: greatest difference between a given time and the time
+                of a stored pose [ns].
 
         Returns:
             (M, 4, 4) poses.
@@ -177,12 +177,12 @@ def read_angles(
 ) -> tuple[Trajectory, tuple[str, ...]]:
     """Reads a trajectory: rows with a time, a position and three angles.
 
-    Times are in microseconds, roll, pitch and yaw in radians.
+    Times are in microseconds; roll, pitch and yaw are in radians.
 
     Args:
         path: a table with commas.
-        num_velocities: number of velocities behind the position, and again
-            behind the angles, in a table without a header.
+        num_velocities: number of velocities that follow the position, and of
+            velocities that follow the angles, in a table without a header.
 
     Returns:
         Poses with the rotation Rz(yaw) Ry(pitch) Rx(roll); a note if rows were

@@ -1,8 +1,9 @@
 """Localisation of single scans, or of a drive, in a map.
 
-`localisation_map` makes a map, and `estimators` registers a scan to it, from
-`initial_poses` that are random. `localise` does so with many scans, `tracking`
-with a drive. `results` summarises the records of both. `robust_icp` and `fit`
-are parts of estimators, and `settings` contains their settings. `one_scan`
-reads a single cloud as a drive.
+`localisation_map` makes a map, and `estimators` registers a scan to this map
+from one of the random `initial_poses`. `localise` registers many scans
+independently of each other; `tracking` registers the scans of a drive one after
+another. `results` summarises the records of both. `robust_icp` and `fit` are
+parts of estimators, and `settings` contains the settings of estimators.
+`one_scan` reads a single cloud as a drive.
 """

@@ -1,9 +1,9 @@
 """Estimators: functions that register a scan to a map from an initial pose.
 
-The shipped estimators are from small_gicp (K. Koide, "small_gicp: Efficient
-and parallel algorithms for point cloud registration", JOSS 2024), two
-estimators with a robust kernel, and, as an optional extra, KISS-Matcher (H. Lim
-et al., ICRA 2025). An estimator of your own is a Python function.
+The shipped estimators are the algorithms of small_gicp (K. Koide, "small_gicp:
+Efficient and parallel algorithms for point cloud registration", JOSS 2024), two
+estimators with a robust kernel, and KISS-Matcher (H. Lim et al., ICRA 2025),
+which is an optional extra. An estimator of your own is a Python function.
 
 In small_gicp, the point-to-plane error of two corresponding points is the
 elementwise product of their offset and the normal, instead of the dot product.

@@ -27,8 +27,8 @@ class Fit:
     Attributes:
         share: share of the scan's points that lie on a surface of the map.
         residual: root mean square distance of the scan's points from the planes
-            at the nearest points of the map, without points more than 1 m from
-            the map [m]; NaN if no point is left.
+            at the nearest points of the map [m]. Points of the scan more than 1
+            m from the map do not count; NaN if no point counts.
         covariance: (6, 6) covariance of a small motion about the LiDAR, in axes
             of W: rotation [rad], translation [m]. The covariance is the inverse
             Hessian of the point-to-plane error, corrected for the noise of the

@@ -114,7 +114,7 @@ def _believed_threshold(rows: np.ndarray) -> float:
 def summary(rows: np.ndarray) -> dict[str, float | int | None]:
     """Returns a summary of localised scans, for JSON.
 
-    Success rates count all queries; quantiles count queries with a pose.
+    Success rates count all queries; quantiles count only queries with a pose.
 
     Args:
         rows: (K,) results, records of `QUERY`.

@@ -42,8 +42,8 @@ def align_robustly(
     """Registers a scan to a map by ICP or GICP with a Geman-McClure kernel.
 
     Several alignments follow one another. Each alignment begins at the result
-    of the previous alignment, and pairs points over a shorter distance than
-    that alignment.
+    of the previous alignment, and pairs points over shorter distances than the
+    previous alignment.
 
     Args:
         surface: the map.
@@ -55,7 +55,7 @@ def align_robustly(
         still: translation and rotation below which a step ends an alignment [m,
             rad].
         covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
-            None for point to plane.
+            None for point-to-plane ICP.
 
     Returns:
         The estimated X_WS, and the number of steps.

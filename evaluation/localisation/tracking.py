@@ -94,10 +94,11 @@ def track_drive(
         contains the number of the section, the length of the path since the
         drive's first scan and since the previous scan [m], and the error of the
         tracked position [m]. The tracked position is the result of the
-        alignment; if there is none, the position by odometry.
+        alignment, or the position by odometry if the alignment has no result.
 
     Raises:
-        InputError: a scan cannot be read, or fewer than two are in the map.
+        InputError: a scan cannot be read, or fewer than two scans lie within
+            the map.
     """
     X_WS = query.X_WS
     way = travelled(X_WS[:, :3, 3])
@@ -198,7 +199,7 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
 
 
 def numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields a method's results for `results.csv` that only a track has.
+    """Yields those results for `results.csv` that only a tracked drive has.
 
     Args:
         tracked: records of `TRACKED`.
