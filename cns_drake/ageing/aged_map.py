@@ -200,7 +200,8 @@ def _copy_inputs(
 def _way_name(drive: Path) -> str:
     """Returns a name for the copy of a drive's waypoints.
 
-    It differs between drives, and from the map's own waypoint file.
+    The copies of different drives have different names, and no copy has the
+    name of the map's own waypoint file.
     """
     return f"waypoints_{drive.stem.removeprefix('sequence_')}.csv"
 

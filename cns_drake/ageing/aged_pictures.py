@@ -31,7 +31,7 @@ _SEEN = 60.0
 def street_views(aged: AgedMap) -> dict[str, View]:
     """Returns camera views that show many changed buildings.
 
-    The cameras stand on the path of the map's last drive, not close together,
+    The cameras stand apart from each other on the path of the map's last drive,
     and look in the direction of travel.
 
     Returns:
@@ -75,7 +75,7 @@ def air_view(aged: AgedMap) -> View:
 
 
 def draw_pictures(folder: Path, aged: AgedMap) -> None:
-    """Writes a picture of each view in each year, and one of all views.
+    """Writes a picture of each view in each year, and a picture of all views.
 
     The files are `pictures/year_<year>_<view>.jpg` and `pictures/film.jpg` in
     the map's folder.

@@ -213,8 +213,8 @@ def renovated(
     Args:
         building: the building.
         rng: random generator for the colour.
-        insulated: whether the walls get an insulation layer, too, and so move
-            outwards by 15 cm.
+        insulated: whether the walls also get an insulation layer, which moves
+            their surface outwards by 15 cm.
     """
     model = building.model
     walls = [p for p in model.parts if p.material != "glass" and p.rgb]
@@ -255,8 +255,8 @@ def scaffold_before(
 
     Args:
         plot: plot of the building.
-        height: height of the building [m]. The scaffold has the same height, up
-            to the greatest height of scaffolds.
+        height: height of the building [m]. The scaffold is as high as the
+            building, unless the building is higher than scaffolds can be.
         name: name of the scaffold.
         rng: random generator for the scaffold.
     """

@@ -128,8 +128,8 @@ class Buildings:
             lot: the lot.
             height: approximate height of the new building [m].
             rng: random generator for the building and the site.
-            replaced: name of the building that stood there; the new one is of
-                another archetype.
+            replaced: name of the building that stood there; the new building
+                has another archetype.
         """
         plot, standing = lot.plot, self._standing
         near = [

@@ -43,15 +43,15 @@ class Lot:
         plot: the plot.
         height: usual height of buildings on the lot [m].
         building: name of the building; None without one.
-        parts: names of annexes, storeys and balconies, or of what stands on the
-            lot instead of a building.
+        parts: names of the building's annexes, additional storeys and
+            balconies; without a building, names of the structures on the lot.
         finished: year in which the building `coming` is finished; 0 if none is
             being built.
         coming: the building that is being built.
         old: name of the building that `coming` replaces; "" if there was none.
-        is_raised: whether the building has a further storey; it gets one at
-            most.
-        has_balconies: whether the building has got balconies.
+        is_raised: whether a storey was added to the building; at most one is
+            added.
+        has_balconies: whether balconies were added to the building.
     """
 
     number: int
@@ -67,7 +67,7 @@ class Lot:
 
 
 def find_lots(world: OldWorld, kept_free: BaseGeometry) -> list[Lot]:
-    """Returns the lots of a city: of its buildings, then the free lots.
+    """Returns the lots of a city: first lots with buildings, then free lots.
 
     Args:
         world: the city.
@@ -125,7 +125,7 @@ def _free_lots(
 ) -> list[Lot]:
     """Returns rectangles of open ground along streets as lots.
 
-    Trees and furniture may stand on them.
+    Trees and furniture may stand on these lots.
 
     Args:
         world: the city.

@@ -71,8 +71,9 @@ class OldWorld:
         """Reads the last stage of a map.
 
         Raises:
-            InputError: there is no stage, it cannot be loaded, or it is not a
-                world of one link with visuals named <structure>/<part>.
+            InputError: the map has no stage; or the last stage cannot be
+                loaded, or is not a world of one link with visuals named
+                <structure>/<part>.
         """
         stages = list(folder.stages().values())
         if not stages:

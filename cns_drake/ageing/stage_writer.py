@@ -44,7 +44,7 @@ class StageWriter:
         Args:
             world: the city of today.
             draft: the folder to write.
-            seed: seed of the ageing, which stages name in a comment.
+            seed: seed of the ageing; a comment in each stage states the seed.
         """
         self._world = world
         self._draft = draft
@@ -65,8 +65,8 @@ class StageWriter:
         Args:
             stage: name of the stage.
             year: years since the original city; negative for years before.
-            standing: name -> structure, for all that stand in this year; None
-                for a structure that is as in the original city.
+            standing: name of each structure that stands in this year -> the
+                structure, or None if it is the same as in the original city.
         """
         world = self._world
         new = [one for one in standing.values() if one is not None]

@@ -62,8 +62,9 @@ class StandingStructures:
             one: the structure.
             footprint: area in W [m] that the structure takes; by default its
                 own footprint.
-            because: event whose record does not name the structure. The record
-                then says that the structure was put up because of this event.
+            because: event that causes the structure to be put up, if the
+                event's own record does not name the structure. A further record
+                then states this cause; by default there is no further record.
         """
         self.by_name[one.name] = one
         self.new.setdefault(one.name, one)

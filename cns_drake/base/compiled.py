@@ -99,12 +99,12 @@ def _compiling_once(
     """Returns a function that compiles once for all processes.
 
     Processes that run side by side wait for the result of the first process. A
-    literal number among the arguments counts by its type; numba would compile
-    for that one number.
+    literal number among the arguments counts by its type; otherwise numba would
+    compile the function for that single number.
 
     Args:
         compile_for: function that compiles for types of arguments.
-        file: file that is locked meanwhile.
+        file: file that is locked during the compilation.
     """
 
     def compile_once(types: tuple) -> object:

@@ -53,8 +53,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
     empty is replaced if `replaces` is true; otherwise it is an error.
 
     Raises:
-        InputError: if `folder` cannot be written, is not empty and `replaces`
-            is false, or another process is writing it.
+        InputError: `folder` cannot be written, another process is writing it,
+            or it is not empty although `replaces` is false.
     """
     # `.` has no name.
     place = Path(os.path.abspath(folder))

@@ -55,8 +55,8 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
 
     Raises:
         InputError: the file cannot be read, is not CSV in UTF-8, holds a
-            control character, or its first line is separated by other
-            characters than commas.
+            control character, or separates the cells of its first line by
+            characters other than commas.
     """
     text = read_text(path)
     try:

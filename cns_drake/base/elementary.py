@@ -1,9 +1,10 @@
 """Elementary functions and matrix products with equal bits on every processor.
 
-The last bits of NumPy's results depend on the vector instructions of the
-processor, and the last bits of its matrix products on the order of summation.
-The elementary functions here call the C library for each value, which takes
-about 0.1 us; the matrix product adds in a fixed order.
+The last bits of NumPy's elementary functions depend on the vector instructions
+of the processor. The last bits of NumPy's matrix products depend on the order
+of summation. The elementary functions here call the C library once for each
+value, which takes about 0.1 us per value. The matrix product adds in a fixed
+order.
 """
 
 import math

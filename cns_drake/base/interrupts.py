@@ -39,8 +39,8 @@ def interrupt_on_termination(once: bool = False) -> None:
 def _handled_by(handle: _Handler) -> Iterator[dict[int, _Handler]]:
     """Sets a handler of `SIGNALS` for the block; yields the former handlers.
 
-    Signals that are ignored, or have the default action, keep that. Python sets
-    and runs handlers in the main thread only.
+    A signal that is ignored, or has the default action, keeps its action.
+    Python sets and runs handlers in the main thread only.
     """
     before: dict[int, _Handler] = {
         number: handler

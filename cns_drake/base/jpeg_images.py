@@ -16,9 +16,9 @@ def to_jpeg(
 ) -> bytes:
     """Returns a picture as JPEG.
 
-    A picture of more than 8 bits, such as that of a thermal camera, is scaled
-    so that its darkest and brightest pixels, without the outer 1 %, become
-    black and white.
+    A picture of more than 8 bits, such as a thermal camera's picture, is
+    scaled: the darkest 1 % of its pixels become black, and the brightest 1 %
+    become white.
 
     Args:
         picture: the picture.

@@ -31,7 +31,7 @@ class Element(ElementTree.Element):
     line = 0
 
     def all(self, *path: str) -> Iterator[Element]:
-        """Yields all elements that a path of tags, from this element, reaches.
+        """Yields all elements at the end of a path of tags from this element.
 
         For example, `all("road", "link")` yields each `link` in each `road` in
         this element.

@@ -66,9 +66,11 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
 def _with_kitti_intensities(drive: McapDrive, scan: np.ndarray) -> np.ndarray:
     """Returns a scan with its intensities in KITTI's scale, if known.
 
-    Calibrated intensities become a byte / 256 in hundredths, at most 0.99, as
-    in the scans of KITTI odometry 00. Ideal intensities, from 0 to 1, stay as
-    they are, and so do those of other recorders, whose unit is not known.
+    A calibrated intensity from 0 to 255 is divided by 256, rounded to
+    hundredths and limited to 0.99, as in the scans of KITTI odometry 00.
+    Calibrated intensities of the preset `hdl-64e` already count hundredths.
+    Ideal intensities, from 0 to 1, stay as they are. Intensities of other
+    recorders, whose unit is not known, also stay as they are.
     """
     if drive.lidar_section.get("returns") != "calibrated":
         return scan

@@ -79,7 +79,8 @@ def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
 
     Args:
         drive: the recording.
-        name: name of the drive in the scenario; by default the recording's.
+        name: name of the drive in the scenario; by default the name of the
+            recording.
     """
     if drive.scenario is None:
         return {}

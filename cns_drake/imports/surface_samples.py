@@ -48,7 +48,7 @@ def _points_on(triangles: np.ndarray, spacing: float) -> np.ndarray:
     """Returns points (N, 3) on triangles (M, 3, 3), triangle by triangle [m].
 
     The points are in lines between the two longer sides, parallel to the
-    shortest one.
+    shortest side.
     """
     sides = np.roll(triangles, 1, axis=1) - np.roll(triangles, -1, axis=1)
     lengths = np.sqrt((sides * sides).sum(axis=2))

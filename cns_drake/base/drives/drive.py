@@ -196,7 +196,7 @@ class Drive(abc.ABC):
 
     @property
     def lidar_section(self) -> Mapping:
-        """Settings of the drive's LiDAR from the scenario; empty without any.
+        """Settings of the drive's LiDAR; empty if no scenario contains them.
 
         A scenario may have several LiDARs. If the name of the drive ends in
         `_<lidar>`, the settings of that LiDAR are returned, otherwise the

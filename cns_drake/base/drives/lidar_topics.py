@@ -25,12 +25,15 @@ def cloud_topics(topics: Mapping[str, Iterable[str]]) -> list[str]:
 def choose_lidar_topic(
     topics: Mapping[str, Iterable[str]], lidar: str | None, source: object
 ) -> str:
-    """Returns the topic of the wanted LiDAR; it may be missing without clouds.
+    """Returns the topic of the wanted LiDAR.
+
+    If the file has no topic of point clouds, the result need not be in
+    `topics`.
 
     Args:
         topics: topic -> message types, as in `McapFile.topics`.
-        lidar: name or topic of the LiDAR. None stands for `/lidar/points`, or
-            for the only topic of point clouds.
+        lidar: name or topic of the LiDAR. None stands for `/lidar/points` or,
+            if this topic is missing, for the only topic of point clouds.
         source: the file, with which an error message begins.
 
     Raises:

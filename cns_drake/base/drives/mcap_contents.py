@@ -56,8 +56,8 @@ class Contents:
             chunks, in the file's order [bytes].
         indexes: for each block, channel id -> offset of the message index
             [bytes].
-        attachments: (name, offset in the file [bytes]) of each.
-        metadata: the same of each metadata record.
+        attachments: (name, offset in the file [bytes]) of each attachment.
+        metadata: (name, offset in the file [bytes]) of each metadata record.
         found: channel id -> (block, offset in it, log time [ns]) of each
             message; None if the index has them.
         statistics: the file's own, if any.
@@ -76,7 +76,8 @@ class Contents:
     def of(cls, summary: bytes) -> Contents:
         """Returns the contents of a file, as its summary section lists them.
 
-        The `mcap` package takes longer to read the section than all poses.
+        With the `mcap` package, reading this section would take longer than
+        reading all poses.
         """
         contents = cls()
         chunks: list[tuple[int, dict[int, int]]] = []

@@ -189,10 +189,11 @@ def locate_records(
     The records are the same as in `read_records`.
 
     Yields:
-        Two offsets [bytes], and the record. For a record in a chunk, the
-        offsets are those of the chunk in the file and of the record in the
-        uncompressed chunk. For any other record, the offsets are that of the
-        record in the file, and 0.
+        Two offsets [bytes], and the record. For a record in a chunk, the first
+        offset is the place of the chunk in the file, and the second is the
+        place of the record in the uncompressed chunk. For any other record, the
+        first offset is the place of the record in the file, and the second is
+        0.
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)

@@ -65,7 +65,7 @@ class _Kind(NamedTuple):
     Attributes:
         row: function that returns a decoded message as a row.
         frames: function that returns the names of its frames.
-        dtype: of the rows.
+        dtype: dtype of the rows.
         layout: the doubles at the end of a message.
     """
 
@@ -140,8 +140,8 @@ class MessageRows:
         """Adds a serialised message as row `index`.
 
         Raises:
-            ValueError: the message cannot be decoded, or its frames are not
-                those of the first message.
+            ValueError: the message cannot be decoded, or its frames differ from
+                the frames of the first message.
         """
         split = self._length - self._kind.layout.itemsize
         if (

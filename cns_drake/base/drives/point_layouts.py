@@ -78,14 +78,15 @@ def to_layout(
             have.
         num_rings: number of rings of the LiDAR. If given, the layout `velodyne`
             counts rings from the lowest ring, as Velodyne's driver does.
-        is_calibrated: whether the intensities are calibrated, from 0 to 255.
-            Otherwise intensities are from 0 to 1.
+        is_calibrated: whether the intensities are calibrated. Calibrated
+            intensities are from 0 to 255, all others from 0 to 1.
 
     Returns:
-        (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
-        nanoseconds and `time` in seconds, since the message's stamp; azimuths
-        from 0 to 2 pi, from x to y; `reflectivity` and the intensity of
-        `autoware` from 0 to 255.
+        (N,) records. Ranges of `ouster` are in millimetres. `t` and
+        `time_stamp` count nanoseconds since the message's stamp, and `time`
+        counts seconds since the stamp. Azimuths are from 0 to 2 pi, and
+        increase from x to y. `reflectivity` and the intensity of `autoware` are
+        from 0 to 255.
     """
     if layout == "cns":
         return points
@@ -184,10 +185,11 @@ def _nanoseconds(times: np.ndarray | None) -> np.ndarray | None:
     Some drivers count backwards from the last point, or since 1970.
 
     Args:
-        times: (N,) of a point's field, if there is one.
+        times: (N,) times of the points; None if the points have no such field.
 
     Returns:
-        (N,) uint32 [ns]; None if there is none, or its unit is not certain.
+        (N,) uint32 [ns]; None without such a field, or if its unit is not
+        certain.
     """
     if times is None or times.dtype.kind != "f":
         return None

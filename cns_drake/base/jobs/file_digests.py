@@ -73,8 +73,8 @@ def _state_and_digest(path: str, known: list | None) -> list:
 def _state(path: str) -> list[int]:
     """Returns size, times and number of a file.
 
-    The time of the last change of the inode cannot be set back, unlike that of
-    the content.
+    A program can set back the time of the content's last change, but not the
+    time of the inode's last change.
     """
     stat = os.stat(path)
     return [

@@ -72,7 +72,7 @@ class Space:
     Attributes:
         folder: folder of the results, which exists.
         most: space that the jobs need while they run [bytes].
-        rest: space that their results need in the end [bytes].
+        rest: space that the jobs' results need in the end [bytes].
     """
 
     folder: Path
@@ -104,8 +104,8 @@ def forecast(
         least: shortest time that is worth a message [s].
 
     Returns:
-        One line of text; None if all jobs are done, take less than `least`, or
-        nothing is known about them.
+        One line of text; None if all jobs are done, if they take less than
+        `least`, or if nothing is known about them.
     """
     # Whether a job is done, which takes a look at the disk, is asked only if
     # all jobs together may take long enough.

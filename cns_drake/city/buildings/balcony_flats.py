@@ -182,10 +182,10 @@ def _add_balconies(
 def _stair(
     p: BalconyFlats, front: _Front, top: float, highest: bool
 ) -> list[Mesh]:
-    """Returns a canopy over the door, and what shows of the stair.
+    """Returns a canopy over the door, and the visible part of the stair.
 
-    That is a stair tower in front of the wall, or on the highest section a
-    house on the roof.
+    If `p.stair` is `tower`, a stair tower in front of the wall is visible;
+    otherwise only a house on the roof of the highest section.
     """
     x, wall = front.stair, front.wall
     pieces = [

@@ -141,8 +141,8 @@ def _stack_adder(
 ) -> Callable[[float, int], float]:
     """Returns a function that adds a stack of storeys with one outline.
 
-    The function gets the height of their bottom and the number of the stack,
-    and returns the height of their top [m].
+    The function takes the height of the stack's bottom and the number of the
+    stack, and returns the height of the stack's top [m].
     """
     groups, per_group, storey = counts
     step = per_group * storey

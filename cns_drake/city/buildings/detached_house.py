@@ -89,8 +89,8 @@ class DetachedHouse(FamilyHouse):
         """Chooses the wings of the house.
 
         The first wing is `main`, with `storeys` storeys. `free` is the stretch
-        in x of its front that no other wing hides, and `ahead` the depth of
-        free ground in front of it [m].
+        in x of the main wing's front that no other wing hides, and `ahead` is
+        the depth of free ground in front of the main wing [m].
         """
         x0, y0, x1, y1 = self.site.bounds
         left, right, back = x0 + MARGIN_M, x1 - MARGIN_M, y1 - MARGIN_M

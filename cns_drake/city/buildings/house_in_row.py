@@ -49,10 +49,10 @@ class HouseInRow(Building):
 
         Args:
             width: width of the house [m].
-            roofs: kinds of roof that the house can have. `gable` and `gambrel`
-                have their ridge along the street, and `flat` has a cornice. The
-                gable of `front` and `stepped` faces the street; it has steps if
-                `stepped`.
+            roofs: kinds of roof that the house can have. The roofs `gable` and
+                `gambrel` have their ridge along the street, and `flat` has a
+                cornice. The roofs `front` and `stepped` have a gable that faces
+                the street; the gable of `stepped` has steps.
             casings: styles of the frames around the windows.
         """
         self.roof = self.pick(roofs)

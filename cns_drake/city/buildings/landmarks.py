@@ -116,7 +116,7 @@ def _read_model(folder: Path) -> _Model:
 def _stretched(mesh: Mesh, along: np.ndarray) -> Mesh:
     """Returns a mesh stretched along x, y and z by the factors `along`.
 
-    What lies below the ground, its foundation, keeps its depth.
+    The foundation, which lies below the ground, keeps its depth.
     """
     vertices = mesh.vertices * along
     below = mesh.vertices[:, 2] < 0.0

@@ -55,8 +55,9 @@ class Assembly(Dice):
     def draw_roof_items(self, kinds: str, low: int, high: int) -> list[str]:
         """Returns the kinds of a random number of objects on the roof.
 
-        The result contains the first kinds in `kinds`, which are separated by
-        spaces. The number of objects is at least `low` and less than `high`.
+        The text `kinds` lists kinds, separated by spaces; the result contains
+        the first of them. The number of objects is at least `low` and less than
+        `high`.
         """
         return kinds.split()[: self.whole(low, high)]
 

@@ -166,10 +166,10 @@ def _with_replaced_corners(
 ) -> np.ndarray:
     """Returns an outline with several corners in place of some corners.
 
-    All convex corners are replaced, or those `chosen` by number. The function
-    `corner` returns the new ones. It gets the corner's number, its place, and
-    the directions of the edges before and after it. The first edge stays the
-    first one.
+    The corners whose numbers are in `chosen` are replaced; by default, all
+    convex corners. The function `corner` takes a corner's number, its place,
+    and the directions of the edges before and after the corner, and returns the
+    new corners. The first edge of the outline stays the first edge.
     """
     points = np.asarray(points, dtype=float)
     result: Corners = []

@@ -148,8 +148,8 @@ def _pier(
 ) -> Mesh:
     """Returns a box with a back, in wall coordinates.
 
-    It needs a back because piers are deeper than walls: near a corner their
-    backs show in the recesses of the next wall.
+    The box needs a back because piers are deeper than walls: near a corner, the
+    backs of piers are visible in the recesses of the next wall.
     """
     a, b = x - width / 2, x + width / 2
     plan = [(a, -depth), (b, -depth), (b, reach), (a, reach)]

@@ -154,7 +154,7 @@ def gable_wall(
 
     Args:
         line: underside of the roof as (along the wall, height) points [m]. The
-            line runs from a to b, and nowhere below z.
+            line runs from a to b, and is nowhere below z.
         a: left end of the wall [m].
         b: right end of the wall [m].
         z: height of the wall's foot [m].
@@ -223,7 +223,7 @@ def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
 
 
 def _ridge(rectangle: np.ndarray) -> np.ndarray:
-    """Returns (4, 2) the points on the ridge above the corners of a rectangle.
+    """Returns the points (4, 2) on the ridge above a rectangle's corners.
 
     Two corners share each end of the ridge; on a square, all four share one
     point.

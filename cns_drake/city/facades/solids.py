@@ -289,7 +289,7 @@ def foundation(points: ArrayLike) -> Mesh:
 
 
 def _corner_turns(points: np.ndarray) -> np.ndarray:
-    """Returns (N,) the cross product of the two edges at each corner [m^2].
+    """Returns the cross product (N,) of the two edges at each corner [m^2].
 
     It is positive where the outline turns left.
     """

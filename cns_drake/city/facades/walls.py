@@ -225,10 +225,11 @@ def _corner_shift(
 ) -> np.ndarray | float:
     """Returns how much a wall at `depth` is shortened at a corner [m].
 
-    `a` and `b` are the directions of the two walls. Two lines that leave the
-    corner at the turn t, moved inwards by `depth` and `other`, meet at (other -
-    depth cos t) / sin t along the first one; for equal depths this is depth
-    tan(t / 2).
+    `a` and `b` are the directions of the two walls, and t is the angle by which
+    the outline turns at the corner. If the first wall's line is moved inwards
+    by `depth` and the other wall's line by `other`, the lines meet at the
+    distance (other - depth cos t) / sin t from the corner, measured along the
+    first wall. For equal depths, this distance is depth tan(t / 2).
     """
     cosine, sine = float(a @ b), float(a[0] * b[1] - a[1] * b[0])
     return 0.0 if abs(sine) < 1e-6 else (other - depth * cosine) / sine

@@ -31,8 +31,9 @@ class Roof:
         thickness: vertical thickness of the roof [m].
         ridge: place of a gable roof's ridge, as a share of the span.
         parapet: height of a flat roof's parapet [m].
-        falling: whether a shed roof falls towards the back, instead of rising
-            towards it; with `along_y`, the right takes the place of the back.
+        falling: whether a shed roof falls towards the back instead of rising
+            towards the back. With `along_y`, whether it falls towards the right
+            instead of rising towards the right.
     """
 
     kind: str = "gable"

@@ -143,9 +143,8 @@ def render_stages(
         structures and of triangles in the stage.
 
     Raises:
-        InputError: if a structure cannot be lower, or cannot be under
-            construction, as the stages demand, or the city has too many
-            structures.
+        InputError: the stages demand that a structure is lower or under
+            construction, and it cannot be; or the city has too many structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
     if len(growing.structures) > MAX_INSTANCE:

@@ -161,14 +161,14 @@ def starter_plan(areas: Areas, seed: int) -> dict:
 
 
 def starter_stages(city: City, missing: float = _MISSING) -> dict:
-    """Returns two stages; the first stage lacks the east of the city.
+    """Returns two stages; the first lacks buildings and trees in the east.
 
-    The first stage lacks buildings and trees in the east. The result has the
-    fields of `cns_drake.city.plan.stages.Stages`.
+    The result has the fields of `cns_drake.city.plan.stages.Stages`.
 
     Args:
         city: the whole city.
-        missing: share of the buildings that the first stage lacks.
+        missing: share of the buildings that the first stage lacks: those
+            farthest to the east. The stage also lacks the trees between them.
     """
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]

@@ -91,7 +91,7 @@ def bar(
     radius: float,
     rgb: tuple[float, float, float] | None = None,
 ) -> Part:
-    """Returns a cylinder between two points, as a share of a structure.
+    """Returns a cylinder between two points, as a part of a structure.
 
     Args:
         name: name of the part.
@@ -122,7 +122,7 @@ def block(
     rgb: tuple[float, float, float] | None = None,
     material: str | None = None,
 ) -> Part:
-    """Returns a box as a share of a structure.
+    """Returns a box as a part of a structure.
 
     Args:
         name: name of the part.

@@ -108,7 +108,7 @@ def _insert_touching(
 ) -> list[_Point] | None:
     """Returns a ring that also runs around a hole, from a corner they share.
 
-    It is None if they share no corner.
+    The result is None if ring and hole share no corner.
     """
     for k, corner in enumerate(hole):
         for i in (i for i, other in enumerate(ring) if other == corner):
@@ -122,7 +122,8 @@ def _insert_apart(
 ) -> list[_Point]:
     """Returns a ring that also runs around a hole that it does not touch.
 
-    It leads there and back along a line that crosses none of the walls.
+    The ring leads to the hole and back along a line that crosses none of the
+    edges `walls`.
     """
     k = hole.index(max(hole))
     for i in sorted(
@@ -250,8 +251,9 @@ def _delaunay(
 def _in_circle(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
     """Returns whether d is inside the circle through a, b and c.
 
-    The three are counter-clockwise. Then the quadrilateral a, d, b, c is
-    convex as well, so that its diagonal can be flipped.
+    The points a, b and c are counter-clockwise. If d, which lies beyond the
+    edge a b, is inside the circle, the quadrilateral a, d, b, c is convex, so
+    that its diagonal can be flipped.
     """
     rows = [(p[0] - d[0], p[1] - d[1]) for p in (a, b, c)]
     (ax, ay), (bx, by), (cx, cy) = rows

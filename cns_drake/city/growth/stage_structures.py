@@ -56,8 +56,8 @@ class GrowingCity:
 
         Raises:
             KeyError: if there is no such stage.
-            ValueError: if a structure cannot be lower, or cannot be under
-                construction, as the stage demands.
+            ValueError: the stage demands that a structure is lower or under
+                construction, and it cannot be.
         """
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)

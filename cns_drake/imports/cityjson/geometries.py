@@ -49,8 +49,8 @@ class Templates:
     def place(self, instance: dict) -> tuple[Any, np.ndarray]:
         """Returns an instance's template, and the vertices of the instance.
 
-        The vertices (N, 3) are those of the template, transformed to the place
-        of the instance [m].
+        The vertices (N, 3) are the template's vertices, transformed to the
+        place of the instance [m].
 
         Args:
             instance: geometry of the type `GeometryInstance`, which refers to a

@@ -180,8 +180,9 @@ def _chosen_geometries(
 ) -> list[CityGeometry]:
     """Returns the geometries of an object and its parts that are used.
 
-    What a part shows in more detail is not used again from its whole, or the
-    other way round.
+    A geometry of a part is left out if a more detailed geometry of the whole
+    covers it. In the same way, a geometry of the whole is left out if more
+    detailed geometries of parts cover it.
     """
     chosen: list[tuple[CityObject, CityGeometry]] = []
     for one in members:

@@ -210,8 +210,8 @@ def _with_fronts(
 
     Args:
         plans: plans of walls.
-        to_way: distance of each wall from the nearest street or drive [m]. The
-            nearest wall of a building has its door.
+        to_way: distance of each wall from the nearest street or drive [m]. A
+            building gets its door in the nearest of its walls on a street.
         paving: upper sides of the paving in front of the walls.
     """
     groups: defaultdict[int, list[int]] = defaultdict(list)

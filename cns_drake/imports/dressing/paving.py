@@ -55,8 +55,8 @@ def triangles_from_above(
 ) -> np.ndarray:
     """Returns triangles of structures as polygons (N,), seen from above [m].
 
-    Vertical triangles are left out. Unless `with_downward` is true, which is
-    the default, so are triangles that look downwards.
+    Vertical triangles are left out. Triangles that look downwards are left out
+    only if `with_downward` is false.
     """
     triangles = joined_triangles(one.triangles for one in structures)
     if with_downward:

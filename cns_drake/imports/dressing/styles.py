@@ -112,7 +112,7 @@ def building_use(
 
 
 def tagged_finish(tags: Mapping[str, str], part: str) -> Finish | None:
-    """Returns the finish of a part that its tags name; None without tags.
+    """Returns the finish that tags give to a part; None without such tags.
 
     `part` is the beginning of the tags' keys, `building` or `roof`.
     """

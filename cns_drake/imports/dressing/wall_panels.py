@@ -185,7 +185,7 @@ def _panel_numbers(
     building: np.ndarray,
     least: float,
 ) -> np.ndarray:
-    """Returns (M,) the number of the panel of each triangle (M, 3, 3) [m].
+    """Returns the number (M,) of the panel of each triangle (M, 3, 3) [m].
 
     Two triangles that share an edge are in one panel if they belong to the same
     building, numbered (M,), and if the dot product of their unit normals (M, 3)

@@ -174,8 +174,8 @@ def _longest_arm(
 ) -> list[int]:
     """Returns the longest way that leaves a drive at a piece, the joint.
 
-    With `backwards`, the way ends at the joint and is in reverse order. It is
-    empty if it is too short.
+    With `backwards`, the way ends at the joint and is in reverse order. The
+    result is empty if this way is too short.
     """
     links = graph.links(graph.beside(np.array(used), joint))
     if backwards:

@@ -30,9 +30,10 @@ class WayGraph(ABC):
     ):
         """Links pieces: each of `before` (L,) leads into one of `after` (L,).
 
-        `lengths` (N,) are those of the pieces [m]. `costs` (L,) are from the
-        middle of one piece to the middle of the next; if None, they are lengths
-        [m].
+        `lengths` (N,) contains the lengths of the pieces [m]. `costs` (L,)
+        contains the cost of each link, from the middle of a piece to the middle
+        of the next piece. If `costs` is None, each cost is the length of the
+        link [m].
         """
         self.lengths = lengths
         if costs is None:
