@@ -22,8 +22,8 @@ import typer
 from cns_drake.city.plan import city_plan, stages
 from cns_drake.command_line import cli
 from cns_drake.roads import roads_file
-from cns_drake.roads.lane_path import Speeds
 from cns_drake.roads.route import Route, RouteLeg
+from cns_drake.roads.speeds import Speeds
 from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.sections import (

@@ -16,7 +16,8 @@ from cns_drake.motion.body_ride import BodyRide, RideMoments, ride_motion
 from cns_drake.motion.frame_motion import FrameMotion, cross
 from cns_drake.motion.path_geometry import PathJet, SmoothPath
 from cns_drake.motion.splines import SplineDerivatives
-from cns_drake.roads.lane_path import LanePath, Speeds
+from cns_drake.roads.lane_path import LanePath
+from cns_drake.roads.speeds import Speeds
 
 _UP = np.array([[0.0, 0.0, 1.0]])
 

@@ -1,10 +1,8 @@
-"""The line along which a vehicle drives, and the limits of its speed."""
+"""The line along which a vehicle drives, with the speed limits of the roads."""
 
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
 from cns_drake.base.errors import InputError
 
@@ -16,29 +14,8 @@ _MAX_LENGTH = 100_000.0
 # over about 10 m, as when a driver turns the wheel. In the tightest bends of a
 # town, the path deviates from the middle of the lane by less than 10 cm.
 POINT_SPACING = 2.0
-
 # Distance between the points from which a path is interpolated [m].
 DENSE_SPACING = 0.25
-
-Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
-
-
-class Speeds(BaseModel):
-    """Limits of speed and acceleration, which the car never exceeds.
-
-    Attributes:
-        cruise: highest speed of the car [m/s]. The speed limits of the roads
-            apply as well.
-        longitudinal_acceleration: largest acceleration and deceleration along
-            the path [m/s^2].
-        lateral_acceleration: largest centripetal acceleration in bends [m/s^2].
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    cruise: float = Field(default=13.5, ge=0.5, le=60, allow_inf_nan=False)
-    longitudinal_acceleration: Acceleration = 2.0
-    lateral_acceleration: Acceleration = 3.0
 
 
 @dataclass(frozen=True)

@@ -25,41 +25,6 @@ from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 # The faces of a tetrahedron, counter-clockwise seen from outside. This holds if
 # its first three vertices are counter-clockwise, seen from the fourth.
 _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
-
-
-def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the boundary surface of a volume mesh in a VTK file.
-
-    Returns:
-        Vertices (N, 3), float64 [m], including inner vertices, and triangles
-        (M, 3), int32.
-
-    Raises:
-        RuntimeError: Drake cannot read the file.
-    """
-    # Drake's reader converts all dialects of VTK to the one that Drake writes.
-    words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
-    vertices = _rows_of_numbers(words, "POINTS", 3, 3).astype(float)
-    cells = _rows_of_numbers(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
-    faces = cells[:, _FACES].reshape(-1, 3)
-    # A face between two tetrahedra occurs twice.
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return vertices, faces[np.sort(first[count == 1])]
-
-
-def _rows_of_numbers(
-    words: Sequence[str], keyword: str, header: int, columns: int
-) -> np.ndarray:
-    """Returns the rows of numbers behind a keyword and its header."""
-    at = words.index(keyword)
-    rows = int(words[at + 1])
-    begin = at + header
-    block = np.array(words[begin : begin + rows * columns])
-    return block.reshape(rows, columns)
-
-
 # Formats whose y axis points up. Drake rotates them so that z does.
 _Y_UP = (*GLTF, ".dae")
 # Larger files are parsed again each time, so that they do not stay in memory.
@@ -240,4 +205,37 @@ def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-_READERS = {".obj": _read_obj, ".vtk": read_vtk}
+def _read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the boundary surface of a volume mesh in a VTK file.
+
+    Returns:
+        Vertices (N, 3), float64 [m], including inner vertices, and triangles
+        (M, 3), int32.
+
+    Raises:
+        RuntimeError: Drake cannot read the file.
+    """
+    # Drake's reader converts all dialects of VTK to the one that Drake writes.
+    words = RefineVolumeMeshIntoVtkFileContents(MeshSource(path)).split()
+    vertices = _rows_of_numbers(words, "POINTS", 3, 3).astype(float)
+    cells = _rows_of_numbers(words, "CELLS", 3, 5).astype(np.int32)[:, 1:]
+    faces = cells[:, _FACES].reshape(-1, 3)
+    # A face between two tetrahedra occurs twice.
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return vertices, faces[np.sort(first[count == 1])]
+
+
+def _rows_of_numbers(
+    words: Sequence[str], keyword: str, header: int, columns: int
+) -> np.ndarray:
+    """Returns the rows of numbers behind a keyword and its header."""
+    at = words.index(keyword)
+    rows = int(words[at + 1])
+    begin = at + header
+    block = np.array(words[begin : begin + rows * columns])
+    return block.reshape(rows, columns)
+
+
+_READERS = {".obj": _read_obj, ".vtk": _read_vtk}

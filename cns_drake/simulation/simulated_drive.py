@@ -72,6 +72,7 @@ class SimulatedDrive(Drive):
     Attributes:
         X_BS: pose of the first LiDAR in base_link.
         structures: names of all structures in the world.
+        trajectory: planned motion of base_link.
         period: time between two frames [s].
     """
 
@@ -155,6 +156,7 @@ class SimulatedDrive(Drive):
 
     @property
     def pattern(self) -> BeamPattern:
+        """The beams of a revolution of the first LiDAR."""
         return self._lidar.pattern
 
     def scan(self, index: int) -> np.ndarray:

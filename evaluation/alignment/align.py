@@ -28,7 +28,6 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.same_world import check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import yaw_pose
-from evaluation.alignment.anchor_search import find_candidates, find_guesses
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,
@@ -42,6 +41,7 @@ from evaluation.alignment.pose_graph import (
     fit_bent,
     fitted_to_loops,
 )
+from evaluation.alignment.pose_guesses import find_candidates, find_guesses
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.drive_views import MovedDrive
 

@@ -10,7 +10,7 @@ import typer
 
 from cns_drake.base import commands, shared_options, terminal
 from cns_drake.base.terminal import number
-from evaluation.command_line import options
+from evaluation.command_line.printed_text import interval_text
 
 if TYPE_CHECKING:
     from evaluation.recognition.bootstrap import Interval
@@ -73,7 +73,7 @@ def compare(
         level = "  [95 %]" if known else ""
         rows.insert(0, ("method", f"{metric}, {where}{level}"))
     for one in found.differences:
-        interval = options.interval_text(one.difference.interval)
+        interval = interval_text(one.difference.interval)
         rows.append(
             (
                 f"{one.first} - {one.second}",
@@ -85,7 +85,7 @@ def compare(
         rows.append(
             (
                 f"Kendall's tau, {alike.first} and {alike.second}",
-                f"{number(alike.tau)}  {options.interval_text(alike.interval)}",
+                f"{number(alike.tau)}  {interval_text(alike.interval)}",
             )
         )
     terminal.show(found.to_json(), rows, json=json)
@@ -95,4 +95,4 @@ def _spaced_interval(interval: Interval) -> str:
     """Returns an interval after two spaces; "" if it is unknown."""
     if isnan(interval.low):
         return ""
-    return f"  {options.interval_text(interval)}"
+    return f"  {interval_text(interval)}"

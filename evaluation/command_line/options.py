@@ -14,11 +14,8 @@ from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
     from evaluation.drives import Drive
-    from evaluation.recognition.bootstrap import Interval
     from evaluation.study.engine import Engine
 
-
-NOT_FINITE = "points are not finite, and left out"
 # Option: when drives are aligned to one world.
 When = Literal["auto", "always", "never"]
 # Option: frame whose poses an estimated trajectory contains.
@@ -118,9 +115,3 @@ def overlap_of(truth: str) -> float | None:
             " part above 0 and up to 1, such as overlap:0.5"
         )
     return least
-
-
-def interval_text(interval: Interval) -> str:
-    """Returns an interval as text in brackets."""
-    low, high = map(terminal.number, (interval.low, interval.high))
-    return f"[{low}, {high}]"

@@ -13,6 +13,7 @@ import typer
 from cns_drake.base import commands, shared_options, terminal
 from cns_drake.base.terminal import number
 from evaluation.command_line import options
+from evaluation.command_line.printed_text import NOT_FINITE, interval_text
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
 
@@ -180,7 +181,7 @@ def pr(
             terminal.note(note)
     for one in counted:
         if one.num_ignored:
-            terminal.note(f"{one.name}: {one.num_ignored} {options.NOT_FINITE}")
+            terminal.note(f"{one.name}: {one.num_ignored} {NOT_FINITE}")
     if overlaps is not None:
         assert shares is not None
         overlap_truth.write_overlaps(
@@ -273,7 +274,7 @@ def _write_scores(
         on_note=terminal.note,
     )
     if num_ignored:
-        terminal.note(f"{num_ignored} {options.NOT_FINITE}")
+        terminal.note(f"{num_ignored} {NOT_FINITE}")
     terminal.note(f"wrote {output}")
     if (note := method.assumption(None)) is not None:
         terminal.note(note)
@@ -311,7 +312,7 @@ def _recognition_rows(
     yield (
         "R@1",
         f"{number(metrics.recall_at_1)}"
-        f"  {options.interval_text(metrics.recall_at_1_interval)}"
+        f"  {interval_text(metrics.recall_at_1_interval)}"
         f"  (TP {metrics.num_right} of N {with_match})",
     )
     for rank in (5, 10, 25):
@@ -319,7 +320,7 @@ def _recognition_rows(
     yield "R@1%", number(metrics.recall_at_1_percent)
     yield (
         "AUC",
-        f"{number(metrics.auc)}  {options.interval_text(metrics.auc_interval)}",
+        f"{number(metrics.auc)}  {interval_text(metrics.auc_interval)}",
     )
     yield "AUC strict", f"{number(metrics.auc_strict)}  (recall = TP / N)"
     f1 = number(metrics.f1_max)

@@ -12,6 +12,7 @@ import typer
 from cns_drake.base import commands, shared_options, terminal
 from cns_drake.base.terminal import number
 from evaluation.command_line import options
+from evaluation.command_line.printed_text import NOT_FINITE
 from evaluation.command_line.trajectories import compare_paths
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def tcr(
             terminal.note(note)
         ignored = one.voxels.num_ignored
         if ignored:
-            terminal.note(f"{one.name}: {ignored} {options.NOT_FINITE}")
+            terminal.note(f"{one.name}: {ignored} {NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
     if output is not None:

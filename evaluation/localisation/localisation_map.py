@@ -129,7 +129,7 @@ def make_map(
             f"{source.name}: a map of {len(points)} points, fewer than"
             f" {FEWEST_POINTS}"
         )
-    return map_of(points, source.name, settings)
+    return map_of(points, source.name, settings.neighbours)
 
 
 def _scans_of_map(
@@ -157,15 +157,13 @@ def map_frames(drive: Drive) -> np.ndarray:
     return frames[kept]
 
 
-def map_of(
-    points: np.ndarray, name: str, settings: Settings
-) -> LocalisationMap:
+def map_of(points: np.ndarray, name: str, neighbours: int) -> LocalisationMap:
     """Returns a localisation map made of points.
 
     Args:
         points: (M, 3) points in W [m], at least `FEWEST_POINTS`.
         name: name of the map.
-        settings: settings for downsampling and for normals.
+        neighbours: number of points that a normal or a covariance is fitted to.
     """
-    surface = make_surface(points, settings.neighbours)
+    surface = make_surface(points, neighbours)
     return LocalisationMap(name, surface)

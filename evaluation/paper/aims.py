@@ -51,9 +51,7 @@ def aims(
     all other methods on all queries.
     """
     differences = _auc_differences(results)
-    if differences.keys() != {
-        (*key[:3], key[3]) for key in paper().recognitions
-    }:
+    if differences.keys() != {key[:4] for key in paper().recognitions}:
         return []
     pairs = list(dict.fromkeys(key[:3] for key in differences))
     tcr = [
@@ -80,7 +78,7 @@ def aims(
     ]
     of_methods = {
         method: np.array([differences[(*pair, method)] for pair in pairs])
-        for method in dict.fromkeys(key[3] for key in differences)
+        for method in dict.fromkeys(name for *_, name in differences)
     }
     for method, tolerance, share in _AUC_AIMS:
         off = of_methods[method]

@@ -56,10 +56,10 @@ def paper() -> Reference:
         further=[("kaist (real)", "01 ↔ 06", changes[KAIST])],
         recognitions=recognitions,
         protocols={
-            key[3]: replace(
-                PAPER_PROTOCOL, scans_per_place=10 if key[3] == "btc" else 1
+            method: replace(
+                PAPER_PROTOCOL, scans_per_place=10 if method == "btc" else 1
             )
-            for key in recognitions
+            for *_, method, _ in recognitions
         },
     )
 

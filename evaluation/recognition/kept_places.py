@@ -18,7 +18,8 @@ def checked_keep(value: Any, where: str) -> str | int:
     """Returns a value of the field `keep` of an experiment.
 
     Args:
-        value: `all`, `latest`, or a number of places per cell.
+        value: `all`, `latest`, or a number of places per cell, at most
+            1 000 000.
         where: file and field, for errors.
 
     Raises:
@@ -28,7 +29,7 @@ def checked_keep(value: Any, where: str) -> str | int:
     if not (is_number or value in (KEEP_ALL, KEEP_LATEST)):
         raise InputError(
             f"{where}: {value!r} is neither {KEEP_ALL}, {KEEP_LATEST} nor a"
-            " whole number from 1 on"
+            f" whole number from 1 to {_MOST}"
         )
     return value
 

@@ -98,7 +98,7 @@ class Reference:
     @property
     def city_names(self) -> set[str]:
         """Names of the maps with published place recognition."""
-        return {key[0] for key in self.recognitions}
+        return {city for city, *_ in self.recognitions}
 
     def change(self, map_name: str, stages: Sequence[str]) -> float | None:
         """Returns the published TCR_sym of a pair of stages, in any order."""
@@ -139,7 +139,7 @@ class Reference:
         The mode is `all`, or `filtered` for only the queries with a match. For
         a method without published numbers, the mode is `all`.
         """
-        modes = (key[4] for key in self.recognitions if key[3] == method)
+        modes = (mode for *_, name, mode in self.recognitions if name == method)
         return next(modes, "all")
 
     def values(self, result: PlaceOutcome, mode: Mode) -> Published | None:

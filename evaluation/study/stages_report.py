@@ -237,14 +237,7 @@ class StagesReport:
             self.protocol.to_text(),
         ]
         results, _ = self._plan.engine.write_tables()
-        single = {one.name for one in self.recordings}
-        shown = (
-            row
-            for row in results.rows
-            if row.database in single - {row.query}
-            and (row.task == "change" or row.gate == self.protocol.gate)
-        )
-        report.results = Results(results.factors, tuple(shown))
+        report.results = self._shown_rows(results)
         for one in self._plan.cities:
             one.collect(report, on_note)
         if self.protocol.exclude_recent is None:
@@ -260,6 +253,23 @@ class StagesReport:
         for one in self._plan.cities:
             remove_descriptors(one.jobs.values())
         return written
+
+    def _shown_rows(self, results: Results) -> Results:
+        """Returns the rows of a table that the report shows.
+
+        These are rows whose database is a single recording, other than the
+        query. Rows of other tasks than `change` also need geometric
+        verification if the protocol has it, and no verification otherwise.
+        """
+        names = {one.name for one in self.recordings}
+        shown = (
+            row
+            for row in results.rows
+            if row.database in names
+            and row.database != row.query
+            and (row.task == "change" or row.gate == self.protocol.gate)
+        )
+        return Results(results.factors, tuple(shown))
 
 
 def report_on_recordings(

@@ -5,9 +5,10 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 import yaml
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.roads.lane_path import LanePath, Speeds
+from cns_drake.roads.lane_path import LanePath
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
+from cns_drake.roads.speeds import Speeds
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_drives
 

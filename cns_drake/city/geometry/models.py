@@ -1,5 +1,7 @@
 """Models: the shapes, finishes, parts and meshes of a structure."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -64,7 +66,7 @@ class Finish(NamedTuple):
     material: str | None = None
 
     @classmethod
-    def given(cls, value: Any) -> "Finish":
+    def given(cls, value: Any) -> Finish:
         """Reads a finish from a file: a colour, or a material with its colour.
 
         For example `[0.8, 0.7, 0.6]`, or `{brick: [0.5, 0.3, 0.2]}`.
@@ -121,7 +123,11 @@ class Model:
 
     @property
     def num_triangles(self) -> int:
-        """Number of triangles of all parts; 12 for a part without a mesh."""
+        """Number of triangles of all parts.
+
+        A part without a mesh counts as a box of 12 triangles: programs that
+        draw a cylinder or a sphere choose its triangles themselves.
+        """
         return sum(
             self.meshes[part.shape.mesh].num_triangles
             if isinstance(part.shape, MeshShape)
@@ -142,7 +148,8 @@ def part_triangles(
     """Returns the vertices (N, 3) [m] and the triangles (M, 3) of a part.
 
     The vertices are in the structure's frame S; triangles contain indices of
-    vertices. Cylinders and spheres become slightly larger prisms.
+    vertices. Cylinders and spheres become slightly larger prisms, which have
+    sides but no ends.
     """
     mesh = part_mesh(part, meshes)
     return mesh.vertices, mesh.triangles()
@@ -151,8 +158,9 @@ def part_triangles(
 def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     """Returns the mesh of a part, in the structure's frame S [m].
 
-    Cylinders and spheres become slightly larger prisms. `meshes` maps names to
-    meshes. If the part refers to a mesh, `meshes` contains this mesh.
+    Cylinders and spheres become slightly larger prisms, which have sides but no
+    ends. `meshes` maps names to meshes. If the part refers to a mesh, `meshes`
+    contains this mesh.
     """
     shape = part.shape
     scale = np.ones(3)
@@ -185,7 +193,7 @@ def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
 
 
 def _round_mesh(radius: float, length: float) -> Mesh:
-    """Returns a prism that just contains an upright cylinder."""
+    """Returns the sides of a prism that just contains an upright cylinder."""
     angle = 2 * np.pi * np.arange(_ROUND_SIDES) / _ROUND_SIDES
     ring = radius / np.cos(np.pi / _ROUND_SIDES)
     x, y = ring * np.cos(angle), ring * np.sin(angle)

@@ -1,5 +1,7 @@
 """Structures: the named objects of which a city consists."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 import math
@@ -64,7 +66,7 @@ class Structure:
         """Ground area of the model, seen from above, in W [m]."""
         return placed(self.model.footprint, self.xyz[:2], self.yaw)
 
-    def with_origin(self, xyz: tuple[float, float, float]) -> "Structure":
+    def with_origin(self, xyz: tuple[float, float, float]) -> Structure:
         """Returns the same structure with the origin of S elsewhere in W.
 
         `xyz` is the new origin [m]. Only poses in S and the pose of S change:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-import operator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +33,7 @@ from cns_drake.sensors.lidar.ray_queries import (
     cast_exact_rays,
     geometry_ids,
 )
-from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
+from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
 from cns_drake.sensors.lidar.scanner import Scanner
 from cns_drake.sensors.lidar.seen_geometry import (
     GeometryView,
@@ -59,9 +58,9 @@ class Lidar(LeafSystem):
         input_ports:
         - geometry_query
         - geometry (optional)
+        - moving_instances (optional)
         - sweep (optional)
         - frame_poses (optional)
-        - moving_instances (optional)
         - body_spatial_velocities (with `moving_bodies`)
         output_ports:
         - scan
@@ -183,10 +182,14 @@ class Lidar(LeafSystem):
                 is no thread.
         """
         super().__init__()
-        _check_role(role)
-        _check_unseen(unseen or ())
-        if operator.index(num_threads) < 1:
-            raise ValueError(f"num_threads: {num_threads} is less than 1")
+        view = GeometryView(
+            parent_frame_id=parent_frame_id,
+            role=role,
+            unseen=None if unseen is None else frozenset(unseen),
+            structures=structures,
+            anchored_frames=frozenset(anchored_frames),
+            num_threads=num_threads,
+        )
         pattern.check()
         self.parent_frame_id = parent_frame_id
         self.X_PB = RigidTransform(X_PB)
@@ -196,16 +199,7 @@ class Lidar(LeafSystem):
         self._scanner = Scanner(pattern, measurement, returns)
         self._moving_bodies = dict(moving_bodies or {})
         self._declare_inputs(has_velocities=moving_bodies is not None)
-        self._declare_caches(
-            GeometryView(
-                parent_frame_id=parent_frame_id,
-                role=role,
-                unseen=None if unseen is None else frozenset(unseen),
-                structures=structures,
-                anchored_frames=frozenset(anchored_frames),
-                num_threads=num_threads,
-            )
-        )
+        self._declare_caches(view)
         self._declare_outputs()
 
     def _declare_inputs(self, *, has_velocities: bool) -> None:
@@ -549,7 +543,7 @@ class Lidar(LeafSystem):
         scan = self._measured.Eval(context).points
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]])
         greys = self._scanner.greys(scan["intensity"])
-        _set_points(output.get_mutable_value(), p_SRset, greys)
+        set_points(output.get_mutable_value(), p_SRset, greys)
 
     def _calc_point_cloud_W(
         self, context: Context, output: AbstractValue
@@ -563,51 +557,7 @@ class Lidar(LeafSystem):
         p_SRset_W = np.einsum("nij,nj->ni", R_WSset[pose], p_SRset)
         p_WRset = (p_WSset[pose] + p_SRset_W).T
         greys = self._scanner.greys(scan["intensity"])
-        _set_points(output.get_mutable_value(), p_WRset, greys)
-
-
-def _set_points(
-    cloud: PointCloud, p_FRset: np.ndarray, greys: np.ndarray
-) -> None:
-    """Sets the points of a cloud.
-
-    Args:
-        cloud: the cloud, with or without colours.
-        p_FRset: (3, N) positions in any frame F [m].
-        greys: (N,) brightness of the points, from 0 to 255.
-    """
-    cloud.resize(p_FRset.shape[1])
-    cloud.mutable_xyzs()[:] = p_FRset
-    if cloud.has_rgbs():
-        cloud.mutable_rgbs()[:] = np.rint(np.clip(greys, 0.0, 255.0))
-
-
-def _check_role(role: Role) -> None:
-    """Checks that a role is a role of geometry.
-
-    Raises:
-        TypeError: the role is another object.
-    """
-    if not isinstance(role, Role) or role == Role.kUnassigned:
-        raise TypeError(
-            f"role: {role!r} is not a role of geometry; give "
-            "Role.kPerception, Role.kIllustration or Role.kProximity of "
-            "pydrake.geometry"
-        )
-
-
-def _check_unseen(unseen: Collection[FrameId | GeometryId]) -> None:
-    """Checks that the elements of `unseen` are frames or geometries.
-
-    Raises:
-        TypeError: an element is of another type.
-    """
-    for place in unseen:
-        if not isinstance(place, FrameId | GeometryId):
-            raise TypeError(
-                f"unseen: {place!r} is not a FrameId or GeometryId; "
-                "add_lidar also takes a RigidBody or Frame"
-            )
+        set_points(output.get_mutable_value(), p_WRset, greys)
 
 
 def _eval_seen(entry: CacheEntry, context: Context) -> SeenGeometry:

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from pydrake.perception import PointCloud
 
 from cns_drake.base.compiled import compiled
 from cns_drake.sensors.lidar.beams import Beams
@@ -146,3 +147,19 @@ def assemble_points(
             geometry = np.uint64(met[k])
             point.label = label[geometry]
             point.instance = instance[geometry]
+
+
+def set_points(
+    cloud: PointCloud, p_FRset: np.ndarray, greys: np.ndarray
+) -> None:
+    """Sets the points of a cloud of Drake.
+
+    Args:
+        cloud: the cloud, with or without colours.
+        p_FRset: (3, N) positions in any frame F [m].
+        greys: (N,) brightness of the points, from 0 to 255.
+    """
+    cloud.resize(p_FRset.shape[1])
+    cloud.mutable_xyzs()[:] = p_FRset
+    if cloud.has_rgbs():
+        cloud.mutable_rgbs()[:] = np.rint(np.clip(greys, 0.0, 255.0))

@@ -53,6 +53,11 @@ class GeometryView:
             ids in alphabetical order.
         anchored_frames: frames that never move, besides the frame of the world.
         num_threads: number of threads that share the rays.
+
+    Raises:
+        TypeError: the role is no role of geometry, `unseen` has an element of
+            another type, or the number of threads is no integer.
+        ValueError: there is no thread.
     """
 
     parent_frame_id: FrameId
@@ -61,6 +66,22 @@ class GeometryView:
     structures: Structures | None
     anchored_frames: frozenset[FrameId]
     num_threads: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.role, Role) or self.role == Role.kUnassigned:
+            raise TypeError(
+                f"role: {self.role!r} is not a role of geometry; give "
+                "Role.kPerception, Role.kIllustration or Role.kProximity of "
+                "pydrake.geometry"
+            )
+        for place in self.unseen or ():
+            if not isinstance(place, FrameId | GeometryId):
+                raise TypeError(
+                    f"unseen: {place!r} is not a FrameId or GeometryId; "
+                    "add_lidar also takes a RigidBody or Frame"
+                )
+        if operator.index(self.num_threads) < 1:
+            raise ValueError(f"num_threads: {self.num_threads} is less than 1")
 
 
 class SeenGeometry:

@@ -1,5 +1,7 @@
 """Batches of queries and places, sampled from the scans of random cities."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -66,7 +68,7 @@ class TrainingScans:
     overlaps: np.ndarray | None = None
 
     @classmethod
-    def joined(cls, parts: Sequence["TrainingScans"]) -> "TrainingScans":
+    def joined(cls, parts: Sequence[TrainingScans]) -> TrainingScans:
         """Joins the scans of several cities into one object.
 
         Args:

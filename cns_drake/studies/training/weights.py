@@ -1,5 +1,7 @@
 """Makes a file of weights for the method `learned`."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 import json
@@ -57,7 +59,7 @@ class TrainingPlan:
     graded: bool = False
 
     @classmethod
-    def of_minutes(cls, minutes: float, **fields: Any) -> "TrainingPlan":
+    def of_minutes(cls, minutes: float, **fields: Any) -> TrainingPlan:
         """Returns a plan that takes about the given minutes on one core."""
         cities = max(2, round(_CITIES_A_MINUTE * minutes))
         steps = max(10, round(_STEPS_A_MINUTE * minutes))

@@ -301,7 +301,9 @@ def localise_among_others(
             continue
         around = np.flatnonzero(apart < _AROUND).tolist()
         mapped = map_drive(drive, Settings.voxel, frames=around)
-        surroundings = map_of(mapped.centroids_W, drive.name, Settings())
+        surroundings = map_of(
+            mapped.centroids_W, drive.name, Settings.neighbours
+        )
         stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
         ends = iter(found)
         for estimator, settings in made:

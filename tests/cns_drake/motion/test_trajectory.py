@@ -16,7 +16,8 @@ import pytest
 
 from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.roads.lane_path import LanePath, Speeds
+from cns_drake.roads.lane_path import LanePath
+from cns_drake.roads.speeds import Speeds
 
 
 def motion(trajectory, t):

@@ -11,9 +11,10 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.roads.car_outline import swept_area
 from cns_drake.roads.centreline import Centreline
-from cns_drake.roads.lane_path import POINT_SPACING, Speeds
+from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
+from cns_drake.roads.speeds import Speeds
 from cns_drake.roads.u_turn import LOOP_RADIUS, TIGHTEST_RADIUS, loop_corners
 from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive

@@ -7,7 +7,8 @@ import pytest
 
 from cns_drake.motion.speed_profile import KNOT_PERIOD
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.roads.lane_path import LanePath, Speeds
+from cns_drake.roads.lane_path import LanePath
+from cns_drake.roads.speeds import Speeds
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.sections import DriverConfig, TrafficConfig

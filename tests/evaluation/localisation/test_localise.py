@@ -76,7 +76,7 @@ def street(seed=0, *, ends=True, density=4.0):
 
 
 def localiser(points, method, settings=EXACT):
-    place = map_of(points, "map", settings)
+    place = map_of(points, "map", settings.neighbours)
     return Localiser(place, make_estimator(method, settings), settings)
 
 
@@ -256,7 +256,7 @@ def test_covariance_of_planes_in_closed_form():
         sheet((-1.0, -1.0, -1.0), (2, 0, 0), (0, 0, 2), 2, 200.0),
         sheet((-1.0, -1.0, -1.0), (0, 2, 0), (0, 0, 2), 3, 100.0),
     ]
-    surface = map_of(np.concatenate(parts), "map", Settings()).surface
+    surface = map_of(np.concatenate(parts), "map", Settings.neighbours).surface
     middles = np.concatenate(
         [part[(np.abs(part) < 0.8).sum(axis=1) == 2] for part in parts]
     )
@@ -462,7 +462,7 @@ def test_auroc_of_scores():
 
 def test_an_end_without_a_pose_is_a_failure():
     found = Localiser(
-        map_of(street(), "map", EXACT),
+        map_of(street(), "map", EXACT.neighbours),
         lambda *_: Estimate(None, -math.inf),
         EXACT,
     )

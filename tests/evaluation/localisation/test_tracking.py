@@ -51,7 +51,7 @@ class Line:
 
 
 def follow(line, estimator, drift=0.0, mapped=None, starts=None):
-    place = map_of(CLOUD, "map", Settings())
+    place = map_of(CLOUD, "map", Settings.neighbours)
     found = Localiser(place, estimator, Settings())
     mapped = np.ones(len(line), bool) if mapped is None else mapped
     starts = Starts(0.5, 0.0) if starts is None else starts

@@ -35,6 +35,8 @@ _NUM_GUESSES = 5
 # Extent of the points of a scan along each axis [m].
 _MAX_RANGE = 100.0
 _SEED = 11
+# Number of times that a guess is fitted again to the pairs that agree with it.
+_REFINEMENTS = 3
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         if votes[best] < 2:
             break
         pairs = agreement[best] & is_left
-        for _ in range(3):
+        for _ in range(_REFINEMENTS):
             turn, move = _fit_turn_and_move(candidates, pairs)
             agreeing = _agree(candidates, turn, move)
             if not agreeing.any():

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.poses import yaw_pose
-from evaluation.alignment.anchor_search import Candidates, find_guesses
+from evaluation.alignment.pose_guesses import Candidates, find_guesses
 
 
 def make_candidates(X_TS, right, wrong, seed=1, drift=0.0):

@@ -1,0 +1,18 @@
+"""Texts that several commands print."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cns_drake.base.terminal import number
+
+if TYPE_CHECKING:
+    from evaluation.recognition.bootstrap import Interval
+
+# Note on a cloud, after the number of points.
+NOT_FINITE = "points are not finite, and left out"
+
+
+def interval_text(interval: Interval) -> str:
+    """Returns an interval as text in brackets."""
+    return f"[{number(interval.low)}, {number(interval.high)}]"
