@@ -48,7 +48,7 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 def find_speed_profile(
     path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
-    """Returns the fastest drive along a path within all limits.
+    """Returns the fastest drive within all limits along a path.
 
     The drive starts and ends at rest. The acceleration is piecewise constant.
 

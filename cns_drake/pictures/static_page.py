@@ -58,9 +58,9 @@ def make_static_page(
 ) -> str:
     """Returns a Meshcat scene as a web page that needs no server.
 
-    The page is that of Drake, but with compressed commands, so that a city
-    takes a third of the space. Browsers can decompress such commands since
-    2023.
+    The page is Drake's page with compressed commands, so that a city takes a
+    third of the space. Browsers have been able to decompress such commands
+    since 2023.
 
     Args:
         meshcat: the server with the scene.

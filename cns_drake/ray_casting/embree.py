@@ -118,10 +118,9 @@ def load() -> ctypes.CDLL:
 class PacketFunction(types.WrapperAddressProtocol):
     """A C function that casts a packet of rays, for compiled code.
 
-    The function takes four addresses: those of the mask of active rays, of the
-    scene, of the packet and of the arguments. Unlike a ctypes function, it can
-    be an argument of a compiled function whose machine code numba keeps on
-    disk.
+    The function takes the addresses of four things: the mask of active rays,
+    the scene, the packet and the arguments. Unlike a ctypes function, it can be
+    an argument of a compiled function whose machine code numba keeps on disk.
     """
 
     def __init__(self, function: object):

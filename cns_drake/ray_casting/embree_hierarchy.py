@@ -116,7 +116,8 @@ class EmbreeHierarchy:
     def place(self, placed: Placed) -> None:
         """Moves the groups in sight to their poses, and disables all others.
 
-        Fewer groups are faster to build and to cast rays on.
+        The fewer groups are enabled, the faster the hierarchy is rebuilt, and
+        the faster rays are cast on it.
         """
         lib = self._lib
         places = np.ascontiguousarray(placed.X_OLs, np.float32)
@@ -340,9 +341,9 @@ def _release_scenes(
 def _decompose_motion(group: RayGroup) -> np.ndarray:
     """Returns the poses of a moving group at evenly spaced times.
 
-    Embree turns from one orientation to the next at a constant rate about F's
-    origin, which moves in a straight line. That is the motion of a frame with
-    constant velocities.
+    Embree rotates F from one orientation to the next at a constant rate about
+    F's origin, which moves in a straight line. That is the motion of a frame
+    with constant velocities.
 
     Returns:
         (T, 16) float32, an RTCQuaternionDecomposition each: 3 scales, 3

@@ -92,9 +92,10 @@ def _entry_distance(
 ) -> float:
     """Returns the distance at which a ray enters a node's box [m].
 
-    It is infinite if the ray does not enter the box before a limit. `p` is the
-    ray's origin, and `r` the reciprocal of its direction; where that is
-    infinite, comparisons with NaN let the ray pass, which only costs time.
+    The distance is infinite if the ray does not enter the box before a limit.
+    `p` is the ray's origin, and `r` is the reciprocal of the ray's direction.
+    Where `r` is infinite, comparisons with NaN let the ray pass, which only
+    costs time.
     """
     near, far = 0.0, limit
     for axis in range(3):

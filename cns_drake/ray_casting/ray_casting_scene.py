@@ -76,9 +76,9 @@ class RayCastingScene:
             calc_X_WF: returns the pose of a frame.
             num_threads: threads that share the rays of a cast; hits do not
                 depend on it.
-            previous: a scene of similar geometry, which is replaced: its parts
-                are reused where the surfaces are still the same objects. None
-                to build all anew.
+            previous: a scene of similar geometry, which the new scene replaces.
+                Parts of the previous scene are reused where the surfaces are
+                still the same objects. None to build all anew.
             p_WS: (3,) position of the sensor in the world [m]; None if it is
                 not known.
         """

@@ -95,7 +95,7 @@ class RayGroup:
             revolution; missing until `place` is called.
         motion: motion of F during the revolution; None if F does not move.
         in_sight: whether rays can meet the group. If rays cannot meet the
-            group, `X_OL` and `motion` are those of an earlier revolution.
+            group, `X_OL` and `motion` are from an earlier revolution.
     """
 
     frame_id: FrameId | None

@@ -15,7 +15,7 @@ from cns_drake.base.compiled import compiled
 class Rays(NamedTuple):
     """N rays, cast from one or several poses of a sensor S.
 
-    O is the frame of the scene: its axes are those of the world, and its origin
+    O is the frame of the scene: its axes are the world's axes, and its origin
     is near enough to the sensor for float32 to be precise. Ray i has direction
     i. In all other arrays, entry i mod n belongs to ray i, where n is the
     length of the array.

@@ -183,8 +183,9 @@ class McapRecorder(LeafSystem):
             further: name -> further sensor.
             layouts: LiDAR name -> name of the layout of its recorded points; by
                 default `cns`.
-            num_rings: LiDAR name -> number of its rings. With it, the layout
-                `velodyne` counts rings from the lowest.
+            num_rings: LiDAR name -> number of its rings. For a LiDAR in this
+                mapping, the layout `velodyne` counts rings from the lowest
+                ring.
             calibrated: names of the LiDARs with calibrated intensities, from 0
                 to 255.
             imu_variances: variances of specific force [m^2/s^4] and of

@@ -119,8 +119,9 @@ class RoadNetwork:
     def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
         """Returns whether the second of two lanes that meet leads back.
 
-        Both lanes are on the same road, or on two roads that are the separate
-        directions of one road, such as before a roundabout.
+        The second lane leads back if it is the opposite direction of the first
+        lane's road. It also leads back if the lanes are on two roads that are
+        the separate directions of one road, such as before a roundabout.
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction

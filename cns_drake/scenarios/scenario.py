@@ -418,10 +418,11 @@ class Scenario(Section):
         """Returns the scenario with another driver.
 
         Args:
-            driver: `real` for a driver who wanders and changes lanes as in
-                published drives (along waypoints, which have no lanes, the
-                driver only wanders), with the scenario's seed of the driver;
-                `none` for a driver who stays in the middle of the lane.
+            driver: `none` for a driver who stays in the middle of the lane, or
+                `real` for a driver who wanders and changes lanes as in
+                published drives. Along waypoints, which have no lanes, the
+                driver `real` only wanders. The seed of the driver stays the
+                same.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())

@@ -41,7 +41,7 @@ def make_scenario(values: dict, source: object) -> Scenario:
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:
-    """Returns the scenario of a shipped drive, or from a file.
+    """Returns the scenario of a shipped drive, or the scenario in a file.
 
     Raises:
         InputError: there is no such drive or file, or the file is not a

@@ -19,8 +19,8 @@ from cns_drake.scene.map_folder import MapFolder, drive_name
 def worlds_folder() -> Path:
     """Returns the folder of shipped maps.
 
-    In a source checkout it is the folder next to the package. In a wheel it is
-    an archive, which is unpacked to the user's cache.
+    In a source checkout, this is the folder next to the package. A wheel
+    contains the maps as an archive, which is unpacked to the user's cache.
 
     Raises:
         InputError: if the cache cannot be written.

@@ -29,7 +29,7 @@ class FileWatch:
     def changed(self) -> str | None:
         """Returns the path of a file that has changed; None if none has.
 
-        Only files count whose status was recorded by `FileWatch.record`.
+        Only files whose status `FileWatch.record` has recorded count.
         """
         for path, stamp in self._stamps.items():
             if _stamp(_status(path)) != stamp:

@@ -2,10 +2,10 @@
 
 Each part of a structure has a material. The structure table can name the
 material of a part; otherwise the part has the usual material of the structure's
-class. Reflectivities of diffuse materials are those of the ECOSTRESS spectral
-library (Meerdink et al., 2019) near 0.9 um, rounded; those of markings, signs
-and plates follow from the minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at
-30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
+class. Reflectivities of diffuse materials are the rounded values of the
+ECOSTRESS spectral library (Meerdink et al., 2019) near 0.9 um. Reflectivities
+of markings, signs and plates follow from the minimum coefficients of EN 1436
+(R_L 150 mcd/m2/lx at 30 m) and EN 12899-1 (class RA1, 70 cd/lx/m2), times pi.
 """
 
 from pathlib import Path

@@ -24,9 +24,10 @@ class ModelFinder:
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
         """Determines the folders to search.
 
-        These are, in order of precedence: the given ones, those of the
-        environment variables, the world's folder, its parent folder, and the
-        folder `models` in both.
+        The folders are, in order of precedence: `model_paths`; the folders that
+        the environment variables name; the world's folder and its subfolder
+        `models`; the parent of the world's folder and the parent's subfolder
+        `models`.
 
         Args:
             world: SDF file of the world.

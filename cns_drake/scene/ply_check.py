@@ -32,8 +32,8 @@ class _Element:
     Attributes:
         name: name of the element.
         count: number of its rows.
-        properties: name and type of each value of a row. A list has two types,
-            those of its length and of its values.
+        properties: name and type of each value of a row. A list has two types:
+            the type of its length and the type of its values.
     """
 
     name: str
@@ -54,8 +54,8 @@ def check_ply(content: bytes) -> tuple[str, ...]:
     """Returns notes on ignored elements of a PLY file, one for each kind.
 
     Raises:
-        ValueError: surfaces in the file would not be read, such as triangle
-            strips, or be wrong.
+        ValueError: surfaces in the file, such as triangle strips, would not be
+            read, or would be wrong.
     """
     head, found, body = content.partition(b"end_header")
     if not found or len(head) > _LONGEST_HEADER:

@@ -24,7 +24,7 @@ def structure_name(geometry_name: str, *, is_scoped: bool = False) -> str:
 
 
 def part_name(geometry_name: str) -> str:
-    """Returns the name of the part of a structure that a geometry is.
+    """Returns the name of a geometry as a part of its structure.
 
     A visual named `tower_017/storey_03` is the part `storey_03`; a visual
     without a slash is a part with the visual's name.

@@ -29,7 +29,7 @@ class TriangleSurface:
 
 @dataclass(frozen=True)
 class EllipsoidSurface:
-    """An ellipsoid (or sphere) centred on G, with its axes along those of G.
+    """An ellipsoid (or sphere) centred on G, with its axes along the axes of G.
 
     Attributes:
         semi_axes: half lengths along x, y and z [m].

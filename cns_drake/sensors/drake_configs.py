@@ -52,9 +52,9 @@ _RATE = 20
 class LidarConfig:
     """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
 
-    Most fields are the same as those of a LiDAR in a scenario. Unlike in a
-    scenario, coordinates are not rounded by default, and the default rate is
-    the rate of the data sheet.
+    Most fields are the same as for a LiDAR in a scenario. Unlike in a scenario,
+    coordinates are not rounded by default, and the default rate is the rate of
+    the data sheet.
 
     Attributes:
         name: name of the system; the channel is `DRAKE_POINT_CLOUD_<name>`.
@@ -83,7 +83,7 @@ class LidarConfig:
             than a revolution. The message keeps the time of the capture. The
             ports of the `Lidar` are not delayed.
         returns: `ideal` or `calibrated`.
-        echoes: which echoes of a beam calibrated returns report.
+        echoes: which echoes of a beam are reported, with calibrated returns.
         unit_seed: seed of the errors that this individual unit has, in
             calibrated returns.
         seed: seed of the noise.

@@ -166,7 +166,8 @@ def _shot_times(
 ) -> np.ndarray:
     """Returns the times (N,) of the images of a shot [s].
 
-    If `start` is None, the shot begins where the car gets farthest during it.
+    If `start` is None, the shot begins at the time from which the car gets
+    farthest in a straight line before the shot ends.
 
     Raises:
         InputError: the start is not within the drive.

@@ -246,8 +246,9 @@ def _pose_at_odometry(
 def _recorded_camera(camera: RgbdSensor) -> RecordedCamera:
     """Returns how a camera is recorded: its intrinsics and its pose.
 
-    Intrinsics and pose are those of colour and label images. Depth images have
-    their own only if they differ.
+    These are the intrinsics and the pose of colour and label images. Depth
+    images have an entry of their own only if their intrinsics or pose differ
+    from these.
     """
     color, depth = (
         RecordedCamera(core.intrinsics(), core.sensor_pose_in_camera_body())

@@ -65,7 +65,7 @@ class SimulationSource:
 
 
 class SimulatedDrive(Drive):
-    """A drive whose scans are simulated, and equal those of a recording.
+    """A drive whose scans are simulated, and are the same as in a recording.
 
     Each access to a scan simulates it.
 
@@ -165,7 +165,7 @@ class SimulatedDrive(Drive):
     def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
         """Returns the world as a scene for ray casting, and the pose X_WS.
 
-        Scene and pose are those at the time stamp of scan `index`; X_WS is the
+        Scene and pose are valid at the time stamp of scan `index`; X_WS is the
         pose of the LiDAR. The scene is valid until the next call of `look` or
         `scan`.
         """

@@ -64,8 +64,9 @@ def make_station(
     adds a port of its name.
 
     Args:
-        drive: the scenario to build; or the scenario as `load_drive` returns
-            it; the Diagram then takes over the SceneGraph of the loaded world.
+        drive: the scenario to build, or the result of `load_drive` for this
+            scenario. In the second case, the Diagram takes over the SceneGraph
+            of the loaded world.
         bag: open recording with the scenario's topics, if any.
         page: recorder of a web page of the same world, if any.
         num_threads: number of threads that cast the rays of a LiDAR.

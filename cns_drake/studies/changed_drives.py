@@ -58,8 +58,9 @@ class Ageing(NamedTuple):
 class DriveChanger:
     """Changes the drives of a map.
 
-    The fields of a drive are those of its scenario, and fields such as
-    `viewpoint` or `missing`, which this class turns into fields of a scenario.
+    The fields of a drive are the fields of its scenario, and further fields
+    such as `viewpoint` or `missing`. This class turns the further fields into
+    fields of a scenario.
     """
 
     def __init__(

@@ -136,7 +136,7 @@ def _check_paths_differ(
 def _changed_paths(
     place: str, fields: Iterable[tuple[str, Any]], taken: Set[str]
 ) -> set[str]:
-    """Returns the paths that are taken, and those that fields change.
+    """Returns the taken paths, together with the paths that fields change.
 
     Args:
         place: the beginning of the fields' paths, for the error message.

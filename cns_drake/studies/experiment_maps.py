@@ -83,7 +83,7 @@ class ExperimentMaps:
         """Yields the pairs of all maps; makes aged and imported maps.
 
         Args:
-            maps: names or folders of maps that replace those of the experiment.
+            maps: names or folders of maps that replace the experiment's maps.
 
         Raises:
             InputError: a map cannot be used, or two maps or drives have the

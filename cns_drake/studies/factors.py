@@ -33,8 +33,8 @@ def split_values(
         above: names of the fields that contain these, for their paths.
 
     Raises:
-        ValueError: a path, or a value of a factor, is there twice; or as by
-            `leaves`.
+        ValueError: a path, or a value of a factor, occurs twice; or a field is
+            wrong, see `leaves`.
     """
     single: dict[str, Any] = {}
     varied: dict[str, list[Any]] = {}

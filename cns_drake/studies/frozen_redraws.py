@@ -1,10 +1,11 @@
 """Frozen redraws: redrawn cities that stay the same in all releases.
 
-Frozen redraws are redraws of the shipped maps that were not used to develop any
-method. They also have the map's stages, and the map's drives with realistic
-drivers. Some frozen redraws are rotated as a whole, so that their streets are
-not parallel to the axes of the world. `worlds/redraws.csv` contains the seeds
-and rotations, which were chosen at random before any method ran.
+A frozen redraw is a redraw of a shipped map. No method was developed with the
+help of a frozen redraw. A frozen redraw also has the map's stages, and the
+map's drives with realistic drivers. Some frozen redraws are rotated as a whole,
+so that their streets are not parallel to the axes of the world.
+`worlds/redraws.csv` contains the seeds and rotations, which were chosen at
+random before any method ran.
 """
 
 from collections.abc import Mapping, Sequence
@@ -165,7 +166,8 @@ def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns `stages.yaml` with only the structures that a new city has.
 
     The file was written for the original city. Rows of a redrawn city can
-    consist of fewer houses. Groups that lose all their structures are left out.
+    consist of fewer houses than the original rows. Groups that lose all their
+    structures are left out.
 
     Args:
         stages: the content of the file.

@@ -54,7 +54,7 @@ class ExportOptions:
 
     Attributes:
         format: program that reads the data: `pointnetvlad`, or `overlap` for
-            OverlapNet and its like.
+            OverlapNet and similar programs.
         spacing: distance between two clouds, along the path [m].
         scans: number of consecutive scans that are merged into a cloud.
         max_range: largest absolute x, y and z of a point [m]; points beyond

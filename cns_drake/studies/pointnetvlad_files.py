@@ -73,7 +73,7 @@ def write_pickles(
         on_note: is called with notes on clouds and cities that are of no use.
 
     Returns:
-        The pickles that cover all drives; those of single cities are not
+        The pickles that cover all drives; pickles of single cities are not
         listed.
     """
     contents: dict[str, Any] = {}
@@ -106,8 +106,8 @@ def _locations(
     """Returns the drives of each location of MinkLoc3Dv2's evaluation.
 
     A location is a city; if there are fewer cities than locations, some cities
-    occur twice. The evaluation divides by the number of pairs of drives, and
-    for each of these by the number of queries with a match. Cities where one of
+    occur twice. The evaluation divides by the number of pairs of drives and,
+    for each pair, by the number of queries with a match. Cities where one of
     these numbers is 0 are left out, with a note. If no city is left, there is
     no location.
     """

@@ -22,7 +22,8 @@ def session_fields(
 ) -> dict[str, dict[str, Any]]:
     """Returns place in the file -> fields, for each drive of a database.
 
-    Each drive has the fields of the database; its own ones replace them.
+    Each drive has the fields of the database. A field of the drive's own
+    replaces the same field of the database.
 
     Args:
         database: fields of the database.

@@ -87,7 +87,7 @@ def run_study(
         experiment: the experiment.
         output: folder of the results.
         cluster: does the work.
-        maps: maps that replace those of the experiment.
+        maps: maps that replace the experiment's maps.
         source: file of the experiment, for errors.
         on_note: is called with notes on what is left out, and on how long the
             study takes.
@@ -235,10 +235,12 @@ class Study:
     def _wanted_tasks(self) -> Mapping[str, Mapping[str, Any]]:
         """Returns the experiment's tasks with their settings.
 
-        If a database has several drives, what it costs belongs to the answer.
+        If a database has several drives, a study of place recognition also
+        measures the cost of the methods.
 
         Raises:
-            InputError: a task compares two drives, but the database has more.
+            InputError: a task compares exactly two drives, but the database has
+                several.
         """
         wanted = self.experiment.tasks
         if not any(map(_has_several, self._conditions)):
@@ -261,8 +263,8 @@ class Study:
         """Returns the engine with all pairs in all conditions.
 
         Raises:
-            InputError: there is nothing to measure, or a drive is not the one
-                that is frozen.
+            InputError: there is nothing to measure, or a drive differs from the
+                frozen drive.
         """
         engine = Engine(
             self.experiment.name,

@@ -203,7 +203,7 @@ def _traced_objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
     """Returns the vehicles or persons, by the tag of their elements.
 
     Raises:
-        ValueError: one lacks a value, or is there twice at the same time.
+        ValueError: an object lacks a value, or occurs twice at the same time.
     """
     found: dict[str, list[tuple[float, ...]]] = {}
     types: dict[str, str] = {}
@@ -240,8 +240,8 @@ def _without_jumps(
 ) -> tuple[TracedObject, ...]:
     """Returns objects without the steps that are too fast for their kind.
 
-    An object that jumps ends there, and another one with the same name begins.
-    A text on each jump is added to `jumps`.
+    An object that jumps ends before the jump, and another object of the same
+    name begins after the jump. A text on each jump is added to `jumps`.
 
     Args:
         objects: vehicles or persons.

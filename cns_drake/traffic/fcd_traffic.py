@@ -119,7 +119,7 @@ def _extent(places: np.ndarray) -> str:
 
 
 def _at_map_heights(trace: FcdTrace, heights: LaneHeights) -> FcdTrace:
-    """Returns a trace whose heights begin at the same zero as the map's.
+    """Returns a trace whose heights have the same zero as the map's heights.
 
     A trace without heights stays as it is.
     """

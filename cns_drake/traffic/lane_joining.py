@@ -180,8 +180,8 @@ def _ways(
 ) -> Iterator[tuple[tuple[int, ...], int]]:
     """Yields short lanes that follow a lane, and the long lane behind.
 
-    There is one way to each long lane: the first of those with the fewest short
-    lanes.
+    Each long lane is reached in one way: the first of the ways with the fewest
+    short lanes.
     """
     waiting: list[tuple[int, ...]] = [()]
     reached: set[int] = set()

@@ -282,7 +282,7 @@ def _duration(distance: float, v: float, a: float, pace: float) -> float:
 def _serve_crossing(traffic: Traffic, c: int, k: int, last: int) -> int:
     """Opens a crossing for pedestrians once earlier vehicles have passed.
 
-    `last` is the highest `order` so far; the result is the new one.
+    `last` is the highest `order` so far; the result is the new highest `order`.
     """
     streets, cars = traffic.streets, traffic.cars
     one = traffic.crossings[c]
@@ -394,8 +394,8 @@ def _is_ready(streets: Streets, car: Any, k: int) -> bool:
 def _has_room(traffic: Traffic, i: int, k: int) -> bool:
     """Returns whether there is room behind the i-th vehicle's way.
 
-    If there has been none for some time, the vehicle draws another way; see
-    `grant_ways`.
+    If there has been no room for some time, the vehicle samples another way;
+    see `grant_ways`.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]

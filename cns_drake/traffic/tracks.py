@@ -52,8 +52,9 @@ class Tracks:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns coordinates at steps (...), and whether bodies are there.
 
-        The coordinates are (..., N, D), and the second array fits them. No body
-        is there before the first step and after the last one.
+        The coordinates are (..., N, D). The second array is bool, and has the
+        same number of axes. No body is there before the first step or after the
+        last step.
         """
         row = np.clip(k, 0, len(self.values) - 1)
         there = (k == row)[..., None]
@@ -74,8 +75,8 @@ class Tracks:
     def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, ...]:
         """Returns each time's interval, its place there, and the steps beyond.
 
-        Steps beyond are those before the first time or after the last. Place
-        and steps have two more axes than the times.
+        A step is beyond if it lies before the first time or after the last
+        time. Place and steps have two more axes than the times.
         """
         last = len(self.values) - 1
         steps = np.asarray(t, float) / self.dt

@@ -43,7 +43,7 @@ def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
 
 
 def flows(graph: LaneGraph) -> np.ndarray:
-    """Returns (P,) the share of vehicles on each piece, over a long time.
+    """Returns the share (P,) of vehicles on each piece, over a long time.
 
     At each junction, vehicles choose any way, with the shares of `way_shares`.
     """

@@ -89,7 +89,7 @@ class TrafficMotion(LeafSystem):
             bodies: the vehicles of the plan, and then its pedestrians.
             source_id: geometry source of the bodies.
             turn: time over which the output `body_spatial_velocities` is
-                averaged [s]: the duration of a LiDAR's turn.
+                averaged [s]: the duration of a LiDAR's revolution.
         """
         super().__init__()
         self.source_id = source_id
@@ -312,7 +312,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects traffic to a LiDAR, which then labels its bodies as moving.
+    """Connects traffic to a LiDAR, which then labels the bodies as moving.
 
     Args:
         builder: builder of a diagram with both systems.

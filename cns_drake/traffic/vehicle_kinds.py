@@ -13,9 +13,9 @@ from cns_drake.base.yaml_files import parse_yaml
 class VehicleKind:
     """A kind of vehicle.
 
-    The driving parameters are those of the Intelligent Driver Model: Treiber,
-    Hennecke, Helbing, "Congested traffic states in empirical observations and
-    microscopic simulations", Phys. Rev. E 62 (2000).
+    The driving parameters are the parameters of the Intelligent Driver Model:
+    Treiber, Hennecke, Helbing, "Congested traffic states in empirical
+    observations and microscopic simulations", Phys. Rev. E 62 (2000).
 
     Attributes:
         name: name of the kind, with which the names of the kind's meshes begin.

@@ -112,7 +112,7 @@ class GroundSurface:
         return float(z.min()) if len(z) else default
 
     def rise(self, old: np.ndarray, new: np.ndarray) -> float:
-        """Returns the height of the ground at `new` minus that at `old` [m].
+        """Returns the rise of the ground from `old` to `new` [m].
 
         The result is 0 if there is no ground at one of these places.
 

@@ -12,10 +12,10 @@ _TWIGS = 0.1
 
 
 def thin_leaves(around: Surroundings, share: float) -> None:
-    """Removes the leaves of all vegetation except for a share of them.
+    """Removes all leaves of vegetation, except for a share of them.
 
-    Plants with the same mesh lose the same leaves of it, but look different
-    because they are turned and scaled.
+    Plants with the same mesh lose the same leaves of the mesh. These plants
+    still look different, because each plant is rotated and scaled.
     """
     changed = False
     for plant in around.of_classes({"vegetation"}):

@@ -72,7 +72,7 @@ class Surroundings:
         """Returns the areas where new objects must not stand.
 
         The result contains the area `kept_free` and the footprints of all
-        structures except those of the classes `ignored`.
+        structures except structures of the classes `ignored`.
         """
         return self._obstacles(
             one

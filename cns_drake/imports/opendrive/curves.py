@@ -108,7 +108,8 @@ class Cubic:
         """Prepares the arc length.
 
         Args:
-            u, v: four coefficients of each coordinate, that of p^0 first [m].
+            u, v: four coefficients of each coordinate, beginning with the
+                coefficient of p^0 [m].
             last: p at the end.
             length: length of the curve in the file [m].
             by_parameter: whether p is the distance along the curve.

@@ -102,7 +102,7 @@ class ImportedStreets:
 def _areas_by_kind(
     bands: Sequence[LaneBand],
 ) -> tuple[defaultdict[str, list[BaseGeometry]], list[BaseGeometry]]:
-    """Returns the areas of lanes by kind, and those at road level in junctions.
+    """Returns areas of lanes by kind, and areas at road level in junctions.
 
     The kinds are the semantic classes of lanes at road level, `walk` and
     `median` for lanes above a kerb, and `margins` for lanes without a use.

@@ -129,9 +129,10 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
 
 
 def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3): flat ones at the heights of a quad [m].
+    """Returns flat triangles, raised to the heights of a quad, (M, 3, 3) [m].
 
-    `flat` is (M, 3, 2), and `quad` (4, 3).
+    `flat` (M, 3, 2) contains x and y of the triangles' corners, and `quad` (4,
+    3) contains the quad's corners.
     """
     middle = quad.mean(axis=0)
     slope = np.linalg.lstsq(
@@ -225,7 +226,7 @@ def _painted_quads(
         marks: marks on the border, one after the other.
         side: positive if the left of the border is outwards.
         end: where the last mark ends [m].
-        carriageway: area that marks do not leave; None for none.
+        carriageway: area to which marks are limited; None for no limit.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]

@@ -101,7 +101,7 @@ class Cubics:
         """Returns which distances have a piece (N,), and these pieces.
 
         A piece is given by the distance from its start to `s` (N,) [m], and by
-        its coefficients (N, 4), of ds^0 first.
+        its coefficients (N, 4), beginning with the coefficient of ds^0.
         """
         if not self:
             return np.zeros(len(s), bool), s, np.zeros((len(s), 4))

@@ -105,7 +105,8 @@ def _check_ids(elements: Iterable[Element]) -> None:
     """Checks that all elements of a kind have different ids.
 
     Raises:
-        ValueError: naming id and lines, if two are the same.
+        ValueError: two elements have the same id; the message names the id and
+            the lines.
     """
     lines: dict[str, int] = {}
     for one in elements:

@@ -94,8 +94,8 @@ def build_town(
         source: the file.
         options: `seed` of all random draws; `dressed`: whether to paint the
             road marks of the file; `grow`: the share of the buildings that the
-            first stage lacks, which are the buildings in the east; `within`:
-            the greatest distance of structures from the drives [m].
+            first stage lacks, beginning in the east; `within`: the greatest
+            distance of structures from the drives [m].
         own: drives that replace the proposed drives; None to use the proposed
             drives.
 

@@ -222,10 +222,10 @@ def _solids_with_openings(
 def _taken_once(
     outlines: Sequence[_Block], faults: ImportFaults
 ) -> tuple[list[_Block], list[_Block]]:
-    """Returns the outlines of buildings, each once, and those inside others.
+    """Returns each outline of a building once, and the outlines inside others.
 
-    Otherwise walls of both would stand in the same place, and hide each other's
-    windows.
+    If an outline were used twice, or used as a whole building inside another
+    one, two walls could stand in the same place and hide each other's windows.
     """
     tree = STRtree([one.polygon for one in outlines])
     whole: dict[int, _Block] = {}

@@ -71,9 +71,9 @@ def _stones(
 ) -> np.ndarray:
     """Returns rows of stones of random brightness, (N, N, 1).
 
-    `across` and `rows` count the stones, `joint` is width and brightness of the
-    joints between them. Every other row is shifted by `lag` stones. The
-    standard deviation of the stones' brightness is `spread`.
+    `across` and `rows` count the stones, and `joint` contains the width and the
+    brightness of the joints between the stones. Every other row is shifted by
+    `lag` stones. The standard deviation of the stones' brightness is `spread`.
     """
     y, x = np.indices((_SIDE, _SIDE)) / _SIDE
     row = (y * rows).astype(int)

@@ -85,7 +85,7 @@ def add_described_imu(
 class VehicleImu(LeafSystem):
     """Measures like an accelerometer and a gyroscope on a vehicle.
 
-    Up to rounding and added errors, the values are those of Drake's
+    Up to rounding and added errors, the values equal the values of Drake's
     `Accelerometer` and `Gyroscope`. This system is much faster, because it
     computes many samples at once from a known trajectory.
 
@@ -121,8 +121,8 @@ class VehicleImu(LeafSystem):
             rate: samples per second.
             measure: function that adds errors. Its arguments are the number of
                 the first sample, and the exact specific forces and angular
-                velocities, (N, 6). It returns the measured ones, (N, 6). By
-                default there are no errors.
+                velocities, (N, 6). The function returns the measured values,
+                (N, 6). By default there are no errors.
         """
         super().__init__()
         self._trajectory = trajectory

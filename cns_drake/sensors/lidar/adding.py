@@ -252,7 +252,7 @@ def add_described_lidar(
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
         unseen: bodies that the LiDAR does not see. This argument and the
-            following ones are those of `add_lidar`.
+            following ones are the same as for `add_lidar`.
         motion_distortion: whether the bodies of the LiDAR's plant keep moving
             during a revolution. A recorded drive connects a `Sweep` instead of
             setting this argument.

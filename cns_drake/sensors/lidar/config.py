@@ -147,8 +147,8 @@ class LidarSection(Mount):
     def with_preset(self, preset: str) -> LidarSection:
         """Returns this LiDAR with another model in its place.
 
-        The name of the preset, the number of columns and the range limits are
-        those of the preset; all other fields stay.
+        The name of the preset, the number of columns and the range limits come
+        from the new preset; all other fields stay the same.
 
         Args:
             preset: name of the other model.
@@ -177,8 +177,8 @@ def make_pattern(
 ) -> UnitPattern:
     """Returns the beam pattern of a LiDAR.
 
-    With calibrated returns, the elevations are those of a real unit, if they
-    were measured for this preset.
+    With calibrated returns, the elevations are the elevations of a real unit,
+    if a unit of this preset was measured.
 
     Args:
         config: description of the LiDAR.

@@ -168,8 +168,9 @@ class Lidar(LeafSystem):
                 default, structures have no class, and their ids follow the
                 alphabetical order of their names.
             anchored_frames: frames that never move, besides the frame of the
-                world; rays are cast faster on their geometry. If such a frame
-                moves after all, all static geometry is rebuilt.
+                world; rays are cast faster on their geometry than on geometry
+                that can move. If such a frame moves after all, all static
+                geometry is rebuilt.
             num_threads: number of threads that share the rays; the measurement
                 does not depend on this number.
             causal: whether a scan is the revolution that ends at the time of
@@ -398,7 +399,7 @@ class Lidar(LeafSystem):
         return cast_exact_rays(seen, p_WR, d_W, max_range, time)
 
     def _check_context(self, context: Context) -> None:
-        """Checks that a Context is the one of this LiDAR.
+        """Checks that a Context belongs to this LiDAR.
 
         With another Context, Drake would read the cache entries of another
         system, or invalid memory.

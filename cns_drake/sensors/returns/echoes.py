@@ -220,8 +220,8 @@ def _sort_by_beam(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the rows of the light beam by beam, the nearest first.
 
-    Also returns where the rows of each beam begin, and where the last ones end,
-    (num_beams + 1,).
+    Also returns where the rows of each beam begin, and where the rows of the
+    last beam end, (num_beams + 1,).
     """
     first = np.zeros(num_beams + 1, np.int64)
     for beam in light.beam:

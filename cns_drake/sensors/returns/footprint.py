@@ -115,7 +115,8 @@ def _aim_rays(
 
     Args:
         toward: (P, 3) unit vectors across the beams, to the neighbours.
-        rest: (P,) part of a beam's light farther from its axis.
+        rest: (P,) part of a beam's light that is farther from the beam's axis
+            than the ray.
         angle: (P,) angle between `toward` and the direction from the axis to
             the ray [rad].
         hits: hits of the beams' axes.
