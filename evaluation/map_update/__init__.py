@@ -1,8 +1,8 @@
 """Labels of old maps: what is gone, what is new, what was not observed.
 
-`sessions` reads and writes the two maps of a pair of drives, which
-`map_builder` makes, with `labels` of their points. `baselines` and `free_space`
-predict labels, `scores` and `structures` compare them with the ground truth.
-`upkeep` updates a map by several drives, and `upkept_drive` shows the updated
-map in scans.
+`map_builder` makes the map of a drive. `sessions` reads and writes the maps of
+a pair of drives, with the `labels` of the points. `baselines` and `free_space`
+predict labels; `scores` and `structures` compare predicted labels with the
+ground truth. `upkeep` updates a map by several drives, and `upkept_drive` shows
+the updated map in scans.
 """

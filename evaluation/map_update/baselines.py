@@ -3,10 +3,10 @@
 - `distance`: a point is kept if the other map has a point within 0.5 m;
   otherwise the point is gone or new. No point is unobserved.
 - `m3c2` (the extra `map-update`; Lague et al., ISPRS J. 82, 2013, in py4dgeo):
-  the distance between the two maps along the normal of the surface. A point is
-  gone or new if this distance exceeds both the level of detection and 0.1 m,
-  otherwise kept. A point is unobserved if one of the maps has too few points
-  around it to compute the distance.
+  the distance between the two maps is measured along the normal of the surface.
+  A point is gone or new if this distance exceeds both the level of detection
+  and 0.1 m. A point is unobserved if one of the maps has too few points around
+  this point to compute the distance. All other points are kept.
 - `free-space`: the scans of the other drive decide, see
   `evaluation.map_update.free_space`.
 """
@@ -76,9 +76,9 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `m3c2`.
 
     A point is gone (older map) or new (newer map) if the M3C2 distance between
-    the two maps at this point exceeds the distance's level of detection and 0.1
-    m. Otherwise it is kept, or unobserved if a map lacks points to measure this
-    distance. See `evaluation.map_update.labels.Label`.
+    the two maps at this point exceeds both its level of detection and 0.1 m. A
+    point is unobserved if a map lacks points to measure this distance. All
+    other points are kept. See `evaluation.map_update.labels.Label`.
 
     Args:
         mine: the map with N points, and its drive.

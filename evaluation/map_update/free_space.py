@@ -7,8 +7,8 @@ LiDAR looks in this direction. A scan shows the cell if the surface passes
 through it. The first rule that applies gives the label: kept if the other map
 has a point near the cell; gone or new if a scan sees past it; kept if enough
 scans show it; otherwise unobserved. Where more than a fifth of the labelled
-points in a cube of 1 m are gone or new, the kept points there are relabelled as
-well, except points with a point of the other map within 0.12 m.
+points in a cube of 1 m are gone or new, the kept points in this cube become
+gone or new, too. Points within 0.12 m of a point of the other map stay kept.
 
 The settings were fitted on two pairs of drives: Metropolis 01 and 04, whose
 paths hardly meet, and Suburbia after five years.
@@ -113,8 +113,8 @@ def _changed_shares(points: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
 def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
     """Returns how many scans see past each point, show it, or hide it.
 
-    The module's text on `free-space` defines the first two. A scan hides a
-    point if a surface lies in front of it.
+    The module's docstring says when a scan sees past a point, and when it shows
+    a point. A scan hides a point if a surface lies in front of it.
 
     Returns:
         (3, N) counts for the points (N, 3).
@@ -157,7 +157,8 @@ def _field_of_view(p_S: np.ndarray) -> tuple[float, float, float]:
     """Returns the limits of a field of view, from its returns (N, 3) [m].
 
     The field of view reaches from the lowest to the highest return, and as far
-    as the farthest return, without `_STRAYS` returns on each side.
+    as the farthest return. On each side, the `_STRAYS` outermost returns do not
+    count.
 
     Returns:
         Least and greatest slope; greatest distance [m].

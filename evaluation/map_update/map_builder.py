@@ -24,8 +24,8 @@ _MOST_PARTS = 8
 class MapBuilder:
     """Merges scans into a map with one point in each cell of 0.1 m.
 
-    The first point of a cell represents it, because the mean of its points may
-    lie off the surface.
+    The first point of a cell represents the cell, because the mean of the
+    cell's points may lie off the surface.
     """
 
     def __init__(self, origin: np.ndarray):

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 def nearest_distances(
     points: np.ndarray, others: np.ndarray, most: float = math.inf
 ) -> np.ndarray:
-    """Returns the distance (N,) to the nearest_distances other point [m].
+    """Returns the distance (N,) from each point to the nearest other point [m].
 
     Distances beyond `most` are infinite.
 

@@ -17,8 +17,9 @@ The predictions also give an updated map: A without the points that are
 predicted gone, plus the points of B that are predicted new or newly seen. The
 completeness of the updated map is the share of B's map within 0.2 m of the
 updated map. The accuracy is the share of the updated map within 0.2 m of B's
-map, over points that B's drive observed in the ground truth. The Chamfer
-distance is the mean of the mean distances in both directions.
+map; only points count that B's drive observed according to the ground truth.
+The Chamfer distance is the mean of two mean distances: from the updated map to
+B's map, and from B's map to the updated map.
 """
 
 from __future__ import annotations
@@ -217,9 +218,9 @@ def _scores_of_updated_map(both: _Labelled) -> dict[str, float]:
 
     The updated map consists of the points of A that are not predicted gone, and
     the points of B that are not predicted kept. It is compared with B's map.
-    Completeness is the share of B's points that are near the updated map,
-    accuracy the share of the updated map's points that are near B's map. All
-    are NaN if one of the two maps has no points to compare.
+    Completeness is the share of B's points that are near the updated map;
+    accuracy is the share of the updated map's points that are near B's map. All
+    three scores are NaN if one of the two maps has no points to compare.
     """
     pair, truth, predicted, counted = both
     stays = predicted.A != Label.GONE
@@ -248,9 +249,9 @@ def _scores_of_updated_map(both: _Labelled) -> dict[str, float]:
 
 
 def _scores_by_distance(both: _Labelled) -> dict:
-    """Returns scores by points, for ranges of the distance of points.
+    """Returns scores by points, one set of scores for each range of distances.
 
-    The distance is measured from the path of the other drive.
+    The distance of a point is measured from the path of the other drive.
     """
     pair = both.pair
     if not (len(pair.A.X_WS) and len(pair.B.X_WS)):

@@ -3,8 +3,8 @@
 A session is a drive with its map. A folder contains two sessions: the older
 one in the subfolder `A`, the newer one in `B`. A session consists of
 
-- `map.ply`: the merged map in the world, one point for each 0.1 m, with `x`,
-  `y`, `z` [m], and, where known, `label` (class, SemanticKITTI's ids) and
+- `map.ply`: the merged map in the world, one point for each cell of 0.1 m, with
+  `x`, `y`, `z` [m], and, where known, `label` (class, SemanticKITTI's ids) and
   `instance` (number of a structure),
 - `truth.npy`: a label for each point of the map, see `Label`,
 - `Scans/000000.pcd` onwards: the scans in the frame of the LiDAR,

@@ -31,7 +31,7 @@ class UpkeptDrive(MovedDrive):
         Args:
             drive: the drive.
             updates: what the drives of the map changed.
-            number: number of the drive among them.
+            number: number of the drive among the drives of the map.
         """
         super().__init__(drive, drive.X_WS, drive.world_frame, drive.datum)
         self._updates = updates

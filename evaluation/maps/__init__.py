@@ -1,6 +1,6 @@
 """Scans and poses as voxel maps.
 
-`voxel_maps` makes maps of drives and clouds, by the hash table in
+`voxel_maps` makes maps of drives and clouds, by means of the hash table in
 `voxel_table`. `thumbnails` reduces single scans to small pictures, and
 `grid_cells` numbers the cells of grids.
 """

@@ -27,8 +27,8 @@ def cell_keys(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Returns:
         (M,) int64 numbers, which sort like the cells; and (N,) bool, which
-        cells have a number. Only cells with indices from 0 to below 2^21 have
-        one.
+        cells have a number. Only cells with indices from 0 to below 2^21 have a
+        number.
     """
     with np.errstate(invalid="ignore"):
         is_near = (cells >= 0) & (cells < CELLS_PER_AXIS)

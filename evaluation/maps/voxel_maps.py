@@ -269,7 +269,7 @@ def map_drive(
 ) -> VoxelMap:
     """Returns the voxel map of scans of a drive, in the world frame.
 
-    Each scan is read once. The measure of structural change (TCR) has the
+    Each scan is read once. The measure of structural change (TCR) uses the
     default voxel size. By default all frames are mapped.
 
     Raises:

@@ -29,8 +29,8 @@ def _find_slot(
 ) -> np.uint64:
     """Returns the slot of a voxel, or the free slot for it.
 
-    The index is unsigned: for a signed one, numba tests at each use whether it
-    counts from the end.
+    The index of the slot is unsigned: at each use of a signed index, numba
+    tests whether the index counts from the end.
     """
     mask = len(table) - 1
     # Large odd factors spread neighbouring voxels; products wrap around.

@@ -1,8 +1,8 @@
 """Place-recognition methods, all with the same interface.
 
-`method` is the interface, `registry` knows the methods by name, and `own_files`
-loads a method from a user's file. Each method is a module of its own. Modules
-that only some methods need:
+`method` is the interface, `registry` contains the methods by name, and
+`own_files` loads a method from a user's file. Each method is a module of its
+own. Modules that only some methods need:
 
 - BTC: `btc_planes`, `btc_voxel_order`, `btc_keypoints`, `btc_triangles`,
   `btc_verification`.

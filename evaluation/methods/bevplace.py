@@ -110,7 +110,7 @@ def describe_image(weights: Weights, image: np.ndarray) -> np.ndarray:
 def _turned_images(
     image: np.ndarray,
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yields 25 images (H, W, 3), about from -1 to 1, and their points.
+    """Yields 25 images (H, W, 3) with values near [-1, 1], and their points.
 
     The points (N, 2) are the columns and rows of the grid in the turned image.
     """
@@ -183,7 +183,7 @@ def _sampled(
         border: value of all pixels around the image.
 
     Returns:
-        Array float32 of the shape of `x`, and the channels.
+        Array float32 with the axes of `x`, and the channels as last axis.
     """
     height, width, channels = image.shape
     padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), constant_values=border)

@@ -1,7 +1,7 @@
 """BTC, the binary and triangle combined descriptor (Yuan et al., T-RO 2024).
 
 Spots that stand out from the ground (walls, trunks, posts) are keypoints; the
-occupied heights above them are a binary descriptor. Triangles of nearby
+occupied heights above a keypoint are its binary descriptor. Triangles of nearby
 keypoints do not change when the sensor moves. A place is therefore a candidate
 if enough triangles of its cloud match triangles of the query, with similar
 sides and similar descriptors at the vertices. A candidate has a score if its
@@ -15,11 +15,11 @@ then coincide.)
 
 Scores equal the public program's scores (checked on 243 single scans of two
 LiDARs and 163 submaps, each against 308 places). Two details that the paper
-does not determine follow the program. First, the order in which planes are
-compared (`btc_planes`), which makes scores depend on the order of a cloud's
-points. Second, an error in the positions of keypoints where the ground slopes
-sideways, which lowers the scores there; `image_axes: orthogonal` corrects this
-error.
+does not determine follow the program. The first detail is the order in which
+planes are compared (see `btc_planes`). Because of this order, scores depend on
+the order of a cloud's points. The second detail is an error in the positions of
+keypoints where the ground slopes sideways. The error lowers the scores there;
+`image_axes: orthogonal` corrects this error.
 
 Planes are found by `btc_planes`, keypoints and triangles by `btc_triangles`.
 """

@@ -2,9 +2,9 @@
 
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of a plane,
 the cloud is an image. Each cell of the image has one bit for each layer of
-height above the plane, which is set if the layer contains points. Cells with
-many layers set (walls, trunks, posts) are the keypoints, unless they are part
-of a line of such cells.
+height above the plane. The bit is set if the cell has points in this layer.
+Cells with many layers set (walls, trunks, posts) are the keypoints, unless they
+are part of a line of such cells.
 """
 
 from __future__ import annotations

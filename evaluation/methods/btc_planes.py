@@ -23,8 +23,8 @@ class Planes:
     Attributes:
         centers: (P, 3) mean of each patch's points [m].
         normals: (P, 3) unit vectors of either sign.
-        covariances: (P, 3, 3) covariance matrix of each patch's points,
-            divided by their number N and not by N - 1 [m^2].
+        covariances: (P, 3, 3) covariance matrix of each patch's N points, with
+            the divisor N instead of N - 1 [m^2].
         counts: (P,) int64 number of points.
     """
 
@@ -86,7 +86,7 @@ def base_plane(
             plane of a similar patch [m].
 
     Returns:
-        Center (3,) and normal (3,) of the plane, pointing up; None if no
+        Center (3,) of the plane, and normal (3,), which points up; None if no
         patches are similar.
     """
     groups = merge(planes, normal_limit, distance_limit, keep_single=False)

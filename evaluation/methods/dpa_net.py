@@ -107,7 +107,8 @@ def farthest_points(points: np.ndarray, number: int) -> np.ndarray:
     """Returns indices of points that are far apart from each other.
 
     This is farthest point sampling. The first point has index 0. Each further
-    point is the one that is farthest from all points chosen so far.
+    point is the point with the greatest distance from the nearest point chosen
+    so far.
 
     Args:
         points: (N, 3) points [m].

@@ -6,8 +6,9 @@ of their filled cells coincide. Objects that are gone or new only lower this
 number, while unchanged objects all coincide at the same pose.
 
 Matched filters for place recognition come from Joseph, Fischer and Milford
-(arXiv 2409.03998), who use one map of occupied cells. We add the layers, the
-poles and kerbs, and bits instead of a Fourier transform.
+(arXiv 2409.03998), who use one map of occupied cells. Layered overlap adds the
+layers, the poles and the kerbs, and counts bits instead of computing a Fourier
+transform.
 """
 
 from collections.abc import Sequence
@@ -286,8 +287,8 @@ def _search(
     """Searches for the places and poses at which coarse maps overlap most.
 
     The second search compares `number` pairs of a place and a heading, and the
-    third search `refined` of them. An exhaustive search keeps each place at its
-    best heading.
+    third search compares `refined` of these pairs. An exhaustive search keeps
+    each place at its best heading.
 
     Returns:
         (N, 4) int64: place, heading and shifts from which `climb` starts. The
@@ -338,8 +339,8 @@ def _overlaps_beyond_chance(
     `starts` are (N, 4) poses: place, heading and shifts.
 
     Returns:
-        (N,) by how many standard deviations the overlap exceeds that expected
-        by chance; (N, 4) the best poses.
+        (N,) by how many standard deviations the overlap exceeds the overlap
+        that is expected by chance; (N, 4) the best poses.
     """
     counts, found = best_overlaps(
         query.bits, places.bits, weights, starts, moves

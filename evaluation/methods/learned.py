@@ -85,10 +85,10 @@ class LearnedConfig(MethodConfig):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def digest(self) -> str:
-        """Digest of the file of weights.
+        """Digest of the file of weights: 16 hexadecimal digits.
 
-        Results depend on it, because the file's name alone does not identify
-        the weights.
+        Two files with the same name can contain different weights; their
+        digests differ.
         """
         load_weights(self.path)
         return hashlib.sha256(self.path.read_bytes()).hexdigest()[:16]

@@ -81,9 +81,9 @@ class MapClosuresDatabase:
 class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     """MapClosures, computed by the package of its authors.
 
-    Descriptors are downsampled local maps (N, 3). A local map of 200 scans
-    covers about 50 m of path in front and behind, at 10 m/s and 20 scans per
-    second.
+    Descriptors are downsampled local maps (N, 3). At 10 m/s and 20 scans per
+    second, a local map of 200 scans covers about 50 m of path in front of the
+    LiDAR, and as much behind it.
     """
 
     Config = MapClosuresConfig

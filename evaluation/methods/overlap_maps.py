@@ -260,7 +260,7 @@ def _count_common(
     step: int,
     common: np.ndarray,
 ) -> None:
-    """Counts each layer's cells that coincide with the place's, near a pose.
+    """Counts the common cells of two scans, layer by layer, near a pose.
 
     The shifts are whole cells, so that each cell needs to be rotated only once.
 

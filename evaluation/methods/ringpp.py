@@ -295,7 +295,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """Returns a query's spectrum (6 F, F), weighted for the correlation.
 
         The weights account for the frequencies that are not stored (about half
-        of all). The program's scale is used; its transforms are unitary.
+        of all). The scale is the scale of the authors' program, whose
+        transforms are unitary.
         """
         n = self.config.cells
         scale = _CORRELATION_SCALE * _NUM_FEATURES * n * n * math.sqrt(n)
@@ -377,9 +378,9 @@ def _best_offset(product: np.ndarray, n: int) -> tuple[float, tuple[int, int]]:
     """Returns the greatest correlation of two images, and the shift.
 
     `product` (C, n, F) is the spectrum of the image times the conjugate
-    spectrum of the reference; n is the side of the images. The correlation is
-    the sum of its magnitudes over the channels; the shift is in rows and
-    columns.
+    spectrum of the reference; n is the side of the images. The correlations of
+    the channels are computed separately, and their magnitudes are summed. The
+    shift is in rows and columns.
     """
     correlations = scipy.fft.irfft2(product, s=(n, n))
     correlation = np.abs(correlations, out=correlations).sum(axis=0)

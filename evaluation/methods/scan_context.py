@@ -298,8 +298,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
 
         For a shift s of a context's columns, the similarity is the mean cosine
         between column j of the query and column j - s of the context, over
-        columns that are filled in both. Only shifts near the best one by the
-        aligning keys are tried.
+        columns that are filled in both. Only shifts near the shift at which the
+        aligning keys fit best are tried.
 
         Args:
             chosen: (C,) indices of contexts.
@@ -364,7 +364,8 @@ def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
 
     As in the T-RO program, cells are counted outwards from the axes, so that
     the cells around the axes are twice as large, and the first row and column
-    stay empty. Also as there, points below the ground count as ground.
+    stay empty. As in that program, too, points below the ground count as
+    ground.
     """
     rows, columns = (
         2 * int(half / cell)

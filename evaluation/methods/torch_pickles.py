@@ -49,7 +49,7 @@ _OPAQUE = object()
 
 
 def unpickle_tensors(pickle: bytes) -> Any:
-    """Returns the object of a pickle, in which only tensors are made.
+    """Returns the object of a pickle. Of all classes, only tensors are made.
 
     Raises:
         ValueError: the pickle is damaged, or has too many instructions.

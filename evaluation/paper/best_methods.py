@@ -34,9 +34,9 @@ def best_methods(
 ) -> list[list[str]]:
     """Returns the methods with the greatest AUC on each pair.
 
-    Table II of the paper prints these methods in bold. A pair has several if
-    their AUCs are equal as printed. By default, each method is scored in the
-    mode that the paper used for it.
+    Table II of the paper prints these methods in bold. A pair has several best
+    methods if their AUCs are equal as printed. By default, each method is
+    scored in the mode that the paper used for it.
     """
     table = recognition_table(results, (), mode, paper())
     methods = [name for name, _ in table.groups[1:]]

@@ -116,18 +116,20 @@ def open_sequences(
 ) -> list[ImageSequence]:
     """Returns the sequences of images in a folder.
 
-    For the sequences on which BEVPlace was evaluated, the frames of places and
-    queries are those of that evaluation. In any other sequence, the first half
-    of the images are places and the second half queries, unless the sequence
-    has one folder for places and one for queries. Queries without a match are
-    left out, as in the evaluation of BEVPlace.
+    For the sequences on which BEVPlace was evaluated, the places and queries
+    are the same frames as in the evaluation of BEVPlace. In any other sequence,
+    the first half of the images are places and the second half are queries,
+    unless the sequence has one folder for places and one for queries. Queries
+    without a match are left out, as in that evaluation.
 
     Args:
-        folder: folder with a folder for each sequence; it need not exist.
+        folder: folder of the sequences, which need not exist. Each sequence is
+            a folder in it.
         on_note: is called with notes on what is left out.
         queries: number of queries of a sequence, chosen evenly among the
-            queries with a match. The places are then one random match of each
-            query. By default, all queries and all places.
+            queries with a match. If a number is given, the places are only one
+            random match of each query. By default, all queries and all places
+            are used.
 
     Raises:
         InputError: there is a folder but no sequence in it, or a sequence has
@@ -142,7 +144,10 @@ def open_sequences(
 
 
 def open_images(folder: Path) -> list[NamedDrive]:
-    """Returns all images of each sequence in a folder; of places, if named.
+    """Returns a drive for each sequence of images in a folder.
+
+    The drive of a sequence with a folder `places` contains only the images in
+    this folder.
 
     Args:
         folder: as for `open_sequences`.

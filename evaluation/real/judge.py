@@ -1,13 +1,14 @@
 """Tests whether a classifier can tell real scans from simulated scans.
 
-Of each scan, sixteen patches of 8 m within 30 m of the LiDAR are described by
-features. Boosted trees are then trained to distinguish the patches of the two
-sets; a place is never in both training and test data. A place consists of the
-scans less than 30 m from its first scan, even if they come from several passes
-or drives. In a folder without poses, all scans are one place. The AUC of the
-classifier is 1 if it classifies all patches correctly, and 0.5 for guessing. As
-a control, the classifier distinguishes the first half of the simulated places
-from the second half. All AUCs are means over random samples of patches; single
+Of each scan, sixteen square patches are described by features. The sides of a
+patch are 8 m long, and all patches lie within 30 m of the LiDAR. Boosted trees
+are then trained to distinguish the patches of the two sets; a place is never in
+both training and test data. A place consists of the scans less than 30 m from
+its first scan, even if they come from several passes or drives. In a folder
+without poses, all scans are one place. The AUC of the classifier is 1 if it
+classifies all patches correctly, and 0.5 if it guesses. As a control, the
+classifier distinguishes the first half of the simulated places from the second
+half. All AUCs are means over random samples of patches; the AUCs of single
 samples differ by up to 0.04.
 
 Some features need the ring (laser) of each point. Rings are read from
@@ -103,7 +104,7 @@ def places_of(
     the earliest place whose first scan is less than 30 m away. Scans at one
     position are therefore always at one place, even if a drive comes back, or
     if they are from different drives. Each scan is a table as `scan_table`
-    returns it. Scans without points are left out, and `note` is told how many.
+    returns it. Scans without points are left out, with a note on their number.
     """
     places: dict[tuple, list[np.ndarray]] = {}
     for drive in drives:
@@ -269,8 +270,8 @@ def judge_draws(
 ) -> dict:
     """Returns the mean result of `aucs_by_group` over random draws of patches.
 
-    Groups of features that a draw lacks are left out. The numbers of patches
-    are those of the first draw.
+    Groups of features that a draw lacks are left out. The numbers of patches in
+    the result are from the first draw.
 
     Args:
         real, simulated: scans by place, see `places_of`.

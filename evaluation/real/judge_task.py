@@ -20,9 +20,9 @@ _DRAWS = 1
 
 
 class JudgeTask(Task):
-    """Measures how well a classifier tells real scans from simulated ones.
+    """Measures how well a classifier tells real scans from simulated scans.
 
-    The simulated scans are those of the jobs' distractors.
+    The simulated scans are the scans of the jobs' distractors.
     """
 
     name = "judge"

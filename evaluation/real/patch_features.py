@@ -177,7 +177,7 @@ def _ground_steps(p: np.ndarray) -> dict[str, float]:
 def _shape(p: np.ndarray, ring: np.ndarray) -> tuple[float, ...]:
     """Returns the shape of a neighbourhood: shares, normal and residuals.
 
-    The shares of lines, planes and scatter are those of Demantke et al. (2011).
+    Demantke et al. (2011) define the shares of lines, planes and scatter.
     Residuals from the plane are logarithms of mm, in three kinds: of all
     points, within rings, and of the rings' means.
     """

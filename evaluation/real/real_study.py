@@ -316,8 +316,8 @@ class _RealJobs(Jobs):
     """Jobs on data sets and simulated drives.
 
     Attributes:
-        made: the simulated drives, whose places are farther apart than those of
-            the data sets.
+        made: the simulated drives, whose places are farther apart than the
+            places of the data sets.
     """
 
     made: frozenset[NamedDrive] = frozenset()

@@ -118,10 +118,10 @@ def query_ms(
     """Returns the median CPU time of several queries, on one core [ms].
 
     A query is compared with all places, including the second stage of a method
-    with two stages. The time does not include geometric verification and the
+    with two stages. The time includes neither geometric verification nor the
     pose of the top-ranked place, because not every method estimates a pose, and
-    the time to do so does not depend on the number of places. The first query
-    does not count.
+    the time to estimate it does not depend on the number of places. The first
+    query does not count.
 
     Args:
         method: method to measure.

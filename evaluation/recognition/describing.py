@@ -105,7 +105,7 @@ class _FrameClouds:
         """Returns how a protocol changes the sensor of a query at this frame.
 
         The sensor can be rotated, tilted and partly occluded. The result is
-        None if it stays as recorded.
+        None if the sensor stays as recorded.
         """
         if protocol not in self._sensors:
             self._sensors[protocol] = protocol.query_sensor(self.frame)

@@ -20,8 +20,7 @@ class DescribedScans:
         frames: (K,) frame numbers in the drive.
         stamps_ns: (K,) int64 time stamps.
         X_WS: (K, 4, 4) poses of the sensor.
-        descriptors: K descriptors; empty if the drive has no places, or no
-            queries.
+        descriptors: K descriptors; empty if the scans have not been described.
         clouds: the K described clouds if the method has a second stage;
             otherwise empty.
         blocks: (K,) block of the route in which each place or query lies, see

@@ -59,8 +59,8 @@ def overlap_matrix(
 ) -> np.ndarray:
     """Returns the overlap of every query with every place, (Q, D) float64.
 
-    Single scans are compared, even if methods merge several. The overlap is NaN
-    for a query without a point.
+    Single scans are compared, even if methods merge several scans. The overlap
+    is NaN for a query without a point.
 
     Args:
         database: the drive of the places.

@@ -40,9 +40,10 @@ def place_numbers(
     Yields:
         The metrics of the condition and, compared with the baseline, `kept`,
         `kept_r1` and `kept_strict` (AUC, R@1 and strict AUC in the condition,
-        divided by the same metric in the baseline), `lost` and `found` (numbers
-        of queries that are right only in the baseline, and only in the
-        condition), and the result of the function `visible_change_added`.
+        divided by the same metric in the baseline), `lost` (the number of
+        queries that are right only in the baseline), `found` (the number of
+        queries that are right only in the condition), and the result of the
+        function `visible_change_added`.
     """
     outcomes = now.outcomes
     values = now.by_mode["all"].main_metrics
@@ -71,8 +72,8 @@ def _compared_numbers(
 ) -> Iterator[Number]:
     """Yields the results that compare a condition with the baseline.
 
-    They are listed at `place_numbers`. If the queries differ, only `kept`,
-    `kept_r1` and `kept_strict` are known, without intervals.
+    The docstring of `place_numbers` lists these results. If the queries differ,
+    only `kept`, `kept_r1` and `kept_strict` are known, without intervals.
     """
     outcomes = now.outcomes
     values = now.by_mode["all"].main_metrics

@@ -115,9 +115,9 @@ class PlaceOutcome:
             overlaps: (Q,) how much of the query's scan the best of its matches
                 shows, see `evaluation.recognition.overlap_truth`; NaN without a
                 match. None if it is unknown.
-            num_here: number of places in the query's own city, which come
-                first; by default all places of the database drive. Distances to
-                all other places are unknown.
+            num_here: number of places in the query's own city; these places
+                come first. By default, all places of the database drive.
+                Distances to all other places are unknown.
         """
         scores = retrieval.scores
         order = ranked_places(scores)[:, :NUM_BEST].astype(np.int32)

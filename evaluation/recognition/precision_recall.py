@@ -60,8 +60,8 @@ class PrCurve:
     def strict_auc(self, num_with_match: int) -> float:
         """Returns the area under the curve with recall = TP / N.
 
-        N, the number of queries with a match, includes queries with a wrong
-        accepted answer, which TP / (TP + FN) ignores.
+        N is the number of queries with a match. N includes queries whose
+        accepted answer is wrong; TP + FN does not.
         """
         recall = recall_of(
             self.true_positives, num_with_match - self.true_positives

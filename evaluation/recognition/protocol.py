@@ -54,8 +54,8 @@ class RetrievalProtocol:
         exclude_recent: for a drive that is compared with itself: a query is
             compared only with places that the drive passed at least this time
             before the query [s]. None if two drives are compared.
-        overlap: share of a query's scan, up to 1, that the scan of a place at
-            any distance must show to be a match (see
+        overlap: share of a query's scan, up to 1, that a place's scan must show
+            so that the place is a match at any distance (see
             `evaluation.recognition.overlap_truth`). None if places within
             `radius` are matches.
         gate: geometric verification, which rejects top-ranked places that lie

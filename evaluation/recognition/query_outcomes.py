@@ -23,8 +23,8 @@ class QueryOutcomes:
             infinite if no candidate is a true match.
         num_places: size of the database.
         blocks: (Q,) block of the route in which each query lies, see
-            `evaluation.recognition.bootstrap.route_blocks`; None if each is a
-            block of its own.
+            `evaluation.recognition.bootstrap.route_blocks`; None if each query
+            is a block of its own.
 
     Example:
         from evaluation import judge
@@ -113,7 +113,7 @@ def judge(
             no candidates.
         matches: (Q, D) bool, true matches.
         blocks: (Q,) block of the route in which each query lies; None if each
-            is a block of its own.
+            query is a block of its own.
 
     Raises:
         ValueError: scores are complex, masked or not numbers, or scores and

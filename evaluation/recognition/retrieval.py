@@ -41,7 +41,7 @@ class Retrieval:
             place.
         is_known: (Q, D) bool, whether a place is allowed as an answer to a
             query; with `exclude_recent`, places that the drive has passed just
-            before are not allowed.
+            before the query are not allowed.
         overlaps: (Q, D) float64 share of a query's scan that a place's scan
             shows (see `evaluation.recognition.overlap_truth`); None if matches
             are by the radius.

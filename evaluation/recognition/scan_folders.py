@@ -53,10 +53,10 @@ def write_scores(
         The number of points left out because they are not finite.
 
     Raises:
-        InputError: if the method's setting `sequence` is not 0 (it needs the
-            poses of scans), a folder or a scan cannot be read, a scan has no
-            point within the limits of the protocol, or the output cannot be
-            written.
+        InputError: if the method's setting `sequence` is not 0 (this setting
+            needs the poses of scans), a folder or a scan cannot be read, a scan
+            has no point within the limits of the protocol, or the output cannot
+            be written.
     """
     if method.config.sequence:
         raise InputError(

@@ -174,10 +174,10 @@ class Search:
         )
 
     def _groups_in_memory(self) -> Iterator[tuple[int, slice]]:
-        """Yields the number and the places of each group, and builds it.
+        """Yields each group's number and places, after building its database.
 
-        The group that is in memory comes first. Nothing else may hold a
-        database, so that only one is in memory.
+        The group that is in memory comes first. No other object may hold a
+        database, so that only one database is in memory.
         """
         numbers = range(len(self._groups))
         if self._built is not None and self._built[0] == numbers[-1]:

@@ -2,8 +2,9 @@
 
 A scan samples the surfaces around its sensor. The four returns around a
 direction, one in each quadrant, determine where the surface lies in that
-direction: in the plane of the three nearest returns or, at edges and at grazing
-incidence, between the ranges of the nearest and the farthest return.
+direction: in the plane of the three returns nearest to the direction or, at
+edges and at grazing incidence, between the least and the greatest range of the
+four returns.
 
 A comparison with rays cast in the simulated world shows that shares of shown
 points are wrong by some hundredths for scans up to 30 m apart, and by more for
@@ -138,10 +139,11 @@ class SeenSurfaces:
         - Three or more returns with similar ranges: the distance is
           perpendicular to a plane through three of these returns.
         - Fewer returns, or returns from two surfaces at an edge: the distance
-          is along the line of sight. If the point is nearer than all these
-          returns, the distance is measured to the nearest return; if the point
-          is farther, to the farthest return. For a point between the returns,
-          the distance is NaN.
+          is along the line of sight. If the point is nearer to the sensor than
+          all these returns, the distance is measured to the return with the
+          least range; if the point is farther than all of them, to the return
+          with the greatest range. For a point between the returns, the distance
+          is NaN.
         - No return: the result is infinite.
 
         Args:
@@ -215,7 +217,7 @@ def _fit_plane(
 ) -> tuple[float, float, float, float]:
     """Returns the plane n p = h through three points of a scan.
 
-    The points are the three of the four `corners` that are nearest, by `away`.
+    Of the four `corners`, the three with the least distances `away` are used.
     The normal n need not have unit length.
 
     Returns:

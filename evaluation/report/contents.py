@@ -31,14 +31,14 @@ class Report:
         pairs: place recognition results of each pair of drives and, if there
             is one, of its control (the same routes without a change of the
             city).
-        recognitions: place recognition of all pairs without their controls, and
-            of drives compared with themselves.
+        recognitions: place recognition of all pairs, but not of their controls;
+            and of drives compared with themselves.
         sessions: place recognition in databases of several drives through one
             stage, each next to the database that contains only the first of
             these drives.
         differences: AUC differences between methods.
-        evidence: (database, query) -> evidence on why the best-scoring place
-            of a query is wrong.
+        evidence: (database, query) -> evidence on why the top-ranked place of a
+            query is wrong.
         tracks: drive -> time stamps and poses, also for the controls.
         drives: drive -> what the page shows of it.
         illustrations: figures, in the order of the page.
@@ -49,7 +49,7 @@ class Report:
             the report; drives without a page may be left out.
         reference: published numbers to compare with.
         repeated: results by the protocol of the published numbers, if this
-            protocol differs from that of the report.
+            protocol differs from the report's protocol.
     """
 
     results: Results = field(default_factory=lambda: Results((), ()))

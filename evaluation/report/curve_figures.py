@@ -96,9 +96,9 @@ def _draw_curve(
 def draw_track(rows: np.ndarray, stem: Path) -> None:
     """Draws the results of a tracked drive over its length, and saves them.
 
-    The figure shows the position error, with the limits beyond which a pose is
-    wrong or the track is lost, and the share of each scan's points that the map
-    lacks.
+    The figure shows the position error, and the share of each scan's points
+    that the map lacks. It also shows the limits of the error beyond which a
+    pose is wrong, or the track is lost.
 
     Args:
         rows: records of `evaluation.localisation.tracking.TRACKED`.

@@ -1,8 +1,8 @@
 """Renders a cloud of points as a picture.
 
-Millions of points are projected orthographically, occluded points are removed
-by a depth buffer, and edges are darkened where the depth steps (eye-dome
-lighting: Boucheny 2009), which shows shape without normals.
+Millions of points are projected orthographically, and occluded points are
+removed by a depth buffer. Edges are darkened where the depth steps (eye-dome
+lighting: Boucheny 2009). The dark edges show shapes without normals.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class View:
     Attributes:
         azimuth_deg: direction from the scene to the camera, seen from above,
             anticlockwise from the x axis [deg].
-        elevation_deg: height of the camera above the horizon, up to 90 [deg].
+        elevation_deg: angle of the camera above the horizon, up to 90 [deg].
         pixels_per_metre: scale of the picture.
     """
 
@@ -55,8 +55,8 @@ class Picture:
 
     Attributes:
         image: (height, width, 3) uint8 pixels.
-        origin: (2,) position of the image's lower left corner, to the right and
-            upwards [m].
+        origin: (2,) position of the image's lower left corner, along axes that
+            point to the right and upwards in the image [m].
         view: the camera.
     """
 

@@ -92,7 +92,7 @@ def without_controls(
 ) -> tuple[list[Condition], list[str]]:
     """Returns the conditions with a change, and a note on the others.
 
-    If no condition has a change, the result contains all of them.
+    If no condition has a change, the result contains all conditions.
     """
     changed = [one for one in conditions if (STAGE, LAST) not in one]
     left = len(conditions) - len(changed)

@@ -1,7 +1,7 @@
 """Sentences on what a chart or a report shows, and on what it does not show.
 
 Two methods differ significantly if the difference of their AUC has a corrected
-p-value below 0.05, see `evaluation.recognition.metrics`.
+p-value below 0.05, see `evaluation.recognition.significance`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

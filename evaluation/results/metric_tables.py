@@ -40,7 +40,8 @@ class MetricTable:
     Attributes:
         name: name of the table.
         rows: (method with its settings, condition) -> row of the metric.
-        answers: the same -> answers; empty if they are unknown.
+        answers: (method with its settings, condition) -> answers to queries;
+            empty if they are unknown.
     """
 
     name: str
@@ -90,7 +91,7 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
 def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
     """Returns (method with settings, condition) -> row or answers.
 
-    An unknown digest of a protocol is taken for that of the shipped protocol.
+    An unknown digest of a protocol is taken for the shipped protocol's digest.
     """
     found = {}
     for key in keys:
@@ -115,7 +116,7 @@ def _check_answers(
     """Checks that answers to queries give the results beside them.
 
     Raises:
-        InputError: a result differs, or the number of queries.
+        InputError: a result or the number of queries differs.
     """
     known = {
         (*row.identity, row.metric): row

@@ -306,7 +306,7 @@ def _wide_table(results: Results) -> dict[str, Any]:
 def _are_counts(values: Iterable[object]) -> bool:
     """Returns whether all numbers are whole, and one is greater than 1.
 
-    That all shares are 0 or 1 may be chance.
+    Numbers that are all 0 or 1 may be shares, and therefore do not suffice.
     """
     numbers = np.array([v for v in values if _is_finite(v)])
     return bool((numbers == np.floor(numbers)).all() and (numbers > 1.0).any())

@@ -21,8 +21,8 @@ class Range(NamedTuple):
     """The values that a metric can have.
 
     Attributes:
-        least, greatest: its limits.
-        is_whole: whether it is a whole number, such as a count.
+        least, greatest: limits of the metric.
+        is_whole: whether the metric is a whole number, such as a count.
     """
 
     least: float = -math.inf
@@ -90,14 +90,14 @@ def range_of(name: str) -> Range | None:
 
 
 def checked(name: str, value: float) -> float:
-    """Returns a value of a metric, without the rounding beyond its range.
+    """Returns a value, moved to its limit if rounding put it out of range.
 
     Args:
         name: name of the metric, head of the column or label of the axis.
         value: the value; NaN if it is unknown.
 
     Raises:
-        InputError: the value cannot be.
+        InputError: the value is impossible for the metric.
     """
     limits = range_of(name)
     if limits is None or math.isnan(value):

@@ -25,7 +25,7 @@ class Agreement(NamedTuple):
 
     Attributes:
         first, second: names of the two tables.
-        methods: names of these methods.
+        methods: names of the methods that are in both tables.
         tau: Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if the two tables
             rank the methods in the same order, -1 if they rank them in opposite
             orders; NaN if all values of a table are equal.
@@ -46,8 +46,9 @@ def rank_agreement(
 
     The interval is by bootstrap. For a table with four or more maps, the
     bootstrap samples maps, because a ranking should hold on other maps, too.
-    For a table with fewer maps, it samples blocks of the routes if the answers
-    to all queries are known, and otherwise the units of `rank_methods`.
+    For a table with fewer maps, the bootstrap samples blocks of the routes if
+    the answers to all queries are known, and otherwise the units of
+    `rank_methods`.
 
     Raises:
         InputError: fewer than two methods have results in all conditions of

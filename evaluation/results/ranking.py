@@ -35,14 +35,14 @@ def rank_methods(
 ) -> tuple[list[Ranked], np.ndarray]:
     """Returns methods ranked by their means over conditions.
 
-    Only conditions count that were measured with all methods. The intervals of
+    Only conditions that were measured with all methods count. The intervals of
     the means are t intervals. The independent units of the intervals are maps
     if there are several maps, and conditions otherwise. Intervals are limited
     to the metric's range. With two or three units, intervals are unknown,
-    because they would say next to nothing. The bootstrap samples contain the
-    same units for all methods and for all tables of the same maps; tables of
-    other maps are sampled independently. For a single condition, the intervals
-    come from the rows.
+    because they would be too wide to be useful. The bootstrap samples contain
+    the same units for all methods and for all tables of the same maps; tables
+    of other maps are sampled independently. For a single condition, the
+    intervals come from the rows.
 
     Args:
         rows: rows of one metric.

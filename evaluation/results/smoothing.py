@@ -18,7 +18,7 @@ _GRID = 60
 
 
 class Curve(NamedTuple):
-    """A smooth curve through points without a gap, with its 95 % band.
+    """A smooth curve through a run of points without gaps, and its 95 % band.
 
     Attributes:
         x: (M,) coordinates of the curve.

@@ -101,8 +101,8 @@ class Summary(NamedTuple):
         method: name of the method, with its settings.
         gate: whether geometric verification was used, which rejects places by
             the method's own pose estimate.
-        value: the number. low, high: limits of the number's interval or range;
-        NaN if unknown.
+        value: the number.
+        low, high: limits of the number's interval or range; NaN if unknown.
         n: number of conditions from which the number is computed; None if
             unknown.
     """
@@ -149,9 +149,10 @@ def excesses(queries: QueryRows) -> list[Summary]:
     The excess is the product a * b minus ab. The excess is 0 if the causes do
     not interact, because the shares then multiply.
 
-    The result has a summary for each pair of causes that were measured together
-    (as a cause whose name joins both names by "+"), and each by itself (at its
-    strongest level). AUCs are means over the seeds.
+    The result has a summary for each pair of causes that were measured both
+    together and each by itself. The two causes together are a cause whose name
+    joins both names by "+". By itself, each cause is taken at its strongest
+    level. AUCs are means over the seeds.
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
@@ -249,8 +250,9 @@ def lifetimes(
     Args:
         results: table of results. The rows of the metric `kept` contain the
             share that is left at each value of the factor; the least value of
-            the factor is that of the baseline. A row that was measured with a
-            single seed, such as that of the baseline, counts for all seeds.
+            the factor is its value in the baseline. A row that was measured
+            with a single seed, such as a row of the baseline, counts for all
+            seeds.
         factor: name of the factor, whose values are numbers.
         shares: the given shares, from 0 to 1.
 

@@ -67,8 +67,8 @@ class Row(Key):
 
     Attributes:
         metric: name of the metric.
-        value: the number; NaN if it is undefined. low, high: limits of the
-        number's 95 % interval; NaN if unknown.
+        value: the number; NaN if it is undefined.
+        low, high: limits of the number's 95 % interval; NaN if unknown.
         n: number of queries, structures or points that count; None if unknown.
     """
 
@@ -181,7 +181,7 @@ class Results:
         """Writes the table as CSV; equal tables give equal bytes.
 
         Raises:
-            InputError: the file cannot be written, or a value cannot be.
+            InputError: the file cannot be written, or a value is impossible.
         """
         with errors_at(str(path)):
             lines = [

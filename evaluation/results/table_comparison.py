@@ -251,11 +251,11 @@ def _ranked_entries(
 ) -> tuple[dict[str, tuple[MetricTable, str]], list[str]]:
     """Returns the methods to rank by their names, and notes on the others.
 
-    A method with the same results in two tables is there once. If the results
-    differ, the name of a table is appended to the name of its method.
+    A method with the same results in two tables appears only once. If the
+    results differ, the name of a table is appended to the name of its method.
 
     Args:
-        tables: the shipped tables, followed by the user's.
+        tables: the shipped tables, followed by the user's tables.
         common: the conditions that all tables have.
     """
     notes = []

@@ -313,8 +313,8 @@ def ranked(
 ) -> list[Cell]:
     """Returns the cells of a row; the two best numbers have ranks 1 and 2.
 
-    Greater numbers are better. Only our numbers are ranked, not those of the
-    paper. Numbers that are equal to four decimals share a rank. A number that
+    Greater numbers are better. Only our numbers are ranked, not the paper's
+    numbers. Numbers that are equal to four decimals share a rank. A number that
     is alone in its row has no rank.
 
     Args:
@@ -407,7 +407,7 @@ class _Form(NamedTuple):
     """How a markup language writes the values of a table.
 
     `marks` are the formats of the best and the second best value in a row.
-    `printed` is the format of our value followed by the paper's.
+    `printed` is the format of our value followed by the paper's value.
     """
 
     escape: Callable[[str], str]

@@ -165,8 +165,8 @@ class TableLines:
         Args:
             path: the file, or a folder that contains it.
             usual: name of the file in a folder.
-            needed: names of columns that the file must have besides those of
-                its keys.
+            needed: names of columns that the file must have besides the columns
+                of its keys.
             known: names of further columns that are not factors.
             may_be_empty: whether the file may have no rows.
 

@@ -38,8 +38,9 @@ class CityReport:
     """The part of a report that one city makes.
 
     Attributes:
-        jobs: name -> job: those of the engine, and those for the page, which
-            draw, explain wrong answers and repeat published runs.
+        jobs: name -> job. The jobs are the jobs of the engine, and jobs for the
+            page, which draw figures, explain wrong answers and repeat published
+            runs.
     """
 
     def __init__(
@@ -162,8 +163,9 @@ class CityReport:
     def _pairs_of_sessions(self) -> Iterator[tuple[Recordings, Pair]]:
         """Yields two pairs for each earlier stage with several drives.
 
-        The database is the first of these drives, and then the places of all of
-        them. The query is the drive through the last stage.
+        The database of the first pair is the first of these drives; the
+        database of the second pair contains the places of all these drives. The
+        query is the drive through the last stage.
 
         Raises:
             InputError: two of these drives are in different worlds.

@@ -157,7 +157,8 @@ def find_evidence(
 def _wrong_places(result: PlaceOutcome) -> np.ndarray:
     """Returns the wrong top-ranked place of each query, (Q,).
 
-    It is -1 if the top-ranked place is right or less than two radii away.
+    The result is -1 for a query whose top-ranked place is right or less than
+    two radii away.
     """
     outcomes = result.outcomes
     is_far = result.columns["distance"] > NEARLY * result.radius

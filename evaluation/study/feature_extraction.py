@@ -131,7 +131,7 @@ def describe_recording(
     """Describes the places or queries of a recording, and keeps their scans.
 
     No map is made. Only the scans of places and queries are read, each once.
-    The arguments are those of `extract_features`.
+    The arguments are the same as for `extract_features`.
     """
     drive = RecentScans(recording, _most_scans(asked))
     seen: list[np.ndarray] = []

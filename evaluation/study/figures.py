@@ -212,8 +212,8 @@ def routes_stem(city: MapDrives) -> str:
 def change_stems(city: MapDrives, pair: Recordings) -> tuple[str, str]:
     """Returns the file names, without ending, of the two figures of a change.
 
-    The first figure shows which points changed, the second figure the sets of
-    points from which TCR is computed.
+    The first figure shows which points changed; the second figure shows the
+    sets of points from which TCR is computed.
 
     Args:
         city: the city.

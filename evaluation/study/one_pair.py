@@ -178,7 +178,7 @@ def pair_of_drive_maps(
 ) -> Pair:
     """Returns a pair of drives or map files whose voxel maps are known.
 
-    The other arguments are those of `pair_of`.
+    The other arguments are the same as for `pair_of`.
     """
     database, query = (
         OpenSource(Path(one.name), drive_map=one) for one in both

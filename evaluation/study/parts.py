@@ -3,8 +3,8 @@
 A part is the file of one intermediate result. The file begins with a line that
 names its format and a line of JSON with its inputs. The result follows (see
 `evaluation.study.value_encoding`), compressed by zstd at its fastest level.
-Compression halves maps. Spectra hardly shrink; compressing 50 MB of spectra
-takes a tenth of a second.
+Compression halves the size of maps. Spectra hardly shrink; compressing 50 MB of
+spectra takes a tenth of a second.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -150,7 +150,7 @@ class Part:
             return decode(data)
 
     def size(self) -> int:
-        """Returns the size of the value in memory, about [bytes].
+        """Returns the approximate size of the value in memory [bytes].
 
         Raises:
             InputError: if there is no such file, or it is damaged.

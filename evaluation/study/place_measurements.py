@@ -57,7 +57,8 @@ def shown_overlaps(
         reporter: unused.
         scans: files with the scans of database and query: a `KeptScans`, or a
             list of scans.
-        described: files with a method's descriptors of both, for the poses.
+        described: files with a method's descriptors of database and query, from
+            which the poses are read.
         choice: the method.
         protocol: protocol by which the queries are shown.
         radii: radii of a match [m].

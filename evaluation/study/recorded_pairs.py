@@ -24,8 +24,8 @@ class RecordedCondition(NamedTuple):
 
     Attributes:
         factors: name -> value of each factor of the condition.
-        stage: `own`: each drive through its own stage; `last`: the control, in
-            which both drives lead through the stage of the query.
+        stage: `own` if each drive goes through its own stage; `last` for the
+            control, in which both drives go through the stage of the query.
         is_baseline: whether other conditions are compared with this one.
         protocol: protocol of place recognition.
         sessions: the recordings of the database, if there are several.

@@ -32,7 +32,7 @@ def remove_descriptors(jobs: Iterable[Job]) -> None:
 
 
 def renew_removed_descriptors(jobs: Collection[Job]) -> None:
-    """Lets jobs compute removed descriptors again that new results need.
+    """Lets jobs compute removed descriptors again if new results need them.
 
     Args:
         jobs: all jobs of a study, each after the jobs that it needs.

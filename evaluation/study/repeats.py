@@ -93,9 +93,9 @@ def repeats_of(
 ) -> list[Repeat]:
     """Returns the second runs of methods on a pair of drives.
 
-    If the reference has published numbers of a method on this pair, measured by
-    another protocol than the study's, the method runs a second time, by that
-    protocol, for comparison.
+    A method runs a second time if the reference has published numbers of the
+    method on this pair, and the protocol of these numbers is not the study's
+    protocol. The second run is by the protocol of the published numbers.
 
     Args:
         stages: names of the map, and of the stages of database and query.

@@ -72,9 +72,9 @@ class StagesReport:
     same files.
 
     A recording can serve as a control: its drive goes through one stage of a
-    map, on the route of the drive through another stage. Comparing the control
-    with the usual drive through the same stage shows the effect of the route
-    only.
+    map, on the route of the drive through another stage. A comparison of the
+    control with the usual drive through the same stage shows only the effect of
+    the route.
 
     Attributes:
         recordings: the recordings. A recording that does not exist yet is made
@@ -201,8 +201,8 @@ class StagesReport:
           the same as those of the experiment `stages`.
         - `figures`: a folder with figures. Figures that exist are kept.
 
-        Wide tables follow if they are asked for. The wide tables are views of
-        the same results:
+        If `with_tables` is true, wide tables are written as well. The wide
+        tables are views of the same results:
 
         - Tables, each as .csv (with all numbers), .md and .tex: `survival`,
           `tcr`, `place_recognition`, `poses`, and `costs` if costs were

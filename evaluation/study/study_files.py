@@ -46,8 +46,8 @@ class FeatureFiles:
 
         Args:
             key: `MethodChoice.key` of the method; for descriptors by a second
-                protocol, the result of `described_key` of
-                `evaluation.study.feature_extraction`.
+                protocol, the result of
+                `evaluation.study.features.described_key`.
         """
         return Part(self.folder / f"described_{file_name(key)}.data")
 

@@ -70,8 +70,8 @@ def visible_change(
     """Returns four values on a pair's visible change; None if unknown.
 
     The values are: the mean visible change (share of a query's scan that its
-    right place does not show); the number of queries; the mean minus that of
-    the control; and this difference as a share of the mean.
+    right place does not show); the number of queries; the mean minus the mean
+    in the control; and this difference as a share of the pair's mean.
     """
     known = evidence.get((database, query))
     if known is None:

@@ -12,11 +12,11 @@
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
-show. By default, the task is `place`, or else the only task with the metric,
-and `gate` is 0 (without geometric verification). Each method has the same
-colour in all charts. The title says in words what the chart shows. If the
-answers to all queries are known, the title also says which methods differ by
-the test of `evaluation.recognition.metrics`.
+show. By default, `gate` is 0 (without geometric verification), and the task is
+`place`; if `place` does not have the metric, the first task that has it. Each
+method has the same colour in all charts. The title says in words what the chart
+shows. If the answers to all queries are known, the title also says which
+methods differ by the test of `evaluation.recognition.significance`.
 
 `kinds` checks and draws a chart of any kind.
 """

@@ -29,8 +29,8 @@ class Chart:
     """What a chart shows.
 
     Attributes:
-        keys: the fields of the chart's description, without its kind and
-            without those that select rows.
+        keys: the fields of the chart's description, except the kind and the
+            fields that select rows.
         results: the whole table of results.
         rows: the selected rows of the chart's metric.
         styles: method as in the legend -> its colour, line style and marker.
@@ -99,7 +99,7 @@ def with_significance(message: str, chart: Chart, at: object) -> str:
 
 
 def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
-    """Makes axes start at 0 whose metric cannot be negative.
+    """Makes an axis start at 0 if its metric cannot be negative.
 
     Args:
         axes: a panel in which everything is drawn.

@@ -111,8 +111,8 @@ def _selected_rows(
 def _file_names(rows: Sequence[Row]) -> dict[tuple[str, object], str]:
     """Returns settings of methods that name files, without their folders.
 
-    Paths are too long for a chart. If two paths of a table end alike, all paths
-    stay whole.
+    Paths are too long for a chart. If two paths of a table end in the same
+    name, all paths stay whole.
 
     Returns:
         (Column, value) -> the value without folders; empty if nothing changes.

@@ -152,12 +152,12 @@ class Jobs:
 
         Args:
             pair: the pair.
-            needs: list to which the names of the jobs are appended that write
-                the files.
+            needs: list to which the names of the jobs that write the files are
+                appended.
 
         Returns:
             For each drive, the file with the scans of its places, and one file
-            per method with their descriptors.
+            per method with the descriptors of these places.
         """
         found = []
         for drive in pair.beside:
@@ -177,8 +177,8 @@ class Jobs:
 
         Args:
             pair: the pair; without distractors, the result is empty.
-            needs: list to which the names of the jobs are appended that
-                describe these drives.
+            needs: list to which the names of the jobs that describe these
+                drives are appended.
 
         Returns:
             For each drive through another city, one file per method with the

@@ -54,9 +54,9 @@ NOT_LOCALISED = ": not localised"
 class LocaliseTask(Task):
     """Measures how well scans are aligned to a map from wrong initial poses.
 
-    With the setting `odometry_drift`, whole drives are tracked, instead of
-    aligning single scans. The setting `estimator` contains settings of all
-    registration methods.
+    With the setting `odometry_drift`, whole drives are tracked; without this
+    setting, single scans are aligned. The setting `estimator` contains settings
+    of all registration methods.
     """
 
     name = "localise"

@@ -104,7 +104,8 @@ class Task(abc.ABC):
         Args:
             found: the task's result for the pair.
             before: the task's result for the same drives in the baseline
-                condition; None for the baseline itself, or if there is none.
+                condition; None for the baseline itself, or if there is no
+                baseline.
         """
 
     def answers(self, found: Any) -> Iterable[Answered]:
