@@ -97,7 +97,7 @@ class StageWriter:
         """Writes the meshes of a stage, and counts its contents.
 
         Meshes that an earlier stage also uses are not written again. The
-        arguments are those of `stage`.
+        arguments are the same as for `stage`.
         """
         new = [one for one in standing.values() if one is not None]
         old = [name for name, one in standing.items() if one is None]
@@ -130,10 +130,10 @@ class StageWriter:
     def table(self, new: Mapping[str, Structure]) -> None:
         """Writes the structure table of all stages.
 
-        Today's structures come first, then those of later years (`new`) in the
-        order in which they are built, and last those of the past. If more years
-        after today are added, the instance ids of structures built before stay
-        the same.
+        Today's structures come first. Structures of later years (`new`) follow
+        in the order in which they are built, and structures of the past come
+        last. If more years after today are added, the instance ids of
+        structures built before stay the same.
 
         Raises:
             InputError: there are more structures than instance ids.

@@ -79,8 +79,8 @@ def draft_folder(folder: Path, *, replaces: bool = False) -> Iterator[Path]:
 def remove_folder(folder: Path) -> None:
     """Renames a folder, then removes it.
 
-    If the process is killed meanwhile, no incomplete folder is left under the
-    original name.
+    If the process is killed before the folder is removed, no incomplete folder
+    is left under the original name.
 
     Raises:
         InputError: if the folder cannot be removed.
@@ -184,7 +184,7 @@ def _new_part(path: Path) -> Path:
     """Returns the part name of a file that may be written.
 
     Raises:
-        InputError: the name is that of a folder, link, device or pipe.
+        InputError: the path is a folder, link, device or pipe.
     """
     with user_errors(path):
         mode = path.lstat().st_mode if os.path.lexists(path) else stat.S_IFREG

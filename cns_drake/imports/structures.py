@@ -64,11 +64,11 @@ class ImportedStructure:
 
     @property
     def num_own_triangles(self) -> int:
-        """Number of triangles that the structure shares with no other one.
+        """Number of triangles that only this structure has.
 
-        A building has its own meshes, with all details. The meshes of any other
-        structure may be shared, as those of trees are; `triangles` are counted
-        instead.
+        A building has its own meshes, and their triangles are counted, with all
+        details. The meshes of any other structure may be shared, as trees share
+        meshes; the triangles in the attribute `triangles` are counted then.
         """
         if self.is_building:
             return self.structure.model.num_triangles

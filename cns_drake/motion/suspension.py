@@ -215,7 +215,7 @@ class Suspension:
 
         Args:
             inputs: (N, W + 3) loads at N times, for a car with W wheels. The
-                columns are those of `Suspension.at_rest`.
+                columns are the same as in `Suspension.at_rest`.
             step: time between two rows [s].
 
         Returns:

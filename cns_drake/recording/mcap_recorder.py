@@ -57,9 +57,9 @@ class RecordedCamera(NamedTuple):
     Attributes:
         info: intrinsics as Drake describes them.
         X_BC: pose of C in B.
-        depth: camera of the depth images, if this camera's intrinsics or pose
-            differ from those of the colour images. Depth images then have the
-            frame `<camera>_depth`, and intrinsics on the topic
+        depth: camera of the depth images, if its intrinsics or pose differ from
+            the colour camera's. Depth images then have the frame
+            `<camera>_depth`, and intrinsics on the topic
             `/<camera>/depth/camera_info`.
     """
 

@@ -210,8 +210,8 @@ def _box_fields(numbers: np.ndarray) -> tuple[tuple, np.ndarray]:
 def motion_table(objects: RecordedObjects) -> np.ndarray:
     """Returns the positions and velocities of N objects as records (N,).
 
-    The fields are those of `MOTION_DTYPE`: x, y, z [m], vx, vy, vz [m/s],
-    yaw_rate [rad/s], instance and moving, all in the world W.
+    The fields of `MOTION_DTYPE` are x, y, z [m], vx, vy, vz [m/s], yaw_rate
+    [rad/s], instance and moving. Positions and velocities are in the world W.
     """
     table = np.zeros(len(objects.instance), MOTION_DTYPE)
     for names, values in (("x y z", objects.p_WO), ("vx vy vz", objects.v_WO)):

@@ -46,7 +46,7 @@ class PartFile(io.BufferedRandom):
     def starts_like(self, content: bytes) -> bool:
         """Returns whether the existing file and a content begin alike.
 
-        They are compared up to the end of the shorter one.
+        File and content are compared up to the end of the shorter of the two.
         """
         self.seek(0)
         found = self.read(len(content))

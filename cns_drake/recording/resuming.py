@@ -46,7 +46,7 @@ def _complete_frames(
     schedule: Schedule,
     frame_topic: str,
 ) -> Iterator[list[RecordedMessage]]:
-    """Yields the messages of each frame, up to the first incomplete one.
+    """Yields the messages of each frame, up to the first incomplete frame.
 
     A frame is yielded before the first message behind it is read.
 

@@ -203,9 +203,10 @@ def _offset_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and greatest offsets (N,) to the left of a path [m].
 
-    At each point, both are the limits of the free interval of offsets that is
-    nearest to the path. They are narrowed so that they hold over the whole
-    length over which offsets are smoothed. Both are 0 where there is no room.
+    At each point, the two offsets are the limits of that free interval which is
+    nearest to the path. The interval is narrowed so that it is free over the
+    whole length over which offsets are smoothed. Both offsets are 0 where there
+    is no room.
     """
     free = _has_room(points[::_CHECK_STRIDE], _TRIED_OFFSETS, obstacles)
     low, high = np.zeros((2, len(free)))

@@ -129,8 +129,8 @@ def _refuse_loops(
 ) -> None:
     """Raises an InputError if any inner waypoint needs a loop.
 
-    `turns` (N - 2,) [rad] and `is_loop` (N - 2,) are for the inner ones of N
-    waypoints, and `names` contains the names of all.
+    `turns` (N - 2,) [rad] and `is_loop` (N - 2,) are for the inner waypoints of
+    N waypoints, and `names` contains the names of all N.
     """
     for k in np.flatnonzero(is_loop):
         raise InputError(

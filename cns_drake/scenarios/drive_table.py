@@ -97,7 +97,7 @@ def write_table(
 ) -> None:
     """Updates the table of drives in a map's folder.
 
-    A folder without drives gets no table. The arguments are those of
+    A folder without drives gets no table. The arguments are the same as for
     `drive_rows`.
 
     Raises:

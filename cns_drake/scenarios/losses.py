@@ -1,10 +1,11 @@
 """Structures that an experiment removes from the city of a drive.
 
-A share of the buildings and plants is missing. The missing structures are those
-nearest to a random place, so a drive with a greater share lacks everything that
-a drive with a smaller share lacks. The removed structures can also be limited
-to structures that an earlier stage lacks; the city is then between the two
-stages. In addition, structures of chosen classes can be missing at random.
+A share of the buildings and plants is missing. The missing structures are the
+structures nearest to a random place, so a drive with a greater share lacks
+everything that a drive with a smaller share lacks. The removed structures can
+also be limited to structures that an earlier stage lacks; the city is then
+between the two stages. In addition, structures of chosen classes can be missing
+at random.
 """
 
 from collections.abc import Mapping, Set
@@ -159,8 +160,8 @@ def _scattered_losses(
 ) -> frozenset[str]:
     """Returns a random share of the structures of each class.
 
-    `shares` maps classes to shares from 0 to 1. The structures of a smaller
-    share are among those of a greater share.
+    `shares` maps classes to shares from 0 to 1. A greater share contains all
+    structures of a smaller share.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]
     rows = [row for row in records if not _is_on_a_lot(row)]

@@ -421,8 +421,8 @@ class Scenario(Section):
             driver: `none` for a driver who stays in the middle of the lane, or
                 `real` for a driver who wanders and changes lanes as in
                 published drives. Along waypoints, which have no lanes, the
-                driver `real` only wanders. The seed of the driver stays the
-                same.
+                driver `real` only wanders. The driver `real` keeps the
+                scenario's seed of the driver.
         """
         if driver == "none":
             return self.replaced(driver=DriverConfig())

@@ -49,8 +49,8 @@ class GeometryRecord(NamedTuple):
 class GeometryList(tuple[GeometryRecord, ...]):
     """The records of all geometry with a role, in the order of the SceneGraph.
 
-    The order is that of `GetAllGeometryIds`, which Drake documents as stable,
-    so the list depends only on the SceneGraph.
+    The order is the order of `GetAllGeometryIds`. Drake documents this order as
+    stable, so the list depends only on the SceneGraph.
     """
 
     def __deepcopy__(self, memo: dict) -> GeometryList:

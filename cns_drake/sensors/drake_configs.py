@@ -128,8 +128,9 @@ class ImuConfig:
         name: name of the systems; the channel is `DRAKE_IMU_<name>`.
         X_PB: pose of the sensor B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
-        rate: samples per second, any number as for `add_imu`; by default the
-            rate in the file `kalibr`, or else 20.
+        rate: samples per second; any number is possible, as for `add_imu`. By
+            default the rate in the file `kalibr`, or 20 if no file states a
+            rate.
         kalibr: path of a file in Kalibr's format with the noise densities; by
             default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias of
@@ -275,7 +276,7 @@ def ApplyImuConfig(
         config: description of the IMU.
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
-        scene_graph: ignored, so that the signature is that of Drake's
+        scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
         lcm_buses: the available buses; `config.lcm_bus` names one of them.
         lcm: interface to publish on, instead of a bus. If both `lcm_buses` and
@@ -332,7 +333,7 @@ def ApplyOdometryConfig(
         config: description of the odometry.
         builder: builder of the diagram.
         plant: finalized plant; by default the system named `plant`.
-        scene_graph: ignored, so that the signature is that of Drake's
+        scene_graph: ignored, so that the function has the arguments of Drake's
             `ApplyCameraConfig`.
         lcm_buses: the available buses; `config.lcm_bus` names one of them.
         lcm: interface to publish on, instead of a bus. If both `lcm_buses` and

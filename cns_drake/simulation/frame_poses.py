@@ -30,8 +30,8 @@ class FramePoses(LeafSystem):
     `traffic_poses` and `frame_poses` are abstract, of type `KnownPoses`.
 
     A LiDAR that has all poses need not ask the SceneGraph, which would compute
-    the poses of all geometry. That would take 5 % of a scan's time without
-    traffic, and a third with traffic.
+    the poses of all geometry. This computation would take 5 % of a scan's time
+    without traffic, and a third of a scan's time with traffic.
     """
 
     def __init__(self, plant: MultibodyPlant, traffic: TrafficMotion | None):

@@ -51,7 +51,7 @@ def add_mcap_recorder(
     `/<name>/depth/camera_info` if depth images have other intrinsics or another
     pose than colour images (the frame of depth images is then `<name>_depth`);
     `/imu/data` for an IMU; and `/odometry` for odometry. The poses of sensors
-    on the same body as the odometry are in `/tf_static`; those of all other
+    on the same body as the odometry are in `/tf_static`; the poses of all other
     sensors are in `/tf`.
 
     A sensor with an entry in `rates` is recorded at this rate. An IMU that was

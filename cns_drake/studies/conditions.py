@@ -34,7 +34,8 @@ class Condition:
             alternatives: the fields for the wanted level of change, followed by
             the fields for each lower level. The first alternative that is
             possible on a map is used.
-        is_baseline: whether other conditions are compared with this one.
+        is_baseline: whether all other conditions are compared with this
+            condition.
     """
 
     factors: Changes

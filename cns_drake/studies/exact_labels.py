@@ -17,7 +17,7 @@ B's world is there, `gone` if B's drive observes it and no surface is there, and
 A's world decide whether a point of the newer map B is `kept`, `new` or `newly
 seen`.
 
-The poses of a drive are those of the scans that make its map. Surfaces are
+The poses of a drive are the poses of the scans that make its map. Surfaces are
 ideal: glass and leaves count as solid geometry.
 """
 

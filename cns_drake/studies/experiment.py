@@ -280,7 +280,7 @@ def named_programs(fields: Any) -> list[str]:
 
 
 def in_long_form(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns fields of an experiment with short forms replaced by long ones.
+    """Returns fields of an experiment, with long forms in place of short forms.
 
     A field that cannot be used stays as it is, for the validation of
     `Experiment` to name it.

@@ -92,7 +92,7 @@ def write_truth(
 
 
 def _check_same_map(a: LabelledDrive, b: LabelledDrive) -> None:
-    """Refuses drives of different map folders, even of the same name.
+    """Refuses drives of two map folders, even if the folders' names are equal.
 
     For worlds without a map folder this cannot be checked; the user must make
     sure that both show the same place.

@@ -115,8 +115,8 @@ def session_factors(place: str, factors: Changes) -> dict[str, Any]:
 def years_aged(database: Changes, sessions: Mapping[str, Changes]) -> int:
     """Returns by how many years the city of the query is aged.
 
-    These are the years of the oldest drive of the database. The years of the
-    database itself count, too, even if each drive has years of its own: so
+    The result is the years of the oldest drive of the database. The years of
+    the database itself count, too, even if each drive has years of its own: so
     databases of different drives have the same query.
 
     Args:

@@ -160,7 +160,7 @@ class Study:
         """Measures all conditions; returns the path of the study's page.
 
         Args:
-            maps: names or folders of maps that replace those of the experiment.
+            maps: names or folders of maps that replace the experiment's maps.
 
         Raises:
             InputError: a map or the folder cannot be used, or a step failed.
@@ -209,7 +209,7 @@ class Study:
         """Returns all drives that the study compares, after making their maps.
 
         Args:
-            maps: names or folders of maps that replace those of the experiment.
+            maps: names or folders of maps that replace the experiment's maps.
 
         Raises:
             InputError: a map cannot be used, or its drives are recordings.

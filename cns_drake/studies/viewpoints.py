@@ -47,8 +47,8 @@ def with_lidars_beside(
 ) -> Scenario:
     """Returns a drive of a database along the route of the queries.
 
-    Its LiDARs are moved 1.25 m ahead, too, so that the two drives do not
-    coincide.
+    The LiDARs of the returned drive are also moved 1.25 m ahead, so that the
+    two drives do not coincide.
 
     Args:
         drive: the drive.

@@ -37,7 +37,7 @@ class PathRun(NamedTuple):
         first, last: where on the path the front bumper enters and leaves the
             piece [m].
         s: place on the piece where the front bumper enters [m].
-        beside: the lane from which the car changes to this one; -1 for none.
+        beside: the lane from which the car changes to this piece; -1 for none.
         parts: where on the path the car has left that lane [m].
     """
 

@@ -218,8 +218,8 @@ def grant_ways(traffic: Traffic, k: int) -> None:
 def _is_soon_free(traffic: Traffic, i: int, way: int, t: float) -> bool:
     """Returns whether the i-th vehicle would hardly have to wait on its way.
 
-    It would not if pedestrians and vehicles on other ways will have passed the
-    conflicting places when it gets there.
+    The vehicle would not have to wait if pedestrians and vehicles on other ways
+    will have passed the conflicting places when the vehicle gets there.
     """
     streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     car = cars[i]

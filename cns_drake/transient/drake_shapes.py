@@ -24,8 +24,8 @@ def memory_mesh(
 ) -> geometry.Mesh:
     """Returns a mesh in memory; equal meshes give the same text.
 
-    Readers thus recognise them as the same mesh. The mesh has vertices (N, 3),
-    before they are scaled [m], and triangles (M, 3).
+    Readers thus recognise equal meshes as the same mesh. The mesh has vertices
+    (N, 3), before they are scaled [m], and triangles (M, 3).
     """
     used, corners = np.unique(triangles, return_inverse=True)
     # Python's numbers are formatted several times faster than NumPy's.

@@ -84,7 +84,7 @@ class _Site:
     rng: np.random.Generator
 
     def build(self, standing: Obstacles) -> None:
-        """Adds fences, machines where there is room, and new kerb stones.
+        """Adds fences and new kerb stones, and machines where there is room.
 
         Args:
             standing: areas of all objects that stand on the ground.

@@ -94,7 +94,7 @@ class Drive(abc.ABC):
 
     @property
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """All recorded poses of the LiDAR, at least that of each scan.
+        """All recorded poses of the LiDAR, at least one for each scan.
 
         Returns:
             Stamps (M,) [ns], strictly increasing, and poses X_WS (M, 4, 4).

@@ -113,7 +113,7 @@ def _source(module: _Module) -> Path | None:
 
 
 def _imported_modules(module: _Module) -> Iterator[_Module]:
-    """Yields imported modules of this project, or beside a script.
+    """Yields imported modules of this project, and modules beside a script.
 
     Beside an installed package stand all other installed packages. Their
     versions count (`_LIBRARIES`), not their sources.

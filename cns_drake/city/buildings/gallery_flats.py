@@ -91,7 +91,7 @@ def _add_ground(p: GalleryFlats, slab: np.ndarray) -> float:
 
 
 def _storey_walls(p: GalleryFlats, storey: float, open_edge: int) -> Facade:
-    """Returns the facade of a storey, from its floor to the next one.
+    """Returns the facade of a storey, from its floor to the next floor.
 
     Doors and windows of the flats are on the side of the gallery, loggias on
     the opposite side. The ends have windows in the middle.

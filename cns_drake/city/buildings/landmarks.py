@@ -15,7 +15,7 @@ model's meshes as OBJ files, and `model.yaml`:
       yaw: 1.5708         # heading, a multiple of pi/2 [rad]; 0 by default
       scale: [1, 1, 2]    # scale of a mesh in `object_meshes`; 1 by default
       rgb: [0.8, 0.74, 0.64]
-      material: glass     # name of the material; that of the class by default
+      material: glass     # name of the material; by default the class's own
 """
 
 from collections import defaultdict

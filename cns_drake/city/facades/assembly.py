@@ -105,7 +105,7 @@ class Assembly(Dice):
         """Turns the meshes of all materials about z, and then moves them.
 
         `yaw` is the angle [rad] and `translation` (3,) the shift [m]. Parts
-        that are already complete, such as those from `add`, stay where they
+        that are already complete, such as parts from `add`, stay where they
         are.
         """
         for material, pieces in self._pieces.items():

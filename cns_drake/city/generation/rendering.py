@@ -144,7 +144,8 @@ def render_stages(
 
     Raises:
         InputError: the stages demand that a structure is lower or under
-            construction, and it cannot be; or the city has too many structures.
+            construction, but the structure cannot be; or the city has too many
+            structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
     if len(growing.structures) > MAX_INSTANCE:

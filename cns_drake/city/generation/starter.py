@@ -167,8 +167,9 @@ def starter_stages(city: City, missing: float = _MISSING) -> dict:
 
     Args:
         city: the whole city.
-        missing: share of the buildings that the first stage lacks: those
-            farthest to the east. The stage also lacks the trees between them.
+        missing: share of the buildings that the first stage lacks; these are
+            the buildings farthest to the east. The first stage also lacks all
+            trees that are as far to the east.
     """
     kinds = "building", "vegetation"
     standing = [s for s in city.structures if s.semantic_class in kinds]

@@ -86,7 +86,7 @@ class Structure:
     def p_WFs(self) -> np.ndarray:
         """Lowest points (N, 3) of the model, its feet, in W [m].
 
-        They are all vertices at most 0.05 m above the lowest one.
+        The feet are all vertices at most 0.05 m above the lowest vertex.
         """
         model = self.model
         meshes = [part_mesh(part, model.meshes) for part in model.parts]

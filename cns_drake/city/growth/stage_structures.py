@@ -57,7 +57,7 @@ class GrowingCity:
         Raises:
             KeyError: if there is no such stage.
             ValueError: the stage demands that a structure is lower or under
-                construction, and it cannot be.
+                construction, but the structure cannot be.
         """
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)

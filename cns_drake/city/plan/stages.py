@@ -98,7 +98,7 @@ class Stages(_Model):
     def heights(self, stage: str) -> dict[str, float]:
         """Returns name -> height [m] of structures that still have to grow.
 
-        The heights are those in the stage `stage`. The result can contain
+        The heights are the heights in the stage `stage`. The result can contain
         structures that do not exist yet in this stage; see `absent`.
 
         Raises:

@@ -1,4 +1,4 @@
 """Adds details to the plain shapes of an imported city.
 
-The details follow from tags in the file and are otherwise random.
+Details follow from tags in the file. Details without a tag are random.
 """

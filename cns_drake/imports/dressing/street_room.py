@@ -207,8 +207,8 @@ class StreetRoom:
     def _standing_heights(self, feet: np.ndarray) -> np.ndarray:
         """Returns the heights (N,) on which feet (N, 2) stand [m].
 
-        These are the heights of streets and other ground in the file, or else
-        of the guessed ground.
+        Feet stand on the streets and other ground in the file or, where the
+        file has no ground, on the guessed ground.
         """
         heights, guessed = self._laid.heights(feet), self._ground.height(feet)
         is_laid = np.isfinite(heights) & (heights < guessed + _BRIDGE_HEIGHT)

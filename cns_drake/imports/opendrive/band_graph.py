@@ -154,7 +154,8 @@ def _heading(two: np.ndarray) -> float:
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
     """Returns a running mean (N, 3) of points, narrower at both ends.
 
-    It extends over `window` points to both sides.
+    The mean extends over `window` points to both sides, and over fewer points
+    near both ends.
     """
     count = len(points)
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(points, axis=0)])

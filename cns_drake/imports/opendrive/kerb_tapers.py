@@ -107,7 +107,7 @@ def _num_straight_edges(xy: np.ndarray, ahead: np.ndarray) -> int:
 def _kerb_line(xy: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     """Returns the first corners (M, 2) of a kerb, as far as it runs straight.
 
-    If the kerb soon steps back, the corner behind that step is the last one.
+    If the kerb soon steps back, the corner behind that step is the last corner.
 
     Args:
         xy: (N, 2) corners of the kerb, a ring with the carriageway on its left

@@ -55,7 +55,7 @@ def _read_mark_lines(
 ) -> list[road_model.MarkLine] | None:
     """Returns the lines of a mark (ASAM OpenDRIVE 1.7, 11.9.3).
 
-    A line without a plausible width has the usual one [m]. The result is None
+    A line without a plausible width has the usual width [m]. The result is None
     if a line has impossible lengths.
     """
     found = []

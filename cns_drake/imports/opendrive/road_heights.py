@@ -81,14 +81,15 @@ class KerbHeights:
     """The height of imported sidewalks above the road, by place.
 
     An object is called with places (N, 2) in W [m], and returns heights (N,)
-    [m]. `differ` says whether any kerb has another height than the usual one.
+    [m]. `differ` says whether the height of any kerb differs from the usual
+    height.
     """
 
     def __init__(self, bands: Sequence[LaneBand], usual: float):
         """Takes the lanes on the ground, and the usual height of a kerb [m].
 
         Kerbs without a height in the file, or away from sidewalks, have the
-        usual one.
+        usual height.
         """
         self._usual = usual
         rows = [np.zeros((0, 6))]

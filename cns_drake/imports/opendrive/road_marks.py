@@ -249,7 +249,7 @@ def _painted_quads(
 
 
 def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
-    """Returns the lines of a mark, from the file or else the usual ones.
+    """Returns the lines of a mark in the file, or else the usual lines.
 
     `side` is positive if the left of the border is outwards.
     """

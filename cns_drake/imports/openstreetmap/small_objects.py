@@ -50,7 +50,7 @@ def object_kind(tags: Tags) -> str | None:
 def make_small_objects(
     features: OsmFeatures, local: LocalMetres
 ) -> Iterator[SmallObject]:
-    """Yields small objects: those at nodes, and the trees of tree rows.
+    """Yields small objects: objects at nodes, and the trees of tree rows.
 
     `local` converts places of the file to metres in W.
     """

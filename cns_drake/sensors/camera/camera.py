@@ -52,7 +52,7 @@ _OPTICAL = RigidTransform(
 def optical_pose(config: CameraSection) -> RigidTransform:
     """Returns the pose X_BC of a camera's optical frame C in base_link (B).
 
-    The axes of C are those of an image: x right, y down, z forward.
+    The axes of C follow the image: x right, y down, z forward.
     """
     return (
         RigidTransform(RollPitchYaw(np.radians(config.rpy_deg)), config.xyz)

@@ -86,8 +86,8 @@ class VehicleImu(LeafSystem):
     """Measures like an accelerometer and a gyroscope on a vehicle.
 
     Up to rounding and added errors, the values equal the values of Drake's
-    `Accelerometer` and `Gyroscope`. This system is much faster, because it
-    computes many samples at once from a known trajectory.
+    `Accelerometer` and `Gyroscope`. This system is much faster than Drake's
+    systems, because it computes many samples at once from a known trajectory.
 
     .. pydrake_system::
 

@@ -69,8 +69,8 @@ def add_lidar(
         body: the carrier P: a body of a finalized plant that is registered with
             `scene_graph`, a frame that is fixed on such a body, or a FrameId
             that any other source has registered with `scene_graph`. A frame on
-            a body keeps the pose from its model, even if a Context changes it,
-            as for Drake's cameras.
+            a body keeps its pose in the model, even if a Context gives the
+            frame another pose. Drake's cameras behave in the same way.
         X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
             the frame of the sensor is S.
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
@@ -251,8 +251,8 @@ def add_described_lidar(
         weather: weather of calibrated returns.
         period: duration of a revolution [s]; by default it follows from the
             rate in the description.
-        unseen: bodies that the LiDAR does not see. This argument and the
-            following ones are the same as for `add_lidar`.
+        unseen: bodies that the LiDAR does not see. This argument and all
+            further arguments are the same as for `add_lidar`.
         motion_distortion: whether the bodies of the LiDAR's plant keep moving
             during a revolution. A recorded drive connects a `Sweep` instead of
             setting this argument.
@@ -349,8 +349,8 @@ def _returns_model(
 ) -> CalibratedReturns | None:
     """Returns the model of calibrated returns, None for ideal returns.
 
-    The arguments are those of `add_lidar`; `preset` is None for a pattern that
-    is not given by the name of a preset.
+    The arguments are the same as for `add_lidar`; `preset` is None for a
+    pattern that is not given by the name of a preset.
 
     Raises:
         ValueError: calibrated returns need a preset, or the seed is given

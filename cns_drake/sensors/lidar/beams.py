@@ -180,7 +180,7 @@ class LimitedPattern(BeamPattern):
         azimuths_deg: tuple[float, float],
         elevations_deg: tuple[float, float],
     ):
-        """Limits a pattern; the arguments are those of `BeamPattern.within`.
+        """Limits a pattern; the arguments are as for `BeamPattern.within`.
 
         Args:
             whole: the pattern.

@@ -110,7 +110,8 @@ class Lidar(LeafSystem):
     are moving: their points get the label of the moving class.
 
     `frame_poses` (abstract, `KnownPoses`) repeats poses X_WF of the SceneGraph
-    in one array. Many poses are read faster from this array.
+    in one array. Many poses are read faster from this array than from the
+    SceneGraph.
 
     Drake cannot cast rays. The system therefore reads shapes and poses from the
     QueryObject, casts rays on a hierarchy of its own, and rebuilds the parts of

@@ -1,4 +1,4 @@
-"""Random numbers without the state of a generator: of beams, and of places.
+"""Random numbers of beams and of places, without the state of a generator.
 
 The random number of a beam depends only on a key, the beam and the number's
 index among the numbers of this beam. The random number of a place depends only
@@ -65,8 +65,7 @@ def normal(
     with PPND7, the short form of AS 241 (Wichura, Applied Statistics 37, 1988),
     which is exact to seven digits.
 
-    The arguments are those of
-    `cns_drake.sensors.returns.random_numbers.uniform`.
+    The arguments are as for `cns_drake.sensors.returns.random_numbers.uniform`.
     """
     result = uniform(key, beam, draw)
     for k, u in enumerate(result):

@@ -45,8 +45,8 @@ class TrainingPlan:
         returns: whether some drives have calibrated returns and weather.
         driver: whether drivers wander and change lanes.
         drawn_streets: whether the streets of the cities are sampled at random.
-        graded: whether exact overlaps determine which places are right, instead
-            of distances.
+        graded: whether exact overlaps, and not distances, determine which
+            places are right.
     """
 
     cities: int
