@@ -65,6 +65,8 @@ class OldWorld:
         built: name of a structure -> year of construction, for structures whose
             year is in the table.
         today: calendar year of the stage; None if the table has no years.
+        folder: the folder of the map.
+        path: the SDF file of the stage.
     """
 
     def __init__(self, folder: MapFolder):

@@ -81,7 +81,7 @@ def show(
         print_rows(rows)
 
 
-def number(value: float | None) -> str:
+def number_text(value: float | None) -> str:
     """Returns a number as text with four decimals.
 
     None and NaN become "undefined".

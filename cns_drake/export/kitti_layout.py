@@ -12,7 +12,7 @@ from cns_drake.export.layout import (
     Layout,
     imu_files,
     scenario_files,
-    seconds,
+    seconds_text,
     structure_files,
 )
 
@@ -52,7 +52,9 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
         # Readers of KITTI look for it in `poses`, and those of SemanticKITTI
         # here.
         "poses.txt": _poses_text(drive),
-        "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
+        "times.txt": "".join(
+            f"{seconds_text(ns)}\n" for ns in elapsed_ns.tolist()
+        ),
         "calib.txt": "".join(
             f"{key}: {_pose_rows(X[None])}" for key, X in calibration.items()
         ),

@@ -149,7 +149,7 @@ def check_odometry(drive: McapDrive) -> None:
         )
 
 
-def seconds(stamp_ns: int) -> str:
+def seconds_text(stamp_ns: int) -> str:
     """Returns a time stamp [ns] as text in seconds with nine decimals."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 

@@ -10,7 +10,7 @@ from cns_drake.export.layout import (
     checked_name,
     imu_files,
     odometry_columns,
-    seconds,
+    seconds_text,
     stamped_rows,
 )
 
@@ -20,12 +20,12 @@ def _inner_files(drive: McapDrive) -> dict[str, str]:
     quat_WS = Rotation.from_matrix(X_WS[:, :3, :3]).as_quat(canonical=True)
     return {
         "base_link.tum": stamped_rows(
-            map(seconds, X_WB["stamp_ns"].tolist()),
+            map(seconds_text, X_WB["stamp_ns"].tolist()),
             odometry_columns(drive),
             " ",
         ),
         "lidar.tum": stamped_rows(
-            map(seconds, drive.stamps_ns.tolist()),
+            map(seconds_text, drive.stamps_ns.tolist()),
             [X_WS[:, :3, 3], quat_WS],
             " ",
         ),

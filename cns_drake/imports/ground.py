@@ -46,6 +46,11 @@ class Ground:
 
     The constructor takes the coordinates `xs` (C,) and `ys` (R,) of the grid in
     W, and the heights `z` (R, C) at its points [m].
+
+    Attributes:
+        xs, ys: coordinates of the grid in W, (C,) and (R,) [m].
+        z: (R, C) heights at the points of the grid [m].
+        cell: distance between neighbouring points of the grid [m].
     """
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):

@@ -62,6 +62,9 @@ class SmoothPath:
     bend of radius r, the curve runs spacing^2 / (4 r) inside the points. The
     curvature is continuous. The parameter u runs from 0 to `end`, in metres
     along the points.
+
+    Attributes:
+        spacing: distance between neighbouring points [m].
     """
 
     def __init__(self, points: np.ndarray, spacing: float):

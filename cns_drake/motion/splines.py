@@ -44,7 +44,11 @@ def make_uniform_spline(
 
 
 class SplineDerivatives:
-    """A spline and its lower derivatives, to evaluate at many parameters."""
+    """A spline and its lower derivatives, to evaluate at many parameters.
+
+    Attributes:
+        end: greatest parameter of the spline.
+    """
 
     def __init__(self, spline: BsplineTrajectory, count: int):
         """Takes the spline and the number of derivatives to prepare."""

@@ -135,6 +135,9 @@ class Suspension:
     wheels [m]. All coordinates are zero at rest on a level road. The body
     rotates about the point on the ground below its centre of mass. The model
     has no anti-dive or anti-squat geometry.
+
+    Attributes:
+        masses: masses of the car.
     """
 
     # The source of the shipped rates has the same centre of rotation.

@@ -50,6 +50,10 @@ class Trajectory:
     unless the body moves on springs relative to F. Velocities and accelerations
     are exact derivatives of splines, and not differences of samples. The motion
     starts and ends at rest.
+
+    Attributes:
+        path: the smooth path of F's origin.
+        speed_profile: speed along the path.
     """
 
     def __init__(self, lane_path: LanePath, speeds: Speeds):

@@ -56,6 +56,9 @@ class MeshcatRecorder(LeafSystem):
     The poses of all moving frames are recorded at every frame. Scans are
     recorded whenever the vehicle has driven another `scan_spacing` metres. On a
     long drive, this spacing is doubled whenever the page has too many scans.
+
+    Attributes:
+        drive: what was recorded so far.
     """
 
     def __init__(

@@ -15,6 +15,13 @@ class RecordingFolder:
     contains a hash of everything that determines the recording; see
     `cns_drake.scenarios.provenance`. `metadata.yaml` is completed last, so a
     folder with this file contains a finished recording.
+
+    Attributes:
+        path: the folder, as an absolute path.
+        mcap: path of the MCAP file.
+        scenario: path of `scenario.yaml`.
+        fingerprint: path of `fingerprint.txt`.
+        metadata: path of `metadata.yaml`.
     """
 
     def __init__(self, path: Path):

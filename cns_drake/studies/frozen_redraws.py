@@ -118,7 +118,12 @@ def redraw_frozen(
 
 @dataclass(frozen=True)
 class RedrawFrozen(RedrawCity):
-    """A job step that makes a frozen redraw of a map, with its drives."""
+    """A job step that makes a frozen redraw of a map, with its drives.
+
+    Attributes:
+        turn_deg: angle by which the city is rotated about the world's origin
+            [deg].
+    """
 
     turn_deg: float = 0.0
 

@@ -100,6 +100,9 @@ class MadeMaps:
     First call `want_age` and `want_redrawn` for all maps; `make` then makes all
     maps together. In this way, a city that is aged by several numbers of years
     becomes one map with a stage for each number.
+
+    Attributes:
+        folder: the folder for all maps.
     """
 
     folder: Path

@@ -25,6 +25,9 @@ class MakeMap(Step):
 
     If the folder contains a map that an earlier run of this step made from
     other inputs, the map is replaced.
+
+    Attributes:
+        folder: the folder of the map.
     """
 
     folder: Path

@@ -108,12 +108,13 @@ def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
     if np.median(distances) > off_road:
         raise InputError(
             f"{path}: half of the trace is more than {off_road:g} m from the "
-            f"map's lanes: the trace is at {_extent(places)}, the lanes are "
-            f"at {_extent(lanes)}; give a trace of this map, without an offset"
+            f"map's lanes: the trace is at {_extent_text(places)}, the lanes "
+            f"are at {_extent_text(lanes)}; give a trace of this map, without "
+            "an offset"
         )
 
 
-def _extent(places: np.ndarray) -> str:
+def _extent_text(places: np.ndarray) -> str:
     low, high = places.min(axis=0), places.max(axis=0)
     return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
 

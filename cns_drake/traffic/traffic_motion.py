@@ -73,6 +73,11 @@ class TrafficMotion(LeafSystem):
     - `moving_instances`: (N,) instance ids of the vehicles and pedestrians that
       are faster than `MOVING_SPEED`.
     - `objects`: a `RecordedObjects`, for recorders.
+
+    Attributes:
+        source_id: geometry source of the bodies.
+        bodies: the vehicles of the plan, and then its pedestrians.
+        moving_frames: frame of a limb in the SceneGraph -> number of the limb.
     """
 
     def __init__(

@@ -157,7 +157,7 @@ def trajectory_errors(
         raise InputError(
             f"{estimate.path}: time: {inside.sum()} poses within that of the"
             f" drive, of {_LEAST_POSES} at least: the estimate spans"
-            f" {_seconds(stamps_ns)}, {drive.name} {_seconds(own)}"
+            f" {_seconds_text(stamps_ns)}, {drive.name} {_seconds_text(own)}"
         )
     X_WB, _ = truth.interpolate(
         stamps_ns[inside], _LONGEST_GAP_NS, "the estimated pose"
@@ -236,6 +236,6 @@ def _true_poses(drive: Drive, frame: Frame) -> Trajectory:
     return Trajectory(source, stamps_ns, X_WB)
 
 
-def _seconds(stamps_ns: np.ndarray) -> str:
+def _seconds_text(stamps_ns: np.ndarray) -> str:
     first, last = stamps_ns[[0, -1]].tolist()
     return f"{first * 1e-9:.3f} to {last * 1e-9:.3f} s"

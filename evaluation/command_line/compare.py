@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base import commands, shared_options, terminal
-from cns_drake.base.terminal import number
+from cns_drake.base.terminal import number_text
 from evaluation.command_line.printed_text import interval_text
 
 if TYPE_CHECKING:
@@ -64,7 +64,10 @@ def compare(
     for note in found.notes:
         terminal.note(note)
     rows = [
-        (one.method, f"{number(one.value)}{_spaced_interval(one.interval)}")
+        (
+            one.method,
+            f"{number_text(one.value)}{_spaced_interval(one.interval)}",
+        )
         for one in found.ranked
     ]
     if rows:
@@ -77,15 +80,15 @@ def compare(
         rows.append(
             (
                 f"{one.first} - {one.second}",
-                f"{number(one.difference.value)}  {interval}"
-                f"  p {number(one.p_value)}",
+                f"{number_text(one.difference.value)}  {interval}"
+                f"  p {number_text(one.p_value)}",
             )
         )
     for alike in found.agreements:
         rows.append(
             (
                 f"Kendall's tau, {alike.first} and {alike.second}",
-                f"{number(alike.tau)}  {interval_text(alike.interval)}",
+                f"{number_text(alike.tau)}  {interval_text(alike.interval)}",
             )
         )
     terminal.show(found.to_json(), rows, json=json)

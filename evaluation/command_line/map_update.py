@@ -83,9 +83,9 @@ def map_update(
 
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:
     yield "method", name
-    yield "mean IoU", terminal.number(scores["miou"])
+    yield "mean IoU", terminal.number_text(scores["miou"])
     for one in ("kept", "gone", "new", "unobserved"):
-        yield f"  {one}", terminal.number(scores[f"iou_{one}"])
+        yield f"  {one}", terminal.number_text(scores[f"iou_{one}"])
     for title, part in (
         ("by point", scores),
         ("within 0.2 m", scores["within_02m"]),
@@ -93,17 +93,17 @@ def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:
         ("by structure", scores["by_structure"]),
     ):
         text = ", ".join(
-            f"{change} {terminal.number(part[f'precision_{change}'])} and "
-            f"{terminal.number(part[f'recall_{change}'])}"
+            f"{change} {terminal.number_text(part[f'precision_{change}'])} and "
+            f"{terminal.number_text(part[f'recall_{change}'])}"
             for change in ("gone", "new")
         )
         yield f"precision and recall {title}", text
     still = scores["without_vehicles_and_people"]["miou"]
-    yield "mean IoU without vehicles and people", terminal.number(still)
+    yield "mean IoU without vehicles and people", terminal.number_text(still)
     updated = scores["updated_map"]
     yield (
         "updated map: complete, accurate, Chamfer",
-        f"{terminal.number(updated['completeness'])}, "
-        f"{terminal.number(updated['accuracy'])}, "
-        f"{terminal.number(updated['chamfer'])} m",
+        f"{terminal.number_text(updated['completeness'])}, "
+        f"{terminal.number_text(updated['accuracy'])}, "
+        f"{terminal.number_text(updated['chamfer'])} m",
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import commands, shared_options, terminal
-from cns_drake.base.terminal import number
+from cns_drake.base.terminal import number_text
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import NOT_FINITE, interval_text
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -311,47 +311,50 @@ def _recognition_rows(
     yield "queries, with a match (N)", f"{metrics.num_queries}, {with_match}"
     yield (
         "R@1",
-        f"{number(metrics.recall_at_1)}"
+        f"{number_text(metrics.recall_at_1)}"
         f"  {interval_text(metrics.recall_at_1_interval)}"
         f"  (TP {metrics.num_right} of N {with_match})",
     )
     for rank in (5, 10, 25):
-        yield f"R@{rank}", number(metrics.recall_at_n[rank - 1])
-    yield "R@1%", number(metrics.recall_at_1_percent)
+        yield f"R@{rank}", number_text(metrics.recall_at_n[rank - 1])
+    yield "R@1%", number_text(metrics.recall_at_1_percent)
     yield (
         "AUC",
-        f"{number(metrics.auc)}  {interval_text(metrics.auc_interval)}",
+        f"{number_text(metrics.auc)}  {interval_text(metrics.auc_interval)}",
     )
-    yield "AUC strict", f"{number(metrics.auc_strict)}  (recall = TP / N)"
-    f1 = number(metrics.f1_max)
+    yield "AUC strict", f"{number_text(metrics.auc_strict)}  (recall = TP / N)"
+    f1 = number_text(metrics.f1_max)
     curve = metrics.curve
     if metrics.f1_max_index is not None:
         index = metrics.f1_max_index
         f1 += f"  (TP {curve.true_positives[index]}, T {curve.counted[index]})"
     yield "F1max", f1
-    yield "recall at full precision", number(curve.recall_at_full_precision)
-    yield "mean reciprocal rank", number(outcomes.mean_reciprocal_rank)
+    yield (
+        "recall at full precision",
+        number_text(curve.recall_at_full_precision),
+    )
+    yield "mean reciprocal rank", number_text(outcomes.mean_reciprocal_rank)
     if not isnan(outcomes.match_auroc):
-        yield "match AUROC", number(outcomes.match_auroc)
+        yield "match AUROC", number_text(outcomes.match_auroc)
     yield (
         "AUC by radius",
         ", ".join(
-            f"{radius:g} m {number(auc)}"
+            f"{radius:g} m {number_text(auc)}"
             for radius, auc in outcome.auc_over_radius().items()
         ),
     )
     if not isnan(pose.success):
         yield (
             "translation error, median, 90 %",
-            f"{number(pose.translation_median)} m,"
-            f" {number(pose.translation_90)} m"
+            f"{number_text(pose.translation_median)} m,"
+            f" {number_text(pose.translation_90)} m"
             f"  ({pose.num_accepted} accepted matches)",
         )
         yield (
             "rotation error, median, 90 %",
-            f"{number(pose.rotation_median_deg)} deg,"
-            f" {number(pose.rotation_90_deg)} deg",
+            f"{number_text(pose.rotation_median_deg)} deg,"
+            f" {number_text(pose.rotation_90_deg)} deg",
         )
         limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
-        yield f"within {limits}", f"{number(pose.success)}  (of N)"
+        yield f"within {limits}", f"{number_text(pose.success)}  (of N)"
     yield "protocol", outcome.protocol.to_text()

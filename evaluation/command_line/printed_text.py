@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cns_drake.base.terminal import number
+from cns_drake.base.terminal import number_text
 
 if TYPE_CHECKING:
     from evaluation.recognition.bootstrap import Interval
@@ -15,4 +15,4 @@ NOT_FINITE = "points are not finite, and left out"
 
 def interval_text(interval: Interval) -> str:
     """Returns an interval as text in brackets."""
-    return f"[{number(interval.low)}, {number(interval.high)}]"
+    return f"[{number_text(interval.low)}, {number_text(interval.high)}]"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base import commands, shared_options, terminal
-from cns_drake.base.terminal import number
+from cns_drake.base.terminal import number_text
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import NOT_FINITE
 from evaluation.command_line.trajectories import compare_paths
@@ -118,8 +118,8 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     change = report.change
     source, target = report.source, report.target
     yield "pair", f"{source} <-> {target}"
-    yield "TCR_sym", number(change.symmetric)
-    yield "  on shifted grids", " to ".join(map(number, report.spread))
+    yield "TCR_sym", number_text(change.symmetric)
+    yield "  on shifted grids", " to ".join(map(number_text, report.spread))
     if change.undefined_because:
         yield "  because", change.undefined_because
     for names, side in (
@@ -127,10 +127,10 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
         (f"{target} -> {source}", change.target_to_source),
     ):
         counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
-        yield f"TCR {names}", f"{number(side.ratio)}  {counts}"
+        yield f"TCR {names}", f"{number_text(side.ratio)}  {counts}"
     if report.masked is not None:
-        yield "TCR_sym where both drove", number(report.masked.symmetric)
+        yield "TCR_sym where both drove", number_text(report.masked.symmetric)
     if report.control is not None and report.control_names is not None:
         names = " <-> ".join(report.control_names)
-        value = number(report.control.symmetric)
+        value = number_text(report.control.symmetric)
         yield "TCR_sym of only the routes", f"{value}  ({names})"

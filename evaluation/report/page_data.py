@@ -41,6 +41,7 @@ class PageDrive:
         extent: left, right, bottom and top of the view [m].
         images: images of the drive's camera at the frames, if the drive has a
             camera.
+        name: name of the drive.
     """
 
     name: str

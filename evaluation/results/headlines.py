@@ -66,7 +66,7 @@ def by_significance(
     return found
 
 
-def survival(rows: Sequence[Row]) -> str:
+def survival_sentences(rows: Sequence[Row]) -> str:
     """Returns the AUC that methods retain, and which methods survive.
 
     A method survives if it retains at least 90 % of its AUC strict, by the
@@ -88,9 +88,9 @@ def survival(rows: Sequence[Row]) -> str:
     if decided:
         over += f", with a 95 % t interval over {number} cities"
     shares = ", ".join(
-        f"{title(one.method)} {_share(one.value)}"
+        f"{title(one.method)} {_percent(one.value)}"
         + decided
-        * f" ({_share(one.interval.low)} to {_share(one.interval.high)})"
+        * f" ({_percent(one.interval.low)} to {_percent(one.interval.high)})"
         for one in ranked
     )
     text = (
@@ -112,7 +112,7 @@ def survival(rows: Sequence[Row]) -> str:
 
 
 def survivors(ranked: Iterable[Ranked]) -> list[str]:
-    """Returns the labels of the methods that survive, see `survival`.
+    """Returns the labels of the methods that survive, see `survival_sentences`.
 
     Args:
         ranked: the methods, with their means of `kept_strict`.
@@ -120,7 +120,7 @@ def survivors(ranked: Iterable[Ranked]) -> list[str]:
     return [one.method for one in ranked if one.interval.low >= SURVIVES]
 
 
-def _share(value: float) -> str:
+def _percent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 

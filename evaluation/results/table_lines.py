@@ -52,7 +52,14 @@ _FORMER_TABLES = (
 
 @dataclass(frozen=True)
 class TableLine:
-    """A line of a table."""
+    """A line of a table.
+
+    Attributes:
+        file: the table's file, for errors.
+        number: number of the line in the file, from 1.
+        columns: name of a column -> its position in the line.
+        cells: texts of the line's cells.
+    """
 
     file: Path
     number: int
@@ -60,12 +67,19 @@ class TableLine:
     cells: Sequence[str]
 
     def fault(self, column: str, fault: str) -> InputError:
+        """Returns an error on a cell, with the file and the line's number."""
         return InputError(f"{self.file}: line {self.number}: {column}: {fault}")
 
     def cells_of(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Returns the texts of some columns' cells."""
         return tuple([self.cells[self.columns[name]] for name in names])
 
     def text(self, column: str) -> str:
+        """Returns the text of a cell.
+
+        Raises:
+            InputError: the cell is empty.
+        """
         cell = self.cells[self.columns[column]]
         if not cell:
             raise self.fault(column, "empty")
@@ -143,7 +157,14 @@ class TableLine:
 
 @dataclass(frozen=True)
 class TableLines:
-    """The lines of a file, and where each column stands."""
+    """The lines of a table's file.
+
+    Attributes:
+        file: the file, for errors.
+        columns: name of a column -> its position in a line.
+        factors: names of the columns with factors.
+        rows: number of a line in the file, and the texts of its cells.
+    """
 
     file: Path
     columns: Mapping[str, int]

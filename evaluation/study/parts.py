@@ -223,6 +223,7 @@ class MakePart(Step):
             path (of which only the name counts), an object with a method
             `identity` that returns what counts, or a tuple of such values.
         figures: further files that the function writes.
+        part: the file that is written, with the digest of its inputs.
     """
 
     part: Part

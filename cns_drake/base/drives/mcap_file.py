@@ -88,6 +88,9 @@ class McapFile:
 
     If a topic has several channels, for example because several nodes publish
     on the topic, the messages of all channels are read as one stream.
+
+    Attributes:
+        path: path of the file.
     """
 
     def __init__(self, path: Path):

@@ -80,12 +80,12 @@ class Space:
     rest: float
 
     def __str__(self) -> str:
-        text = f"{_gigabytes(self.most)} on the disk"
+        text = f"{_gigabytes_text(self.most)} on the disk"
         if self.rest < 0.95 * self.most:
-            text += f" ({_gigabytes(self.rest)} in the end)"
+            text += f" ({_gigabytes_text(self.rest)} in the end)"
         free = shutil.disk_usage(self.folder).free
         if free < self.most:
-            text += f", which has {_gigabytes(free)}"
+            text += f", which has {_gigabytes_text(free)}"
         return text
 
 
@@ -120,16 +120,16 @@ def forecast(
     if cluster.slots is not None:
         seconds *= measure_slowness()
         parts += [
-            f"about {_rounded_time(seconds)} with {number} at a time, as this"
+            f"about {_time_text(seconds)} with {number} at a time, as this"
             " machine was measured just now",
-            f"{_gigabytes(number * _JOB_MEMORY)} of memory",
+            f"{_gigabytes_text(number * _JOB_MEMORY)} of memory",
         ]
     if space is not None:
         parts.append(str(space))
     return f"{len(left)} jobs: {'; '.join(parts)}" if parts else None
 
 
-def _rounded_time(seconds: float) -> str:
+def _time_text(seconds: float) -> str:
     """Returns a time as text, with one or two digits."""
     if seconds < 100.0:
         return f"{max(math.ceil(seconds / 10.0), 1) * 10} s"
@@ -139,5 +139,5 @@ def _rounded_time(seconds: float) -> str:
     return f"{minutes / 60.0:.1f} h"
 
 
-def _gigabytes(number: float) -> str:
+def _gigabytes_text(number: float) -> str:
     return f"{number / 1e9:.1f} GB"

@@ -19,6 +19,11 @@ class Building(Assembly, abc.ABC):
     building, and then samples its colours. From these attributes, `build` makes
     the parts of the building. Only roof equipment and chimneys may rise above
     the building's `height` [m].
+
+    Attributes:
+        kind: the archetype.
+        height: height of the building without equipment on its roof [m].
+        colours: part of the building -> its finish.
     """
 
     def __init__(

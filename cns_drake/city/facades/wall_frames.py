@@ -16,6 +16,9 @@ class WallFrame:
     is on the ground at the start of the wall: at the left, as seen from
     outside. The wall is the edge number `edge` of `outline` (N, 2), which
     contains the corners of all walls, counter-clockwise [m].
+
+    Attributes:
+        length: length of the wall [m].
     """
 
     def __init__(self, outline: ArrayLike, edge: int):

@@ -39,9 +39,11 @@ from cns_drake.scene.map_folder import MapFolder
 
 
 class City(NamedTuple):
-    """All structures of a city, ground first, and its kinds of parked cars.
+    """A city: its structures, and its kinds of parked cars.
 
-    `cars` maps the name of a kind of car to its weight in random choices.
+    Attributes:
+        structures: all structures, ground first.
+        cars: name of a kind of car -> its weight in random choices.
     """
 
     structures: tuple[Structure, ...]

@@ -49,7 +49,7 @@ def world_sdf(
 
 def _visual(structure: Structure, part: Part) -> str:
     rgb = part.rgb or CLASS_RGB[structure.semantic_class]
-    diffuse = " ".join(_number(value, 3) for value in (*rgb, 1.0))
+    diffuse = " ".join(_number_text(value, 3) for value in (*rgb, 1.0))
     return (
         f"<visual name={quoteattr(f'{structure.name}/{part.name}')}>"
         f"<pose>{_pose(structure, part)}</pose>"
@@ -68,8 +68,8 @@ def _pose(structure: Structure, part: Part) -> str:
     roll, pitch, yaw = part.rpy
     angles = (roll, pitch, yaw + structure.yaw)
     return " ".join(
-        [_number(v, 3) for v in structure.p_WP(part.xyz)]
-        + [_number(v, 5) for v in angles]
+        [_number_text(v, 3) for v in structure.p_WP(part.xyz)]
+        + [_number_text(v, 5) for v in angles]
     )
 
 
@@ -78,17 +78,17 @@ def _geometry(shape: Shape) -> str:
         uri = f"<uri>{MESH_FOLDER}/{shape.mesh}.obj</uri>"
         if shape.scale == (1.0, 1.0, 1.0):
             return f"<mesh>{uri}</mesh>"
-        scale = " ".join(_number(value, 5) for value in shape.scale)
+        scale = " ".join(_number_text(value, 5) for value in shape.scale)
         return f"<mesh>{uri}<scale>{scale}</scale></mesh>"
     tag = type(shape).__name__.removesuffix("Shape").lower()
     sizes = [
-        (name, " ".join(_number(v, 3) for v in np.atleast_1d(value)))
+        (name, " ".join(_number_text(v, 3) for v in np.atleast_1d(value)))
         for name, value in vars(shape).items()
     ]
     inner = "".join(f"<{name}>{size}</{name}>" for name, size in sizes)
     return f"<{tag}>{inner}</{tag}>"
 
 
-def _number(value: float, decimals: int) -> str:
+def _number_text(value: float, decimals: int) -> str:
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text

@@ -71,6 +71,9 @@ class SlopingGround:
     from the height of the street or pad to the height of the field (Shepard's
     interpolation). At the distance d, the height of the street or pad has the
     weight 1/d - 1/R, and the height of the field has the weight 1/R.
+
+    Attributes:
+        pads: level areas outside the streets.
     """
 
     is_level = False

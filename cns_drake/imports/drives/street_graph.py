@@ -128,6 +128,9 @@ class StreetGraph(WayGraph):
 
     On one-way streets a car drives only in the allowed direction. On all other
     streets it drives in the outermost lane.
+
+    Attributes:
+        lanes: the N lanes, which are the pieces of the graph.
     """
 
     def __init__(

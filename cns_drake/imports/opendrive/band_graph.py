@@ -36,6 +36,12 @@ class BandGraph(way_graph.WayGraph):
     """A `cns_drake.imports.drives.way_graph.WayGraph` of OpenDRIVE lanes.
 
     Each lane of a road section is a piece. Edges lead in driving direction.
+
+    Attributes:
+        bands: the N driven lanes.
+        lines: for each lane, its path in driving direction, (M, 3) in W [m].
+        followers: pairs of lane numbers; the second lane of a pair follows the
+            first lane.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):

@@ -55,6 +55,10 @@ class OdometrySensor(LeafSystem):
     the spatial velocity V_WP, expressed in the world. The output is the
     `Odometry` of the observed body or frame B.
 
+    Attributes:
+        frame_id: frame of the body P in the SceneGraph; None if P has no
+            geometry source.
+
     Example:
         from cns_drake import OdometrySensor
 

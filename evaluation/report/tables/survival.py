@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import math
 from typing import NamedTuple
 
-from evaluation.results.headlines import KEPT, survival
+from evaluation.results.headlines import KEPT, survival_sentences
 from evaluation.results.keys import OWN, STAGE
 from evaluation.results.table import Row
 from evaluation.results.table_forms import (
@@ -183,7 +183,9 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
     groups = by_pair(survivals)
     known = [one for one in survivals if one.before]
     without = len(groups) - len(by_pair(known))
-    text = survival([one.after[KEPT] for one in known if KEPT in one.after])
+    text = survival_sentences(
+        [one.after[KEPT] for one in known if KEPT in one.after]
+    )
     parts = [text] if text else []
     if without:
         which = f"For {without} of {len(groups)} pairs" if known else "Here"

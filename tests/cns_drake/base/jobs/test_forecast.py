@@ -86,7 +86,7 @@ def test_nothing_is_told_of_short_jobs():
     ],
 )
 def test_times_have_one_or_two_digits(seconds, text):
-    assert forecast._rounded_time(seconds) == text
+    assert forecast._time_text(seconds) == text
 
 
 def test_this_machine_is_of_this_century():
