@@ -214,7 +214,7 @@ def renovated(
         building: the building.
         rng: random generator for the colour.
         insulated: whether the walls also get an insulation layer, which moves
-            their surface outwards by 15 cm.
+            the surface of the walls outwards by 15 cm.
     """
     model = building.model
     walls = [p for p in model.parts if p.material != "glass" and p.rgb]

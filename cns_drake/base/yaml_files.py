@@ -53,9 +53,9 @@ _UNREAD = re.compile(r"tag:yaml\.org,2002:(set|omap|pairs|binary|timestamp)")
 class _PlainScalars:
     """Reads scalars without quotes as they are written.
 
-    YAML 1.1, and so PyYAML, reads 010 as 8, 1:30 as 90, 1_0 as 10, and `on` and
-    `no` as true and false. Here such numbers and dates are texts, which a
-    field for numbers reads or refuses.
+    YAML 1.1, and so PyYAML, reads 010 as 8, 1:30 as 90, 1_0 as 10, `on` as true
+    and `no` as false. Here such numbers and dates are texts, which a field for
+    numbers reads or refuses.
     """
 
     yaml_implicit_resolvers: ClassVar[dict] = {}

@@ -117,8 +117,8 @@ def _draw_room(
 ) -> dict[str, Artist]:
     """Draws the free space for a car; returns the legend.
 
-    `low` and `high` (2,) are the least and the greatest x and y of the free
-    space [m].
+    `low` (2,) contains the least x and y of the free space, and `high` (2,) the
+    greatest x and y [m].
     """
     room = np.where(space.clearance >= space.least, 1.0, np.nan)
     axes.imshow(

@@ -132,7 +132,8 @@ def _stands_at(
     """Returns whether a structure stands at a stage, given by its number.
 
     A structure that was demolished at an unknown date stands at all stages
-    except the last, if its year (or its missing year) allows it.
+    except the last, from its year of construction on. If this year is unknown,
+    `options.undated` decides.
     """
     years = options.years
     until = one.until

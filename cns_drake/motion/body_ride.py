@@ -33,10 +33,11 @@ class RideMoments(NamedTuple):
 class BodyRide:
     """The motion X_FB(t) of a body B relative to the frame F of its path.
 
-    At rest on a level road, B equals F. Heave, roll and pitch and their first
-    and second derivatives are given at evenly spaced times. Between these times
-    they are polynomials of degree 5, so that accelerations have no jumps. The
-    body rotates about a point on the ground, by its pitch and then by its roll.
+    At rest on a level road, B equals F. Heave, roll and pitch are given at
+    evenly spaced times, with their first and second derivatives. Between these
+    times, heave, roll and pitch are polynomials of degree 5, so that
+    accelerations have no jumps. The body rotates about a point on the ground,
+    by its pitch and then by its roll.
     """
 
     def __init__(

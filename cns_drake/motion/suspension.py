@@ -130,11 +130,11 @@ class Suspension:
 
     The body heaves, rolls and pitches. Each wheel moves up and down between its
     spring and its tyre. The coordinates are the heave of the body, positive
-    upwards [m]; the roll and pitch of the body about x and y of B, positive
-    with the right side down and the nose down [rad]; and the heights of the
-    wheels [m]. All coordinates are zero at rest on a level road. The body
-    rotates about the point on the ground below its centre of mass. The model
-    has no anti-dive or anti-squat geometry.
+    upwards [m]; the roll of the body about x of B, positive with the right side
+    down [rad]; the pitch of the body about y of B, positive with the nose down
+    [rad]; and the heights of the wheels [m]. All coordinates are zero at rest
+    on a level road. The body rotates about the point on the ground below its
+    centre of mass. The model has no anti-dive or anti-squat geometry.
 
     Attributes:
         masses: masses of the car.

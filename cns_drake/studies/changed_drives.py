@@ -79,7 +79,7 @@ class DriveChanger:
             source: file of the experiment, for errors.
             last_stage: the stage that ages, and that the word `last` means.
             same_route: whether the drives of the database follow the query's
-                route, with their LiDARs beside the query's.
+                route, with LiDARs beside the LiDARs of the query.
             age: returns an aged map.
             redraw: returns a redrawn map.
             on_note: is called with a note on everything that is left out.

@@ -31,8 +31,8 @@ def protocol_from_fields(
     """Returns the protocol that some fields of an experiment describe.
 
     Args:
-        fields: field -> value. The field `base` names a protocol, by default
-            `fair`, from which fields that are not given take their values.
+        fields: field -> value. The field `base` names a protocol; by default
+            `fair`. Fields that are not given have the values of this protocol.
         source: file of the experiment, for error messages.
         place: name of the section with these fields, for error messages.
 

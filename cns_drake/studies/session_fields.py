@@ -31,8 +31,8 @@ def session_fields(
         source: file of the experiment, for errors.
 
     Raises:
-        InputError: the drives are no list of fields, or have fields that they
-            cannot have.
+        InputError: the drives are no list of fields, or a drive has a field
+            that it cannot have.
     """
     shared = dict(database)
     for name in _OF_DATABASE:

@@ -26,7 +26,8 @@ def expand_spread(value: Any, *, whole: bool = False) -> Any:
 
     Raises:
         ValueError: an end is no finite number, there are fewer than 2 or more
-            than 10,000 numbers, or they are not whole although they must be.
+            than 10,000 numbers, or a number is not whole although `whole` is
+            true.
     """
     if not is_spread(value):
         if whole and isinstance(value, Mapping) and _SPREAD & set(value):

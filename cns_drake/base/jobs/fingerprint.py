@@ -90,8 +90,8 @@ class _Imports(NamedTuple):
     Attributes:
         names: (module, name imported from it or "") of each import that runs.
         offered: name -> module, of imports under TYPE_CHECKING. In a package,
-            they tell which modules define the names that it imports on first
-            use.
+            these imports tell which modules define the names that the package
+            imports on first use.
     """
 
     names: tuple[tuple[str, str], ...]

@@ -39,7 +39,7 @@ from cns_drake.scene.map_folder import MapFolder
 
 
 class City(NamedTuple):
-    """A city: its structures, and its kinds of parked cars.
+    """A city: its structures, and the kinds of its parked cars.
 
     Attributes:
         structures: all structures, ground first.

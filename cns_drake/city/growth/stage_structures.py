@@ -1,7 +1,7 @@
 """The structures of a city in each of its stages.
 
-In earlier stages, plants are younger, buildings are lower or under
-construction, or their lots have another use.
+In earlier stages, plants are younger than in the last stage. Some buildings are
+lower or under construction. Others are absent, and their lots have another use.
 """
 
 from collections.abc import Mapping, Sequence

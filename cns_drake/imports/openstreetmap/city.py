@@ -150,7 +150,7 @@ def import_openstreetmap(
 def _used_buildings(features: OsmFeatures, dressed: bool) -> list[OsmArea]:
     """Returns the buildings of a file from which structures are made.
 
-    For a dressed city, they include buildings that were demolished at an
+    For a dressed city, the result includes buildings that were demolished at an
     unknown date.
     """
     areas = [
@@ -188,8 +188,8 @@ def _without_outers(
 ) -> Iterator[OsmArea]:
     """Yields buildings without ways that are the outlines of multipolygons.
 
-    If such a way has the same tags as its multipolygon, it would fill its
-    courtyards.
+    If such a way has the same tags as its multipolygon, a building made from
+    the way would fill the courtyards of the multipolygon.
     """
     buildings = list(buildings)
     names = {one.name for one in buildings}

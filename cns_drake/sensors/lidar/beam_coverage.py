@@ -20,8 +20,8 @@ _GAP_CELLS = 48
 class BeamCoverage:
     """The directions that the beams of a revolution cover.
 
-    A beam covers all directions that differ from its own by at most 1.5 deg in
-    elevation and in azimuth and lie inside the field of view.
+    A beam covers all directions inside the field of view whose elevation and
+    azimuth differ from the beam's by at most 1.5 deg each.
 
     The field of view consists of cells of 0.25 deg: the cells of the beams; the
     neighbours of the beams' cells, because rounding can move a point into a

@@ -129,7 +129,8 @@ def detection_probability(snr: ArrayLike) -> np.ndarray:
     """Returns the probability that an echo with a given SNR is detected.
 
     The model compares a photon count with a threshold. The mean of the count is
-    the SNR, and its standard deviation the root of the SNR (shot noise).
+    the SNR, and the standard deviation of the count is the root of the SNR
+    (shot noise).
     """
     snr = np.asarray(snr)
     deviation = (snr - THRESHOLD_SNR) / np.sqrt(np.maximum(snr, 1e-9))

@@ -3,7 +3,7 @@
 Leaves are a medium: a ray passes a distance s with the probability exp(-G LAD
 s). LAD is the leaf area per volume. G is the fraction of that area that faces a
 ray: 1/2 for leaves of all directions. All rays that enter a crown at the same
-clump of leaves or twig pass the same leaf area before they hit a leaf, in every
+twig or clump of leaves pass the same leaf area before they hit a leaf, in every
 scan of every drive.
 
 A glass pane reflects the fraction R of the light like a mirror and transmits

@@ -1,8 +1,8 @@
 """Fog, rain and snowfall: extinction of a beam, and back-scatter.
 
-Rain and snow are drops and flakes of random size and place. The number of drops
-or flakes per volume and diameter follows Marshall and Palmer (1948) for rain
-and Sekhon and Srivastava (1970) for snow,
+Rain consists of drops, and snow consists of flakes. Their sizes and places are
+random. The number of drops or flakes per volume and diameter follows Marshall
+and Palmer (1948) for rain and Sekhon and Srivastava (1970) for snow,
 
     N(D) = N_0 exp(-L D) [1/(m3 mm)]
 

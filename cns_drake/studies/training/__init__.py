@@ -3,7 +3,8 @@
 In a batch, scans of one drive are queries for places of another drive through
 the same city. The training compares queries and places in the same way as the
 method. The loss is the cross entropy between a softmax over all places of the
-batch and the target weights of the places. The target weight of a place grows
-with the exact overlap of its scan with the query's scan, or falls with its
-distance from the query, so that more similar places rank higher.
+batch and the target weights of the places. If exact overlaps are known, the
+target weight of a place grows with the overlap of its scan with the query's
+scan; otherwise it falls with the distance of the place from the query. Places
+that are more similar to the query thus rank higher than others.
 """

@@ -31,9 +31,9 @@ def draw_stages(city: City, rng: np.random.Generator) -> dict[str, dict]:
     """Returns random stages of a city, as the content of `stages.yaml`.
 
     The last stage is the whole city. In earlier stages, whole buildings are
-    missing, and with each building the objects that stand, grow or park nearest
-    to it. Some trees are missing as well, and a few buildings and trees are
-    lower than in the last stage.
+    missing. Objects that stand, grow or park beside a missing building are
+    missing, too, unless another building is nearer. Some other trees are also
+    missing, and a few buildings and trees are lower than in the last stage.
 
     Args:
         city: the city.
