@@ -228,7 +228,7 @@ def align(
     X_TS = source.bend(X_TK)
     frame = target.drive.world_frame
     if ground != 0.0 or target_drift > 0.0:
-        # The drive's world frame is no longer the one that its name stands for.
+        # The name of the drive's world frame no longer names this frame.
         frame = f"{frame}, corrected by {target.name}"
     datum = target.drive.datum
     held_drive = _lowered(target.drive, target.X_WS, ground, frame, datum)

@@ -40,7 +40,7 @@ _POINT = np.dtype(
     ]
 )
 _LONGEST_GAP_NS = 1_000_000_000
-# Origin of W on the UTM grid, in Toronto [m]; chosen like the one in
+# Origin of W on the UTM grid, in Toronto [m]; chosen like the origin in
 # `evaluation.drives.utm_poses.to_world`.
 _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
 

@@ -65,9 +65,9 @@ class KittiDrive(BinDrive):
     inverse(X_CS) X_C0C X_CS; `calib.txt` contains X_CS under the name `Tr`.
     Without `calib.txt`, the files are taken to contain poses of the LiDAR.
 
-    The world frame W is S0, the LiDAR's frame at the first scan, with z up.
-    With a file `first_pose.txt`, which cns-drake exports, W is the world frame
-    of the recording instead. With a folder `labels`, points have the fields
+    The world frame W is S0, the LiDAR's frame at the first scan, with z up. If
+    there is a file `first_pose.txt`, as in exports of cns-drake, W is the world
+    frame of the recording. With a folder `labels`, points have the fields
     `label` and `instance`.
     """
 

@@ -73,13 +73,13 @@ def find_columns(
     """
     found = [_column(word) for word in words]
     if found.count("w"):
-        # A second x y z beside a w is that of the quaternion.
+        # A second x y z beside a w belongs to the quaternion.
         for k, name in enumerate(found):
             is_second = name in ("x", "y", "z") and name in found[:k]
             found[k] = f"q{name}" if is_second or name == "w" else name
     used = [name for name in names if name]
     for name in used:
-        # A table may have a second time, such as that of its recording.
+        # A table may have a second time, such as the time of its recording.
         if name != "time" and found.count(name) > 1:
             raise ValueError(f"header: {name} is there twice")
     if set(used) <= set(found):

@@ -17,8 +17,8 @@ from evaluation.drives.text_tables import (
     read_stamped_rows,
 )
 
-# Greatest error of a rotation matrix or quaternion: that of numbers written
-# with four digits.
+# Greatest error of a rotation matrix or quaternion, as in numbers that are
+# written with four digits.
 _ROTATION_TOLERANCE = 1e-3
 # Columns of a table of poses.
 _COLUMNS = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")

@@ -91,8 +91,8 @@ ROBUST_KINDS = {"robust-plane-icp": "PLANE_ICP", "robust-gicp": "GICP"}
 KISS_MATCHER = "kiss-matcher"
 METHODS = (*SMALL_GICP_KINDS, *ROBUST_KINDS, KISS_MATCHER)
 # Settings that only the methods with an iterative alignment use, and methods
-# with the setting `resolution`. All methods use the others: they downsample
-# map and scan, and measure the fit.
+# with the setting `resolution`. All methods use the other settings, because all
+# downsample map and scan, and measure the fit.
 _ALIGNING = (*SMALL_GICP_KINDS, *ROBUST_KINDS)
 _ALIGNMENT = ("width", "last_width", "iterations")
 _VOXELS = ("vgicp", KISS_MATCHER)

@@ -59,8 +59,8 @@ def run_baseline(name: str, pair: Pair) -> Labels:
 def by_distance(mine: Session, theirs: Session) -> np.ndarray:
     """Returns the labels (N,) uint8 of a map by the baseline `distance`.
 
-    A point is kept if the other map has a point within 0.5 m. Otherwise it is
-    gone (older map) or new (newer map); see
+    A point is kept if the other map has a point within 0.5 m. Otherwise the
+    point is gone (older map) or new (newer map); see
     `evaluation.map_update.labels.Label`.
 
     Args:

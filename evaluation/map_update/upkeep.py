@@ -151,7 +151,7 @@ class UpkeptMap:
 
 
 def _in_cells_of(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Returns which points (N, 3) share a cell of a map with others, (N,)."""
+    """Returns which points (N, 3) share a cell with points of a map, (N,)."""
     cells = [np.floor(one / CELL) for one in (points, others)]
     corner = np.concatenate(cells).min(axis=0, initial=0.0)
     (keys, _), (taken, _) = (cell_keys(one - corner) for one in cells)

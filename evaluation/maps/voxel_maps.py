@@ -87,7 +87,7 @@ class VoxelMap:
         found = np.floor((self.centroids_W - origin) / voxel_size)
         order = np.lexsort(found.T[::-1])
         indices = found[order].astype(np.int32)
-        # NaN counts as a difference: the first row is that of a new voxel.
+        # NaN counts as a difference: the first row belongs to a new voxel.
         is_first = np.diff(found[order], axis=0, prepend=np.nan).any(axis=1)
         rows = np.cumsum(is_first) - 1
         counts = np.zeros(int(is_first.sum()), np.int64)

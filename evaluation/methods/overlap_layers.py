@@ -1,8 +1,8 @@
 """Divides a scan into the layers of layered overlap, as occupied cells.
 
 Part of layered overlap (see `evaluation.methods.layered_overlap`). Cells depend
-on sums, products, quotients and square roots only, which are the same on every
-processor: IEEE 754 defines them to the last bit.
+only on sums, products, quotients and square roots. These results are the same
+on every processor, because IEEE 754 defines them to the last bit.
 """
 
 import math

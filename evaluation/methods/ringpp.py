@@ -126,7 +126,7 @@ class RingDatabase:
 class RingPlusPlus(Method[Ring, RingDatabase]):
     """RING++; the score of two scans is 1 minus their distance.
 
-    Where it differs from the authors' program:
+    Where this method differs from the authors' program:
 
     - For neighbours that lie in a plane, omnivariance and entropy are the
       limits of their formulas. In the authors' program, which has single

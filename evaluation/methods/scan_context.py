@@ -395,7 +395,8 @@ def _highest(
 ) -> np.ndarray:
     """Returns the greatest of heights (N,) in each cell [m].
 
-    It is 0 in cells with too few points, and at least `floor` in others.
+    The result is 0 in cells with too few points, and at least `floor` in all
+    other cells.
     """
     size = shape[0] * shape[1]
     highest = np.full(size, floor)

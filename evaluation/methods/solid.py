@@ -119,7 +119,7 @@ class SolidDatabase:
 class SolidMethod(Method[Solid, SolidDatabase]):
     """SOLiD; the score of two scans is the cosine of their range descriptors.
 
-    Where it differs from the authors' programs:
+    Where this method differs from the authors' programs:
 
     - An elevation outside the field of view counts in the outermost cell. In
       [P] (the authors' Python program), elevations below the field of view wrap

@@ -115,7 +115,7 @@ def _find_state(
 def _dictionaries(
     value: Any, place: str, levels: int, seen: set[int]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields a dictionary and those in it, each once, with their places."""
+    """Yields a dictionary and each dictionary in it once, with its place."""
     if not isinstance(value, dict | list | tuple) or hasattr(value, "_fields"):
         return
     if levels and id(value) not in seen:

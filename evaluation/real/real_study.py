@@ -153,7 +153,7 @@ def measure_real(
 
 
 def _is_estimator(name: str) -> bool:
-    """Returns whether a name or a file is that of an estimator."""
+    """Returns whether a name or a file stands for an estimator."""
     if name.endswith(".py"):
         return hasattr(run_module(Path(name)), "localise")
     return name in METHODS

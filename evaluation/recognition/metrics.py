@@ -16,8 +16,8 @@ from R@1).
 A query with a match and a wrong top-ranked place is FN while it is rejected,
 and FP once it is accepted. Recall = TP / (TP + FN) therefore reaches 1 for
 every method that has a top-ranked place for all queries. The strict AUC,
-`auc_strict`, is the area under the curve with recall = TP / N instead, where N
-is the number of queries with a match.
+`auc_strict`, is the area under another curve, with recall = TP / N, where N is
+the number of queries with a match.
 
 In both modes, R@N is the share of the queries with a match that have a match
 among their N top-ranked places.

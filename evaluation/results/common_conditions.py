@@ -54,7 +54,7 @@ def _notes_on_left_out(
     tables: Sequence[MetricTable],
     common: Iterable[Condition],
 ) -> list[str]:
-    """Returns notes on the conditions of tables that another one lacks."""
+    """Returns notes on the conditions that only some of the tables have."""
     kept = set(common)
     notes: Counter[str] = Counter()
     for table in own:

@@ -1,4 +1,4 @@
-"""Compares your tables of results with one another and the shipped tables."""
+"""Compares your tables of results with each other and with shipped tables."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -131,7 +131,7 @@ def compare_tables(
     gate: bool = False,
     rankings: bool = False,
 ) -> Comparison:
-    """Compares tables of results with one another and the shipped tables.
+    """Compares tables of results with each other and with the shipped tables.
 
     Args:
         paths: tables of results, or folders with a `results.csv`. The answers

@@ -112,7 +112,7 @@ class Table:
 
     def __post_init__(self) -> None:
         groups = [name for name, span in self.groups for _ in range(span)]
-        # The metric is in the column's own head or in that of its group.
+        # The metric is in the column's own head or in the head of its group.
         names = [
             head if range_of(head) else group
             for head, group in zip(

@@ -1,4 +1,4 @@
-"""Chooses the methods that a study runs: shipped ones and your own."""
+"""Chooses the methods that a study runs: shipped methods and your own."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
 
 
 def with_standard(names: Iterable[str]) -> list[str]:
-    """Returns names of methods, with all standard ones in place of `standard`.
+    """Returns names of methods; all standard methods replace `standard`.
 
     Raises:
         InputError: a method is named twice.

@@ -57,7 +57,7 @@ class Engine:
             study takes.
         jobs: name -> job.
         measured: all comparisons.
-        given: results from another source, with which the tables begin.
+        given: results from another source; the tables begin with these results.
     """
 
     experiment: str

@@ -68,7 +68,7 @@ def explain_faults(
         return None
     database, query = (part.read() for part in drives)
     evidence = find_evidence(database, query, found, protocol)
-    # Visible change is that of the queries as the protocol shows them.
+    # The visible change concerns the queries as the protocol shows them.
     return replace(evidence, overlaps=found[0].columns["overlap"])
 
 

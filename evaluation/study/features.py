@@ -132,6 +132,7 @@ def described_key(method: str, protocol: RetrievalProtocol) -> str:
 
     Args:
         method: key of the method.
-        protocol: the second protocol, such as that of published results.
+        protocol: the second protocol, such as the protocol of published
+            results.
     """
     return f"{method},{protocol.name}"

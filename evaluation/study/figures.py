@@ -133,8 +133,8 @@ def city_job(
     Args:
         city: the city.
         files: files of the study.
-        planned: gets a job for each drive of the figure, which extracts its
-            features.
+        planned: gets a job for each drive of the figure; the job extracts the
+            features of the drive.
     """
     needs: list[str] = []
     features = [

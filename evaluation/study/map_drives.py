@@ -78,8 +78,8 @@ class MapDrives:
     Attributes:
         name: name of the map.
         stages: stage -> the drive through this stage.
-        others: further drives, such as controls, which follow the route of one
-            stage through another stage.
+        others: further drives, such as controls. A control follows the route of
+            the drive through one stage, but goes through another stage.
     """
 
     name: str
@@ -94,7 +94,7 @@ class MapDrives:
     def sessions(self, stage: str) -> tuple[RecordingInfo, ...]:
         """Returns all drives through a stage, without controls.
 
-        A control follows the route of the drive through another stage.
+        A control goes through this stage on the route of another stage's drive.
 
         Args:
             stage: name of the stage.

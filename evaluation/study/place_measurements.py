@@ -276,8 +276,7 @@ def _overlaps_of_matches(
     overlaps of a radius are therefore computed once for all methods.
 
     Args:
-        overlaps: radius -> overlaps that are known, to which new ones are
-            added.
+        overlaps: radius -> known overlaps; new overlaps are added here.
         place_scans: scans of the P places of the drive itself, which come first
             in the database.
         query_scans: scans of the Q queries.
@@ -367,7 +366,7 @@ def _method_outcomes(
 
 
 def _other_places(query: DriveDescriptors, drives: Sequence[str]) -> np.ndarray:
-    """Returns (Q, D) bool, all places but that of the query's own scan."""
+    """Returns (Q, D) bool, all places but the place of the query's scan."""
     return ~np.eye(len(query.queries.frames), len(drives), dtype=bool)
 
 

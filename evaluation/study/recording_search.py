@@ -16,8 +16,8 @@ from evaluation.drives.kitti import holds_kitti
 from evaluation.study.map_drives import RecordingInfo
 from evaluation.study.sources import RecordingSource
 
-# The names of drives that state map and stage, the first ones as those of NCLT,
-# Boreas and rosbag2, which end in a date and a time, the last ones as MulRan's.
+# Names of drives that state map and stage. The first form ends in a date, as in
+# NCLT, Boreas and rosbag2; the last form ends in a number, as in MulRan.
 _NAME_FORMS = (
     re.compile(r"(?P<map>.*?)[-_]?(?P<stage>\d{4}([-_])\d\d?\3\d\d?(\D.*)?)"),
     re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)"),

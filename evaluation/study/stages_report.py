@@ -80,7 +80,7 @@ class StagesReport:
         recordings: the recordings. A recording that does not exist yet is made
             by the jobs that its attribute `needs` names.
         output: folder of the report.
-        methods: methods to run; by default those of this package.
+        methods: methods to run; by default the methods of this package.
         protocol: protocol of place recognition.
         with_costs: whether times and memory are measured, after all other jobs.
         reference: published numbers to compare with.
@@ -197,8 +197,8 @@ class StagesReport:
 
         - `report.html`: the whole report, in one file.
         - `report.md`: the report as Markdown.
-        - `results.csv`, `queries.csv`: the results and the answers to queries,
-          the same as those of the experiment `stages`.
+        - `results.csv`, `queries.csv`: the results and the answers to queries;
+          both tables are the tables of the experiment `stages`.
         - `figures`: a folder with figures. Figures that exist are kept.
 
         If `with_tables` is true, wide tables are written as well. The wide

@@ -12,8 +12,8 @@
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
 All other keys select rows: each is a column of the table with the values to
-show. By default, `gate` is 0 (without geometric verification), and the task is
-`place`; if `place` does not have the metric, the first task that has it. Each
+show. By default, `gate` is 0 (without geometric verification). The default task
+is `place`, or the first task with the metric if `place` does not have it. Each
 method has the same colour in all charts. The title says in words what the chart
 shows. If the answers to all queries are known, the title also says which
 methods differ by the test of `evaluation.recognition.significance`.

@@ -96,7 +96,7 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
 
 
 def _pair_labels(pairs: Sequence[tuple[str, str, str]]) -> list[str]:
-    """Returns the map of each pair, with the drives if it has other pairs."""
+    """Returns each pair's map, with the drives if the map has several pairs."""
     of_map = Counter(name for name, *_ in pairs)
     labels = []
     for name, *drives in pairs:

@@ -38,14 +38,14 @@ from evaluation.study.tasks.task import Answered, Task, check_positive
 
 # The methods that need no optional package.
 SHIPPED = tuple(name for name in METHODS if name != KISS_MATCHER)
-# Expected time to localise the scans of a drive among the others [s].
+# Expected time to localise each scan of a drive among its other scans [s].
 _COST = 60.0
 # Expected time to localise the queries of a usual drive [s].
 _QUERIES_COST = 10.0
 # Expected time to add a usual drive to the map [s].
 _MAP_COST = 50.0
 # Scans within this distance make the map of a scan that is localised among
-# the others of its drive [m].
+# the other scans of its drive [m].
 _AROUND = 30.0
 # The end of a note on a drive without a query near the map.
 NOT_LOCALISED = ": not localised"

@@ -90,8 +90,8 @@ class LabelledMapTask(MapTask):
         Args:
             maps: folder with the maps of two drives and their exact labels.
             methods: names of change detectors.
-            given: files with labels of the older and of the newer map, which
-                are scored instead of the labels of change detectors.
+            given: files with labels of the older and of the newer map. These
+                labels are scored instead of the labels of change detectors.
         """
         super().__init__({}, str(maps))
         self._arguments = maps, tuple(methods), tuple(given)
