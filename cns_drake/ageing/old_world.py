@@ -47,7 +47,7 @@ from cns_drake.transient.loaded_structures import (
 
 # The height of the ground is known this far around buildings [m].
 _AROUND = 40.0
-# The colour of parts without one.
+# Colour in the aged map of parts without one.
 _GREY = (0.6, 0.6, 0.6)
 # The only files that a stage may name, since only these are copied to the aged
 # map.

@@ -11,9 +11,8 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.city.geometry import Structure, part_triangles
+from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.loaded_structures import LoadedStructure
-
-_GROUND = ("road", "parking", "sidewalk", "other-ground", "terrain")
 
 
 class StandingStructures:
@@ -103,7 +102,8 @@ class StandingStructures:
         return [
             name
             for name in found
-            if name not in ignored and self.semantic_class(name) not in _GROUND
+            if name not in ignored
+            and self.semantic_class(name) not in GROUND_CLASSES
         ]
 
     def kind(self, name: str) -> str:

@@ -10,6 +10,7 @@ from shapely.geometry.polygon import orient
 from shapely.validation import make_valid
 
 from cns_drake.city.geometry import long_normals, triangulate
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.faults import ImportFaults
 
 # Faces with less area are dropped [m^2].
@@ -177,4 +178,4 @@ def valid_parts(
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)
         geometry = make_valid(polygon)
-    return list(parts_of(shapely.set_precision(geometry, 0.001)))
+    return list(parts_of(shapely.set_precision(geometry, GRID)))

@@ -15,8 +15,10 @@ from cns_drake.city.geometry import (
     Structure,
     hull_of,
 )
+from cns_drake.scene.semantics import GROUND_CLASSES
 
-_GROUND_CLASSES = ("road", "parking", "other-ground", "terrain")
+# Classes of the ground on which cars may drive.
+_GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}
 
 
 # Compared by identity, because there are thousands and comparing meshes takes
@@ -80,7 +82,7 @@ class ImportedStructure:
 
         The structure may still be too steep to drive on.
         """
-        return self.structure.semantic_class in _GROUND_CLASSES
+        return self.structure.semantic_class in _GROUND_OF_CARS
 
 
 def make_imported(

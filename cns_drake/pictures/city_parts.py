@@ -13,6 +13,8 @@ from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 
+# Colour of geometry without one in pictures.
+DEFAULT_RGB = (0.7, 0.7, 0.7)
 # A structure has the same height in two stages if it differs by at most this
 # [m].
 _HEIGHT_TOLERANCE = 0.5

@@ -8,7 +8,7 @@ from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
-from cns_drake.pictures.city_parts import Part
+from cns_drake.pictures.city_parts import DEFAULT_RGB, Part
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     merge_surfaces,
@@ -46,7 +46,6 @@ _SHADOW_HEIGHT = 120.0
 _SHADOW_PIXELS = 4096.0
 
 _WHITE = [1.0, 1.0, 1.0, 1.0]
-_DEFAULT_RGB = (0.7, 0.7, 0.7)
 
 
 def draw_parts(
@@ -86,7 +85,7 @@ def draw_body(
     """
     by_color: dict[tuple, list[PerceptionGeometry]] = {}
     for geometry in geometries:
-        rgb = geometry.rgb or _DEFAULT_RGB
+        rgb = geometry.rgb or DEFAULT_RGB
         by_color.setdefault(rgb, []).append(geometry)
     for k, (rgb, members) in enumerate(by_color.items()):
         surface = merge_surfaces(members, lambda frame_id: RigidTransform())

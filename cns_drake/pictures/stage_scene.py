@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cns_drake.pictures.camera_views import View
+from cns_drake.pictures.city_parts import DEFAULT_RGB
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
@@ -26,8 +27,6 @@ _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 HAZE_LENGTH = 1200.0
 # Range of rays [m].
 _FAR = 5000.0
-# Colour of geometry without one.
-_DEFAULT_RGB = (0.7, 0.7, 0.7)
 
 
 class StageScene:
@@ -106,7 +105,7 @@ def render(
         (height, width, 3) uint8 sRGB image.
     """
     rgb = np.array(
-        [_DEFAULT_RGB if g.rgb is None else g.rgb for g in geometries]
+        [DEFAULT_RGB if g.rgb is None else g.rgb for g in geometries]
     )
     image = np.zeros((height * width, 3))
     half_height = np.tan(np.deg2rad(fov_y_deg) / 2.0)

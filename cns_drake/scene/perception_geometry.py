@@ -35,6 +35,8 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
+# Colour of geometry without one in camera images.
+GREY = (0.5, 0.5, 0.5)
 # Number of sides of a cone; its surface is then exact to 5e-6 of its radius.
 _CONE_SIDES = 1024
 

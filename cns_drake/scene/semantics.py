@@ -34,6 +34,10 @@ _CLASSES = {
 }
 CLASS_IDS = {name: number for name, (number, _) in _CLASSES.items()}
 CLASS_RGB = {name: rgb for name, (_, rgb) in _CLASSES.items()}
+# Classes of the ground on which other objects stand.
+GROUND_CLASSES = frozenset(
+    {"road", "parking", "sidewalk", "other-ground", "terrain"}
+)
 
 # Class -> SemanticKITTI's id while it moves. A class without a moving
 # counterpart gets "moving-other-vehicle".

@@ -23,11 +23,10 @@ from cns_drake.base.points import encode_bin
 from cns_drake.base.progress import track
 from cns_drake.base.repetitions import repeated
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.scene.semantics import CLASS_IDS, GROUND_CLASSES
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.exact_overlap import exact_overlaps
 from cns_drake.studies.pointnetvlad_files import ExportedDrive, write_pickles
-from cns_drake.transient.ground_surface import GROUND_CLASSES
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cloud_at
 from evaluation.maps.voxel_maps import downsample

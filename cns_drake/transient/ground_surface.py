@@ -16,16 +16,13 @@ from cns_drake.city.geometry import (
     turned_up,
     unit_normals,
 )
+from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.loaded_structures import (
     LoadedPart,
     LoadedStructure,
     triangle_corners,
 )
 
-# Classes of the ground on which other objects stand.
-GROUND_CLASSES = frozenset(
-    {"road", "parking", "sidewalk", "other-ground", "terrain"}
-)
 # Steeper surfaces are not ground: least z of the unit normal.
 _LEAST_UP = 0.3
 # Slits between triangles are closed up to twice this width [m].

@@ -10,7 +10,8 @@ from shapely import Polygon
 from cns_drake.base.elementary import product
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.models import Model, part_triangles
-from cns_drake.transient.ground_surface import GROUND_CLASSES, GroundSurface
+from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.loaded_structures import LoadedStructure
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings

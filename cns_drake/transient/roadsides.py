@@ -10,7 +10,7 @@ import shapely
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.transient.ground_surface import GROUND_CLASSES
+from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.kerb_stretches import straight_kerbs
 from cns_drake.transient.surroundings import Surroundings, change_rng
 

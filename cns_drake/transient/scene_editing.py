@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cns_drake.base.elementary import product
 from cns_drake.city.geometry.models import Model, Part
+from cns_drake.scene.perception_geometry import GREY
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.drake_shapes import (
@@ -20,8 +21,6 @@ from cns_drake.transient.drake_shapes import (
 from cns_drake.transient.loaded_structures import LoadedPart, LoadedStructure
 from cns_drake.transient.table_changes import TableChanges
 
-# Colour of parts of models without one.
-_GREY = (0.5, 0.5, 0.5)
 # Points up to this far above a structure's lowest one belong to its foot [m].
 _FOOT = 0.05
 
@@ -389,7 +388,7 @@ def _pose_in_model(part: Part) -> RigidTransform:
 
 
 def _look_of(part: Part) -> Look:
-    return Look(part.rgb or _GREY, material=part.material)
+    return Look(part.rgb or GREY, material=part.material)
 
 
 def _look_properties(look: Look) -> list[geometry.GeometryProperties]:

@@ -12,7 +12,8 @@ from cns_drake.city.geometry.triangles import (
     turned_up,
     unit_normals,
 )
-from cns_drake.transient.ground_surface import GROUND_CLASSES, GroundSurface
+from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.loaded_structures import LoadedPart, triangle_corners
 from cns_drake.transient.scene_editing import Look, SceneEditing
 from cns_drake.transient.surroundings import Surroundings, change_rng

@@ -20,10 +20,10 @@ _RGB = (0.80, 0.79, 0.74)
 _THICKNESS = 0.004
 # Width of a line [m].
 _LINE_WIDTH = 0.14
-# Length of a dash of a lane line [m].
-_DASH = 3.0
-# Length of the gap behind a dash [m].
-_GAP = 6.0
+# Usual length of a dash of a line [m].
+DASH = 3.0
+# Usual length of the gap between two dashes [m].
+DASH_GAP = 6.0
 # Lane lines are divided into pieces of at most this length, to follow curves
 # [m].
 _PIECE = 4.0
@@ -74,8 +74,8 @@ def _lane_lines(road: Road) -> Iterator[tuple[float, float, float, float]]:
         for lane in range(1, count):
             inner = road.lane_offset(direction, lane)
             outer = road.lane_offset(direction, lane + 1)
-            for s in np.arange(first, last - _DASH, _DASH + _GAP).tolist():
-                yield s, s + _DASH, *_across((inner + outer) / 2)
+            for s in np.arange(first, last - DASH, DASH + DASH_GAP).tolist():
+                yield s, s + DASH, *_across((inner + outer) / 2)
     if all(road.lanes.values()) and road.median == 0:
         between = (
             road.lane_offset("forward", 1) + road.lane_offset("backward", 1)

@@ -23,6 +23,7 @@ from cns_drake.city.facades import (
     single_wall,
 )
 from cns_drake.city.geometry import Mesh, triangulate
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.facade_plan import (
     DOOR_DEEPER,
     DOOR_WIDTH,
@@ -69,8 +70,6 @@ _LEAST_WALL = 2.5
 _ON_WALL = {"glass": -0.02, "doors": -0.03, "frames": 0.0}
 # Distance of openings from the edge of a panel that is not a rectangle [m].
 _FROM_EDGE = 0.1
-# Grid on which areas of walls are computed [m].
-_GRID = 1e-3
 # Smaller remainders of a wall are dropped [m^2].
 _LEAST_AREA = 1e-4
 
@@ -144,7 +143,7 @@ def _within_outline(
     area = (0.0, 0.0, panel.length, panel.height)
     outline = panel.outline
     if outline is not None:
-        outline = shapely.buffer(outline, _GRID, join_style="mitre")
+        outline = shapely.buffer(outline, GRID, join_style="mitre")
     while True:
         reliefs = [r for o in plan.openings for r in _reliefs(o, plan)]
         if outline is None or not reliefs:
@@ -239,7 +238,7 @@ def _add_wall(
     _add_in_wall(out, "body", panel, wall.moved((x0, 0.0, z0)))
     if panel.outline is not None:
         rest = shapely.difference(
-            panel.outline, box(x0, z0, x1, z1), grid_size=_GRID
+            panel.outline, box(x0, z0, x1, z1), grid_size=GRID
         )
         for part in parts_of(rest):
             if part.area > _LEAST_AREA:

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiLineString
 
+from cns_drake.city.ground.markings import DASH, DASH_GAP
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.streets import Street, ends_at_nodes
@@ -17,10 +18,6 @@ _MARKS_WITHIN = 80.0
 _LEAST_MARKED = 6.0
 # Streets of these kinds get marks, as do streets with two lanes.
 _MARKED_KINDS = ("primary", "secondary", "tertiary")
-# Length of a dash [m].
-_DASH = 3.0
-# Length of the gap after a dash [m].
-_GAP = 6.0
 # Width of a dash [m].
 _DASH_WIDTH = 0.12
 # Height of a dash above the street [m].
@@ -49,7 +46,7 @@ def lane_marks(
             and (street.tags.get("highway") in _MARKED_KINDS or lanes == "2")
             and line.distance(paths) < _MARKS_WITHIN
         ):
-            middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
+            middles = np.arange(DASH_GAP, line.length - DASH, DASH + DASH_GAP)
             places = shapely.line_interpolate_point(line, middles)
             free = street.width / 2.0 + _BEFORE_JUNCTION
             # Without any junction, the distance is NaN.
@@ -78,7 +75,7 @@ def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
 
 def _dash(line: LineString, s: float) -> np.ndarray:
     """Returns a dash at arc length `s` of a line: triangles (2, 3, 3) [m]."""
-    ends = [line.interpolate(s + k * _DASH / 2.0) for k in (-1.0, 1.0)]
+    ends = [line.interpolate(s + k * DASH / 2.0) for k in (-1.0, 1.0)]
     a, b = (np.array([end.x, end.y]) for end in ends)
     along = (b - a) / np.hypot(*(b - a))
     left = np.array([-along[1], along[0]]) * _DASH_WIDTH / 2.0

@@ -8,8 +8,8 @@ from shapely import STRtree
 from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.paving import (
-    GRID,
     PAVED_WITHIN,
     area_outside,
     near_drives,

@@ -7,8 +7,8 @@ import shapely
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.paving import (
-    GRID,
     area_outside,
     near_drives,
     paved_structure,

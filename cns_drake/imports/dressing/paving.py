@@ -8,6 +8,7 @@ from shapely.geometry import MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import looks_up, turned_up
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles, parts_of
 from cns_drake.imports.structures import ImportedStructure, make_imported
@@ -15,8 +16,6 @@ from cns_drake.imports.structures import ImportedStructure, make_imported
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
 PAVED_WITHIN = 80.0
-# Grid size of set operations on areas [m].
-GRID = 0.001
 
 
 def near_drives(

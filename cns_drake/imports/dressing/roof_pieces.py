@@ -15,6 +15,7 @@ from cns_drake.city.geometry import (
     long_normals,
     unit_normals,
 )
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.styles import Style
 
 # A roof is level if the z of its unit normal is greater than this.
@@ -89,7 +90,7 @@ def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
         some = level[steps == step]
         whole = shapely.union_all(
             [Polygon(one) for one in np.round(some[:, :, :2], 3)],
-            grid_size=1e-3,
+            grid_size=GRID,
         )
         for part in shapely.get_parts(whole):
             if isinstance(part, Polygon) and part.area > _LEAST_ROOF:

@@ -16,6 +16,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Finish, Structure, triangulate
+from cns_drake.city.geometry.polygons import GRID
+from cns_drake.city.ground.markings import DASH, DASH_GAP
 from cns_drake.imports.colours import WHITE, Rgb
 from cns_drake.imports.faces import parts_of
 from cns_drake.imports.opendrive.lanes import LaneBand
@@ -29,11 +31,6 @@ _SLACK = 0.02
 _INWARDS = 0.05
 # Lines are cut with one such square of the carriageway at a time [m].
 _SQUARE = 64.0
-_MM = 0.001
-# Default length of a dash [m].
-_DASH = 3.0
-# Default length of the gap between two dashes [m].
-_GAP = 6.0
 # Distance of the lines of a double line from its middle [m].
 _ASIDE = 0.12
 # Height of marks above the road [m].
@@ -119,7 +116,7 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
         chosen = np.flatnonzero((squares == square).all(axis=1))
         near = shapely.box(*shapely.total_bounds(outlines[chosen]))
         ground = shapely.intersection(carriageway, near)
-        pieces = shapely.intersection(outlines[chosen], ground, grid_size=_MM)
+        pieces = shapely.intersection(outlines[chosen], ground, grid_size=GRID)
         for quad, piece in zip(rest[chosen], pieces, strict=True):
             found += [
                 _at_quad_heights(np.array(triangulate(part)), quad)
@@ -261,8 +258,8 @@ def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
         MarkLine(
             aside=(2 * k - 1) * apart,
             start=0.0,
-            dash=_DASH,
-            gap=0.0 if style == "solid" else _GAP,
+            dash=DASH,
+            gap=0.0 if style == "solid" else DASH_GAP,
             width=mark.width,
         )
         for k, style in enumerate(styles)

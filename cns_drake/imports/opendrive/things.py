@@ -12,6 +12,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Structure, placed
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import tree
@@ -153,7 +154,7 @@ def _extruded_object(
     pieces = [
         piece
         for piece in shapely.get_parts(
-            shapely.set_precision(shapely.make_valid(polygon), 0.001)
+            shapely.set_precision(shapely.make_valid(polygon), GRID)
         )
         if isinstance(piece, Polygon) and piece.area > _LEAST_AREA
     ]

@@ -37,6 +37,7 @@ from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportOptions
+from cns_drake.scene.semantics import GROUND_CLASSES
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1
@@ -52,8 +53,6 @@ _BAY_LENGTHS = (5.8, 7.4)
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
-# Classes of the ground, which is kept whole however far the drives are.
-_GROUND_CLASSES = ("road", "parking", "sidewalk", "terrain", "other-ground")
 
 
 @dataclass(frozen=True)
@@ -283,7 +282,8 @@ def _near_drives(
     shapely.prepare(ways)
     kept = []
     for one in city.structures:
-        if one.semantic_class in _GROUND_CLASSES or shapely.dwithin(
+        # The ground is kept whole.
+        if one.semantic_class in GROUND_CLASSES or shapely.dwithin(
             ways, one.footprint_W, distance
         ):
             kept.append(one)

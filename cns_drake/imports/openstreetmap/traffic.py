@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.openstreetmap.signals import (
     junctions_with_signals,
@@ -109,7 +110,7 @@ def _sidewalks(
     near = shapely.dwithin(flat, paths, _TRAFFIC_WITHIN) & shapely.is_valid(
         flat
     )
-    return shapely.union_all(flat[near], grid_size=0.001)
+    return shapely.union_all(flat[near], grid_size=GRID)
 
 
 def _are_free(

@@ -24,6 +24,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from cns_drake.scene.perception_geometry import (
+    GREY,
     PerceptionGeometry,
     read_perception_geometry,
 )
@@ -43,7 +44,6 @@ from cns_drake.sensors.camera.renderer import (
 
 # Sides of the polygon in place of a circle: true to 0.1 % of the radius.
 _SIDES = 64
-_GREY = (0.5, 0.5, 0.5)
 # Pose, colour and surface of a geometry.
 _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
 # What the geometries of one mesh share: kind of the copy, frame (None for
@@ -206,7 +206,7 @@ def _group_geometries(
         if is_anchored:
             X_FG = calc_X_WF(frame) @ X_FG
         entry = table[one.structure]
-        rgb = one.rgb or _GREY
+        rgb = one.rgb or GREY
         surface = tessellate(one.surface, _SIDES)
         look = entry.material(one.part).look
         for kind, group in (("colours", look), ("classes", entry.label)):
