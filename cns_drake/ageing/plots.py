@@ -41,9 +41,10 @@ class Plot:
     def facing(
         cls, area: BaseGeometry, streets: BaseGeometry, z: float
     ) -> Plot:
-        """Returns the plot on an area in W [m], facing the nearest street.
+        """Returns the plot on an area in W [m], with its front to a street.
 
-        `z` is the height of the ground [m].
+        The front faces the street that is nearest to the area. `z` is the
+        height of the ground [m].
         """
         rectangle = shapely.orient_polygons(area.minimum_rotated_rectangle)
         corners = shapely.get_coordinates(rectangle)

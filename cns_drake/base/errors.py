@@ -220,7 +220,7 @@ def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
 def shows_traceback() -> bool:
     """Returns whether `--traceback` was given on the command line.
 
-    The process of a job has the arguments of its parent process, and therefore
-    returns the same.
+    The process of a job has the arguments of its parent process, so the result
+    is the same in both.
     """
     return TRACEBACK_OPTION in sys.argv

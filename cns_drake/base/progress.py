@@ -39,7 +39,8 @@ class Listener:
         Args:
             costs: name of each job that is left -> expected time on one core
                 [s].
-            num_done: number of further jobs that were done before.
+            num_done: number of jobs that are not in `costs`, because they were
+                done before.
             unit: what the jobs are, such as `cities`.
         """
         return contextlib.nullcontext(JobsListener())

@@ -283,10 +283,10 @@ def ride_on_springs(
 ) -> Trajectory:
     """Returns a drive in which the body heaves, rolls and pitches.
 
-    The vehicle follows the same path at the same speed. The vehicle's springs
-    react to the acceleration of the body's centre of mass, to gravity on
-    slopes, and to the road profile below each wheel. The road also falls to the
-    right with the slope `crossfall` [m/m].
+    The vehicle follows the path of `trajectory` at the same speed. The
+    vehicle's springs react to the acceleration of the body's centre of mass, to
+    gravity on slopes, and to the road profile below each wheel. The road also
+    falls to the right with the slope `crossfall` [m/m].
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS

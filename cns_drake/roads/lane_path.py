@@ -27,9 +27,9 @@ class LanePath:
         spacing: distance between neighbouring points along the path [m].
         speed_limits: (N,) speed limits at the points; infinite where there is
             none [m/s].
-        beside: (N, 2) distances to the middle of the neighbouring lanes on the
-            left and on the right with the same direction [m]; 0 where there is
-            no such lane. None for a path along waypoints.
+        beside: (N, 2) distances to the middles of the left and the right
+            neighbouring lane [m]; 0 where there is no such lane, or it has the
+            opposite direction. None for a path along waypoints.
     """
 
     points: np.ndarray

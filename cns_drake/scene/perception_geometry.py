@@ -154,7 +154,7 @@ class GeometryReader:
     def read(
         self, records: Iterable[GeometryRecord]
     ) -> tuple[PerceptionGeometry, ...]:
-        """Returns recorded geometry, in the same order.
+        """Returns recorded geometry, in the order of the records.
 
         For a geometry that has not changed since the last call, the same object
         is returned.

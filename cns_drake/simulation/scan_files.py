@@ -27,9 +27,9 @@ def check_ending(path: Path) -> None:
 def save_scan(scan: np.ndarray, path: Path) -> None:
     """Saves x, y, z and intensity of a scan to a file.
 
-    The ending of the file name sets the format: `.bin` is KITTI's (float32 x y
-    z intensity), `.npy` an array (N, 4) of the same numbers, `.pcd` a binary
-    PCD file.
+    The ending of the file name sets the format: `.bin` is KITTI's format
+    (float32 x y z intensity), `.npy` is an array (N, 4) of the same numbers,
+    and `.pcd` is a binary PCD file.
 
     Args:
         scan: structured array (N,) with these four fields.

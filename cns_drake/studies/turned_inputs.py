@@ -42,7 +42,7 @@ def turned_bounds(bounds: Sequence[float], turn_deg: float) -> list[float]:
         turn_deg: angle by which the box is rotated about the origin [deg].
 
     Returns:
-        The same values of the bounding box [m].
+        Least x, least y, greatest x and greatest y of the bounding box [m].
     """
     x0, y0, x1, y1 = bounds
     corners = [

@@ -205,8 +205,8 @@ class SceneEditing:
 
         Args:
             structure: the structure.
-            before: model of the structure as it is, with the same parts in the
-                same order.
+            before: model of the unchanged structure, with the parts in the
+                order of the structure's parts.
             after: the changed model. A part replaces the part of the same name
                 in `before`; a part with a new name is added.
             X_WS: pose of the frame S of both models in W.

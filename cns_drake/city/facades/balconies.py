@@ -59,8 +59,9 @@ def add_railing(
         out: the building under assembly, which gets the parts.
         part: name of the part.
         wall: the wall.
-        start: first point: distances along the wall and out of the wall [m].
-        end: last point: distances along the wall and out of the wall [m].
+        start: distances of the first point along the wall and out of the wall
+            [m].
+        end: distances of the last point along the wall and out of the wall [m].
         z: height of the floor [m].
         finish: colour and material.
     """

@@ -237,8 +237,9 @@ def _visible_panels(
 ) -> tuple[list[Panel], np.ndarray]:
     """Returns the plane walls visible from drives, and their distances [m].
 
-    The nearest walls come first, as many as the limit of triangles allows.
-    `walls` has the vertical triangles (M, 3, 3) of each building [m].
+    The walls nearest to drives come first. Only as many walls are returned as
+    the limit of triangles allows. `walls` has the vertical triangles (M, 3, 3)
+    of each building [m].
     """
     panels = find_panels(walls, lambda xy: views.are_near(xy, _WALLS_WITHIN))
     panels = [panel for panel in panels if panel.is_plane]

@@ -137,9 +137,9 @@ def _extinction_of(number: np.ndarray) -> float:
 class Scattering(NamedTuple):
     """Statistics of the echoes of drops and fog that a LiDAR detects.
 
-    The energy of an echo is the reflectivity of the Lambertian target that
-    would return an equally strong echo from the same distance, if it filled the
-    beam and faced the LiDAR.
+    The energy of an echo is the reflectivity of a Lambertian target that fills
+    the beam, faces the LiDAR, and would return an equally strong echo from the
+    same distance.
 
     Attributes:
         distances: (R,) increasing distances [m].
