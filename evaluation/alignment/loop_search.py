@@ -213,7 +213,7 @@ class LoopSearch:
         return made
 
     def _moved_with(self, registered: int, k: int) -> np.ndarray:
-        """Returns X_TK (4, 4) of keyframe k, moved with a registered one."""
+        """Returns X_TK (4, 4) of k, moved with a registered keyframe."""
         loop = self.loops[registered]
         X_TJ = self.target.X_WK[loop.target] @ loop.X_LK
         X_WK = self.source.X_WK

@@ -160,7 +160,7 @@ def _change_on_grid(
     target: DriveMap,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[TemporalChange, list[np.ndarray]]:
-    """Returns the change on a grid shifted by [m], and centroids of A and B."""
+    """Returns the change on a shifted grid, and the centroids of A and B."""
     clouds = [
         one.voxels.merged(shift=shift).centroids_W for one in (source, target)
     ]

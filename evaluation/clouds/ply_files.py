@@ -98,7 +98,7 @@ class _Element(NamedTuple):
 
 
 def _read_ply_header(path: Path) -> tuple[str, list[_Element], int]:
-    """Returns encoding, elements and the offset of the first one [bytes]."""
+    """Returns encoding, elements, and offset of the first element [bytes]."""
     encoding = ""
     elements: list[_Element] = []
     with open(path, "rb") as stream:

@@ -1,4 +1,4 @@
-"""A rotated, tilted or partly occluded sensor, from which a query is seen."""
+"""A sensor for queries, which can be rotated, tilted and partly occluded."""
 
 from __future__ import annotations
 

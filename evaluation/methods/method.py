@@ -113,7 +113,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Returns the descriptor of a query's cloud."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Returns the descriptor of a place; by default like a query's."""
+        """Returns a place's descriptor; by default the same as for a query."""
         return self.describe(points)
 
     def describe_batch(

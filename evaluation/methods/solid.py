@@ -248,7 +248,7 @@ def _counts_by_cell(
 
 
 def _elevation_weights(counts: np.ndarray) -> np.ndarray:
-    """Returns weights: counts scaled so that the least is 0, the greatest 1."""
+    """Returns weights: counts, scaled from 0 (least) to 1 (greatest)."""
     least, most = counts.min(), counts.max()
     if least == most:
         return np.ones(len(counts))

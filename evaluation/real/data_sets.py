@@ -286,7 +286,7 @@ def _open_files(
 
 
 def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
-    """Returns the poses of files, whose names are numbers in a table."""
+    """Returns the poses in a table that belong to files named by numbers."""
     try:
         numbers = np.array([int(file.stem) for file in files])
     except ValueError as error:

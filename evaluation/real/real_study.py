@@ -301,7 +301,7 @@ def _can_be_judged(one: RealScans, on_note: OnNote) -> bool:
 
 
 def _has_classifier(name: str, on_note: OnNote) -> bool:
-    """Returns whether the classifier's package is there; if not, says so."""
+    """Returns whether the classifier's package exists; a note says if not."""
     if importlib.util.find_spec("sklearn") is not None:
         return True
     on_note(

@@ -182,7 +182,7 @@ class PlaceOutcome:
 
     @cached_property
     def by_mode(self) -> Mapping[Mode, PlaceRecognitionMetrics]:
-        """Mode -> metrics, of all queries or of those with a match."""
+        """Mode -> metrics, of all queries or of the queries with a match."""
         return {mode: evaluate(self.outcomes, mode) for mode in MODES}
 
     @cached_property
@@ -310,7 +310,7 @@ def _columns_of_answers(
 
 
 def check_has_match(outcome: PlaceOutcome) -> None:
-    """Checks that a query has a match.
+    """Checks that at least one query has a match.
 
     Raises:
         InputError: no query has a match.

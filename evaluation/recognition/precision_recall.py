@@ -1,4 +1,4 @@
-"""The precision-recall curve of place recognition, and the area below."""
+"""The precision-recall curve of place recognition, and the area under it."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Visible change: how much of the queries' scans their best matches miss."""
+"""Visible change: how much of a query's scan its best match does not show."""
 
 from __future__ import annotations
 

@@ -279,7 +279,7 @@ def _show(axes: Axes, picture: Picture) -> None:
 
 
 def _draw_route(axes: Axes, line: np.ndarray) -> None:
-    """Draws a route (N, 2) with a triangle at its start, a square at end."""
+    """Draws a route (N, 2), a triangle at its start, a square at its end."""
     # A picture has too few pixels for more points. Each piece is drawn by
     # itself.
     number = min(len(line), _ROUTE_POINTS)

@@ -1,4 +1,4 @@
-"""Tables of one metric by method and condition: the user's and the shipped."""
+"""Tables of one metric by method and condition: shipped, and the user's."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

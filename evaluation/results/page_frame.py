@@ -101,6 +101,6 @@ def environment(
 
 
 def read_asset(package: str, folder: str, name: str) -> Markup:
-    """Returns a style sheet or a script in a folder of a package unchanged."""
+    """Returns the unchanged text of a style sheet or script in a package."""
     path = resources.files(package) / folder / name
     return Markup(path.read_text("utf-8"))

@@ -115,7 +115,7 @@ def check_all(name: str, values: Iterable[float]) -> None:
     """Checks several values of a metric; NaN and masked values are left out.
 
     Raises:
-        InputError: a value cannot be.
+        InputError: a value is impossible for the metric.
     """
     numbers = np.ma.masked_invalid(np.asarray(values, dtype=float)).compressed()
     if len(numbers):

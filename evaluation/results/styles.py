@@ -37,7 +37,7 @@ Legend = tuple[tuple[tuple[int, int, int], str], ...]
 
 
 def unit_rgb(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """Scales a colour from 0 to 255 to 0 to 1, as matplotlib needs it."""
+    """Returns a colour scaled from [0, 255] to [0, 1], for matplotlib."""
     red, green, blue = rgb
     return red / 255.0, green / 255.0, blue / 255.0
 

@@ -1,4 +1,4 @@
-"""Runs pairs of drives x tasks x methods, and turns results into two tables."""
+"""Measures pairs of drives by tasks and methods, and writes two tables."""
 
 from collections.abc import (
     Callable,
@@ -180,7 +180,7 @@ class Engine:
     def _baselines(self) -> dict[tuple, dict[int, dict[str, Any]]]:
         """Returns the baseline's results by map, drives and protocol.
 
-        Below that, they are by seed and task.
+        For each of these, the results are by seed and task.
         """
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
         for one in self.measured:

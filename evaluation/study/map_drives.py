@@ -165,7 +165,7 @@ class MapDrives:
 
 
 def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
-    """Returns a note for the user on each map with drives in one stage only."""
+    """Returns a note for the user on each map with drives in only one stage."""
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"

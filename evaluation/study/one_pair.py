@@ -197,7 +197,7 @@ def pair_of_maps(older: Path, newer: Path, map_name: str) -> Pair:
 
 
 def _map_of(opened: Drive | Path) -> str:
-    """Returns the name of a drive's map, or else of its world frame."""
+    """Returns the name of a drive's map; without a map, of its world frame."""
     if isinstance(opened, Path):
         return one_line(opened.name)
     named = (opened.scenario or {}).get("map")

@@ -157,7 +157,7 @@ class StagesReport:
 
     @property
     def _costed_pair(self) -> Recordings | None:
-        """The pair on which costs are measured, if they are."""
+        """The pair on which costs are measured; None without such a pair."""
         if not self.with_costs:
             return None
         pairs = (

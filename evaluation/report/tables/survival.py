@@ -161,7 +161,7 @@ def survival_table(survivals: Sequence[Survival]) -> Table:
 def _metric_columns(
     group: str, metric: str, kept: str | None = None
 ) -> Columns[Survival]:
-    """Returns columns: a metric without change, with change, and retained."""
+    """Returns columns: a metric without and with change, and the ratio."""
 
     def share(one: Survival) -> str | None:
         row = one.after.get(str(kept))

@@ -50,7 +50,7 @@ class Result(Protocol):
         """Returns the result.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: the result cannot be read.
         """
 
 
