@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion import suspension
+from cns_drake.motion import suspension, suspension_data
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import frames_within
 from cns_drake.roads.driver_offsets import FINE_SPACING, driven_path, kerbs
@@ -128,8 +128,8 @@ class DrivePlan:
         if profile is None:
             return trajectory
         springs = suspension.Suspension(
-            suspension.load_car_masses(vehicle_file()),
-            suspension.load_suspension_rates(suspension_file()),
+            suspension_data.load_car_masses(vehicle_file()),
+            suspension_data.load_suspension_rates(suspension_file()),
         )
         return suspension.ride_on_springs(
             trajectory, springs, profile, crossfall=ride.crossfall

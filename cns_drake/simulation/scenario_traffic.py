@@ -19,9 +19,10 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.sections import TrafficConfig
 from cns_drake.scene.map_folder import MapFolder
+from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.scene.world import World
 from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.traffic import lane_graph, queues, traffic_plan
+from cns_drake.traffic import lane_graph, queues
 from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.fcd_trace import read_fcd
 from cns_drake.traffic.fcd_traffic import play_trace
@@ -29,12 +30,12 @@ from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
 from cns_drake.traffic.traffic_motion import traffic_structures
-from cns_drake.traffic.traffic_plan import EgoPath
+from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.traffic_planning import plan_traffic
 from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicle_placement import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.traffic.walkway_clearing import kept_clear
-from cns_drake.transient.ground_surface import GROUND_CLASSES
 from cns_drake.transient.loaded_structures import read_structures
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
@@ -48,7 +49,7 @@ _LONGEST_WAIT = 600.0
 
 def plan_scenario_traffic(
     scenario: Scenario, trajectory: Trajectory, world: World | None = None
-) -> traffic_plan.TrafficPlan:
+) -> TrafficPlan:
     """Returns the motion of all vehicles and pedestrians of a scenario.
 
     Args:
@@ -129,7 +130,7 @@ def _plan_moving_traffic(
     ego: EgoPath,
     graph: lane_graph.LaneGraph,
     walkways: Sequence[lane_graph.Walkway],
-) -> traffic_plan.TrafficPlan:
+) -> TrafficPlan:
     """Plans vehicles and pedestrians that move by their own rules.
 
     Raises:
@@ -138,7 +139,7 @@ def _plan_moving_traffic(
     """
     wanted = scenario.traffic
     follows = scenario.driver.follows
-    plan = traffic_plan.plan_traffic(
+    plan = plan_traffic(
         graph,
         walkways,
         vehicles=wanted.vehicles,
@@ -222,7 +223,7 @@ def _check_room(
         )
 
 
-def with_traffic(world: World, plan: traffic_plan.TrafficPlan) -> World:
+def with_traffic(world: World, plan: TrafficPlan) -> World:
     """Returns a world whose structure table and notes include the traffic.
 
     Raises:

@@ -13,7 +13,8 @@ seed. During the drive, the poses are interpolated from this plan.
   `vehicle_steps`; then `vehicle_poses`.
 - The ego car among them: `follower`, `path_runs`.
 - Pedestrians: `walkers`, `social_force`.
-- Plans: `traffic_plan`, `queues`; `fcd_traffic` from a SUMO trace that
-  `fcd_trace` reads; `tracks`, `overlaps`, `random_numbers`.
+- Plans: `traffic_plan`, made by `traffic_planning` and `traffic_trial`;
+  `queues`; `fcd_traffic` from a SUMO trace that `fcd_trace` reads; `tracks`,
+  `overlaps`, `random_numbers`.
 - In a diagram: `traffic_motion`, `body_states`, `body_shapes`.
 """

@@ -17,11 +17,10 @@ import pytest
 from cns_drake.motion.body_ride import BodyRide
 from cns_drake.motion.road_profile import RoadProfile
 from cns_drake.motion.speed_profile import Speeds
-from cns_drake.motion.suspension import (
-    Suspension,
+from cns_drake.motion.suspension import Suspension, ride_on_springs
+from cns_drake.motion.suspension_data import (
     load_car_masses,
     load_suspension_rates,
-    ride_on_springs,
 )
 from cns_drake.motion.trajectory import Trajectory, poses_and_motion
 from cns_drake.motion.wheel_motion import WheelMotion

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.suspension import (
+from cns_drake.motion.suspension import Suspension
+from cns_drake.motion.suspension_data import (
     AxleRates,
     CarMasses,
-    Suspension,
     SuspensionRates,
     load_car_masses,
     load_suspension_rates,

@@ -13,11 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cns_drake.motion.road_profile import RoadProfile
-from cns_drake.motion.suspension import (
-    Suspension,
+from cns_drake.motion.suspension import Suspension, ride_on_springs
+from cns_drake.motion.suspension_data import (
     load_car_masses,
     load_suspension_rates,
-    ride_on_springs,
 )
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion

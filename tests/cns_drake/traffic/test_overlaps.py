@@ -4,7 +4,7 @@ import numpy as np
 import shapely
 
 from cns_drake.traffic.overlaps import boxes_overlap, find_overlaps
-from cns_drake.traffic.traffic_plan import whom_to_leave_out
+from cns_drake.traffic.traffic_trial import whom_to_leave_out
 
 
 def _polygon(pose, half):

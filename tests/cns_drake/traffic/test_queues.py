@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
-from cns_drake.traffic import traffic_plan
+from cns_drake.traffic import traffic_planning
 from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.queues import plan_queues
-from cns_drake.traffic.traffic_plan import plan_traffic
+from cns_drake.traffic.traffic_planning import plan_traffic
 
 BOX = EgoBox(-1.0, 3.0, 1.0)
 # Direction of the road [rad].
@@ -124,7 +124,7 @@ def test_which_trials_a_plan_makes(monkeypatch, follows, trials, number, known):
             assert np.isinf(until[1:]).all()
         return found[len(seen) - 1]
 
-    monkeypatch.setattr(traffic_plan, "_try", trial)
+    monkeypatch.setattr(traffic_planning, "_better_plan", trial)
     plan = plan_traffic(
         GRAPH, [], vehicles=2, walkers=0, seed=3, duration=4.0, ego=drive,
         ego_box=BOX, drive=SimpleNamespace() if follows else None,

@@ -12,7 +12,7 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.traffic import traffic_plan
+from cns_drake.traffic import traffic_planning
 from cns_drake.traffic.conflicts import find_conflicts
 from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.lane_graph import (
@@ -23,7 +23,9 @@ from cns_drake.traffic.lane_graph import (
 )
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
+from cns_drake.traffic.traffic_plan import WALKER_SIZE
+from cns_drake.traffic.traffic_planning import plan_traffic
+from cns_drake.traffic.traffic_trial import Trial
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 from cns_drake.traffic.vehicle_placement import room_for_vehicles
 from cns_drake.traffic.vehicle_records import make_crossings
@@ -162,12 +164,10 @@ def test_a_trial_given_up_early_changes_no_plan(monkeypatch):
         return xy, np.full(len(t), np.arctan2(*(high - low)[::-1]))
 
     found, calls = [], []
-    run = traffic_plan.Trial.run
-    monkeypatch.setattr(
-        traffic_plan.Trial, "run", lambda *a: calls.append(a) or run(*a)
-    )
+    run = Trial.run
+    monkeypatch.setattr(Trial, "run", lambda *a: calls.append(a) or run(*a))
     for part in (20, 10**6):
-        monkeypatch.setattr(traffic_plan, "_PART", part)
+        monkeypatch.setattr(traffic_planning, "_PART", part)
         found.append(
             plan_traffic(
                 graph,

@@ -1,0 +1,280 @@
+"""A trial of traffic: a simulation that finds bodies that would collide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.traffic.car_following import accelerations
+from cns_drake.traffic.ego_car import STEP, EgoBox
+from cns_drake.traffic.follower import Follower
+from cns_drake.traffic.lane_changes import change_lanes
+from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.overlaps import find_overlaps
+from cns_drake.traffic.right_of_way import grant_ways
+from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
+from cns_drake.traffic.streets import Streets
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import TrafficPlan
+from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
+from cns_drake.traffic.vehicle_placement import (
+    place_vehicles,
+    room_for_vehicles,
+)
+from cns_drake.traffic.vehicle_poses import vehicle_poses
+from cns_drake.traffic.vehicle_records import (
+    Traffic,
+    begin_traffic,
+    find_occupants,
+    make_crossings,
+)
+from cns_drake.traffic.vehicle_steps import advance
+from cns_drake.traffic.walkers import Crowd
+
+# The step at which the drive begins; traffic moves in the steps before it.
+FIRST_STEP = 200
+# Number of steps for which traffic moves on after an ego car that follows
+# others has arrived.
+_AFTER = 20
+# Share of vehicles and pedestrians that are planned in addition, because some
+# will be left out.
+_SPARE_SHARE = 0.06
+# Boxes keep this distance, because they are compared only at some times [m].
+_APART = 0.1
+
+
+class Task(NamedTuple):
+    """What all trials of a plan have in common.
+
+    Attributes:
+        graph: lanes and crossings.
+        walkways: sidewalks on which pedestrians walk, and crossings.
+        streets: the graph, and the ego car at K steps, the first of which are
+            before the drive.
+        ego_track: (2 K - 1, 3) x, y [m], heading [rad] of the middle of the ego
+            car's box at steps and half steps.
+        ego_box: size of the ego car.
+        vehicles, walkers: requested numbers of vehicles and pedestrians.
+        drive: the ego car's drive, if it follows other vehicles; it then stands
+            still in `streets` and `ego_track`.
+    """
+
+    graph: LaneGraph
+    walkways: Sequence[Walkway]
+    streets: Streets
+    ego_track: np.ndarray
+    ego_box: EgoBox
+    vehicles: int
+    walkers: int
+    drive: Trajectory | None
+
+
+class Trial:
+    """One simulation of traffic, which finds bodies that would collide."""
+
+    def __init__(
+        self,
+        task: Task,
+        kinds: Sequence[VehicleKind],
+        crowd: Crowd,
+        traffic: Traffic,
+        follower: Follower | None,
+        seed: int,
+    ):
+        """Takes the bodies before the first time step.
+
+        Args:
+            task: what all trials have in common.
+            kinds: kinds of the vehicles in `traffic`, without the ego car.
+            crowd: the pedestrians.
+            traffic: the vehicles. If the ego car follows others, it is the last
+                of them.
+            follower: the ego car, if it follows others.
+            seed: seed of the random routes.
+        """
+        self._task = task
+        self._kinds = kinds
+        self._crowd = crowd
+        self._traffic = traffic
+        self._follower = follower
+        self._seed = seed
+        self._num_steps = 0
+        num_steps = len(task.streets.until)
+        num_walkers = len(self._crowd.walkers)
+        # The columns are those of `TrafficPlan`.
+        self._vehicles = np.zeros((num_steps, len(kinds), 5))
+        self._walkers = np.zeros((num_steps, num_walkers, 5))
+        # Ego car, vehicles, pedestrians.
+        self._half_sizes = _APART / 2 + np.array(
+            [
+                task.ego_box.half_size,
+                *((k.size[0] / 2, k.size[1] / 2) for k in self._kinds),
+                *([(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * num_walkers),
+            ]
+        )
+        self._overlaps = np.zeros((len(self._half_sizes),) * 2, bool)
+
+    def run(self, steps: range) -> None:
+        """Simulates the given time steps.
+
+        The motion of vehicles and pedestrians is stored, and also which pairs
+        of bodies overlap, the ego car included.
+        """
+        traffic, crowd = self._traffic, self._crowd
+        cars = traffic.cars
+        past_cars = np.empty((len(steps), len(self._kinds)), cars.dtype)
+        past_walkers = np.empty(
+            (len(steps), len(crowd.walkers)), crowd.walkers.dtype
+        )
+        for row, k in enumerate(steps):
+            past_cars[row] = cars[: len(self._kinds)]
+            past_walkers[row] = crowd.walkers
+            find_occupants(traffic, k)
+            grant_ways(traffic, k)
+            wanted = accelerations(traffic)
+            if self._follower is not None:
+                self._follower.step(traffic, k)
+            change_lanes(traffic, k)
+            advance(traffic, wanted)
+            crowd.step(k * STEP, self._seed + 1)
+        rows = slice(steps.start, steps.stop)
+        self._vehicles[rows] = vehicle_poses(traffic.streets, past_cars)
+        self._walkers[rows] = crowd.poses(past_walkers)
+        # From the step before, because of the half step in between.
+        first = max(steps.start - 1, 0)
+        rows = slice(first, steps.stop)
+        half_steps = np.arange(2 * first, 2 * steps.stop - 1)
+        if self._follower is None:
+            ego = self._task.ego_track[half_steps]
+        else:
+            ego = self._follower.poses(half_steps / 2)
+        vehicles, walkers = (
+            _at_half_steps(bodies[rows])
+            for bodies in (self._vehicles, self._walkers)
+        )
+        poses = np.concatenate([ego[:, None], vehicles, walkers], axis=1)
+        find_overlaps(poses, self._half_sizes, self._overlaps)
+        self._num_steps = steps.stop
+
+    def is_over(self, num_steps: int) -> bool:
+        """Returns whether the simulation can end before its last time step.
+
+        The simulation can end if the ego car follows other vehicles, and
+        arrived at least 20 time steps ago.
+
+        Args:
+            num_steps: number of time steps simulated so far.
+        """
+        if self._follower is None:
+            return False
+        u = self._follower.u
+        return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
+
+    def _kept(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the vehicles and pedestrians that overlap no other body."""
+        kept = np.ones(len(self._half_sizes), bool)
+        kept[whom_to_leave_out(self._overlaps, 1)] = False
+        vehicles, walkers = (
+            np.flatnonzero(part)
+            for part in np.split(kept[1:], [len(self._kinds)])
+        )
+        return vehicles[: self._task.vehicles], walkers[: self._task.walkers]
+
+    def left_out(self) -> int:
+        """Returns how many requested vehicles and pedestrians are left out.
+
+        A body is left out if it would overlap with another body.
+        """
+        vehicles, walkers = self._kept()
+        wanted = self._task.vehicles + self._task.walkers
+        return wanted - len(vehicles) - len(walkers)
+
+    def plan(self) -> TrafficPlan:
+        """Returns the plan that results from all time steps so far."""
+        vehicles_at = self._vehicles[: self._num_steps]
+        walkers_at = self._walkers[: self._num_steps]
+        yaw = vehicles_at[:, :, 3]
+        yaw[:] = np.unwrap(yaw, axis=0)
+        vehicles, walkers = self._kept()
+        return TrafficPlan(
+            tuple(self._kinds[k] for k in vehicles),
+            Tracks(STEP, _spline_values(vehicles_at[:, vehicles])),
+            Tracks(STEP, _spline_values(walkers_at[:, walkers])),
+            self.left_out(),
+            self._follower.positions()
+            if self._follower is not None and self._follower.arrived
+            else None,
+        )
+
+
+def begin_trial(task: Task, rng: np.random.Generator) -> Trial:
+    """Returns a trial in which vehicles and pedestrians have random places."""
+    number = min(
+        _with_spare(task.vehicles),
+        max(task.vehicles, room_for_vehicles(task.graph)),
+    )
+    kinds = [KINDS[k] for k in draw_kinds(number, rng)]
+    cars, found = place_vehicles(kinds, task.streets, rng)
+    crossings = make_crossings(task.graph)
+    walkers = _with_spare(task.walkers)
+    crowd = Crowd(walkers, task.walkways, crossings, rng)
+    seed = int(rng.integers(2**31))
+    follower: Follower | None = None
+    if task.drive is not None:
+        follower = Follower(task.graph, task.drive, task.ego_box, FIRST_STEP)
+        cars = np.append(cars, follower.record(task.streets))
+    traffic = begin_traffic(task.streets, cars, crossings, seed)
+    return Trial(
+        task, [kinds[k] for k in found], crowd, traffic, follower, seed
+    )
+
+
+def _spline_values(values: np.ndarray) -> np.ndarray:
+    """Returns the values (K - F, N, D) of a cubic B-spline at its knots.
+
+    Its control points are (K, N, D), at all steps; F steps are before the
+    drive. A spline through the values has no greater accelerations than the
+    control points.
+    """
+    before, here, after = (
+        values[FIRST_STEP + k : len(values) - 1 + k] for k in (-1, 0, 1)
+    )
+    return (before + 4.0 * here + after) / 6.0
+
+
+def _with_spare(number: int) -> int:
+    return int(np.ceil(number * (1 + _SPARE_SHARE)))
+
+
+def _at_half_steps(values: np.ndarray) -> np.ndarray:
+    """Returns x, y, yaw (2 K - 1, N, 3) at steps and half steps."""
+    xy_yaw = values[:, :, [0, 1, 3]]
+    xy_yaw[:, :, 2] = np.unwrap(xy_yaw[:, :, 2], axis=0)
+    result = np.empty((2 * len(xy_yaw) - 1, *xy_yaw.shape[1:]))
+    result[::2] = xy_yaw
+    result[1::2] = (xy_yaw[1:] + xy_yaw[:-1]) / 2
+    return result
+
+
+def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
+    """Returns the bodies to remove so that none overlap, as sorted indices.
+
+    Bodies with the most overlaps are removed first.
+
+    Args:
+        overlaps: (N, N) bool, symmetric: which bodies overlap.
+        kept: the first `kept` bodies are never removed.
+    """
+    overlaps = overlaps.copy()
+    out: list[int] = []
+    while True:
+        involved = overlaps.sum(axis=0)
+        involved[:kept] = 0
+        if not involved.any():
+            return sorted(out)
+        worst = int(involved.argmax())
+        out.append(worst)
+        overlaps[worst] = overlaps[:, worst] = False
