@@ -340,7 +340,7 @@ def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
 
 
 def _fit_with_retries(search: LoopSearch) -> tuple[np.ndarray, str]:
-    """Fits poses by `_fit_poses`, and again after new tries of keyframes."""
+    """Fits poses, tries doubtful keyframes again, and fits poses again."""
     X_TK, model = _fit_poses(search)
     for _ in range(_ROUNDS):
         if not search.retry(_doubtful_keyframes(search, X_TK), X_TK):

@@ -71,9 +71,10 @@ def optimise(
 
     The method is Gauss-Newton on SE(3) with sparse normal equations, as in
     Grisetti et al., "A tutorial on graph-based SLAM" (2010). Measurements
-    (ties) that may be wrong are weighted by Cauchy's kernel, whose width
-    shrinks step by step to its final value (graduated non-convexity), so that
-    poor initial poses do not decide which measurements count as right.
+    (ties) that may be wrong are weighted by Cauchy's kernel. The width of the
+    kernel shrinks step by step to its final value (graduated non-convexity).
+    Poor initial poses therefore do not decide which measurements count as
+    right.
 
     Args:
         V: (N, 4, 4) poses from which the optimisation starts.

@@ -3,8 +3,8 @@
 Source: "The City that Never Settles", equations 1 to 3. The paper leaves the
 following choices open; this module makes them.
 
-- X is the map of a whole drive in world coordinates, as the centroids of the
-  voxels of a grid that is fixed in the world (see
+- X is the map of a whole drive in world coordinates. The points of X are the
+  centroids of voxels, whose grid is fixed in the world (see
   `evaluation.maps.voxel_maps`).
 - TCR_sym changes if that grid is shifted. The least and the greatest value over
   `GRIDS`, shifts that are spread evenly over a voxel, show by how much.

@@ -29,10 +29,10 @@ def open_drive(
     """Opens a recorded drive with the reader for its format.
 
     Args:
-        path: an .mcap file, a folder that contains such a file (as cns-drake
-            and rosbag2 write it), or a folder of a drive as MulRan, HeLiPR,
-            NCLT, Boreas, KITTI odometry or CNS publish it. `LiDAR/<name>` in a
-            folder of HeLiPR chooses the LiDAR.
+        path: an .mcap file; a folder with such a file, as cns-drake and rosbag2
+            write it; or a drive's folder, as MulRan, HeLiPR, NCLT, Boreas,
+            KITTI odometry or CNS publish it. `LiDAR/<name>` in a folder of
+            HeLiPR chooses the LiDAR.
         lidar: name of the LiDAR to read, if the recording has several LiDARs.
         columns: number of float32 values per point in `.bin` files of KITTI and
             MulRan; by default the number is guessed from the values.

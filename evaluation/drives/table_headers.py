@@ -53,9 +53,10 @@ def find_columns(
 ) -> list[int] | None:
     """Returns the places of columns in a table that has a header.
 
-    The known columns are `time`, `x`, `y`, `z`, `qx` to `qz` and `qw` of a
-    quaternion, `roll`, `pitch`, `yaw`, `wx` to `wz` of an angular velocity, and
-    `ax` to `az` of a specific force, in the spelling of many programs.
+    The known columns are `time`; `x`, `y`, `z`; `qx` to `qz` and `qw` of a
+    quaternion; `roll`, `pitch`, `yaw`; `wx` to `wz` of an angular velocity; and
+    `ax` to `az` of a specific force. Each name is known in the spellings of
+    many programs.
 
     Args:
         words: words of the header, one for each column of the table.

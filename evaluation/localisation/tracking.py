@@ -91,8 +91,8 @@ def track_drive(
 
     Returns:
         (K,) records of `TRACKED`. Before the fields of `QUERY`, each record
-        contains the number of the section, the length of the path since the
-        drive's first scan and since the previous scan [m], and the error of the
+        contains the number of the section; the lengths of path since the
+        drive's first scan and since the previous scan [m]; and the error of the
         tracked position [m]. The tracked position is the result of the
         alignment, or the position by odometry if the alignment has no result.
 

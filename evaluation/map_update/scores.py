@@ -169,8 +169,9 @@ def _scores_by_structure(both: _Labelled) -> dict[str, float]:
     """Returns precision and recall by structures, and numbers of structures.
 
     For each kind of change, such as `gone`, the keys are `precision_gone`,
-    `recall_gone` and `gone`, which is the number of structures that changed in
-    this way according to the ground truth. A rate without structures is NaN.
+    `recall_gone` and `gone`. The value of `gone` is the number of structures
+    that changed in this way according to the ground truth. A rate without
+    structures is NaN.
     """
     pair, truth, predicted, counted = both
     found = {}

@@ -65,8 +65,9 @@ def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
     """Returns three unit vectors that span an image on a plane, (3, 3).
 
     Row 0 of the result is the direction in which the row numbers of the image
-    increase, row 1 the direction in which the image's column numbers increase,
-    and row 2 the normal. Row 1 is the x axis, moved vertically onto the plane.
+    increase, row 1 is the direction in which the image's column numbers
+    increase, and row 2 is the normal. Row 1 is the x axis, moved vertically
+    onto the plane.
 
     In the authors' public program, a wrong term makes row 1 not quite
     orthogonal to the normal. Keypoints then lie on a plane that is tilted by

@@ -362,10 +362,10 @@ def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
 def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
     """Returns the greatest height per cell: rows along x, columns along y.
 
-    As in the T-RO program, cells are counted outwards from the axes, so that
-    the cells around the axes are twice as large, and the first row and column
-    stay empty. As in that program, too, points below the ground count as
-    ground.
+    As in the T-RO program, cells are counted outwards from the axes. The cells
+    around the axes are therefore twice as large as the other cells, and the
+    first row and column stay empty. As in that program, too, points below the
+    ground count as ground.
     """
     rows, columns = (
         2 * int(half / cell)

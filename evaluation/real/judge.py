@@ -235,9 +235,9 @@ def _in_folds(one: Features) -> np.ndarray:
 def aucs_by_group(real: Features, simulated: Features) -> dict:
     """Returns how well a classifier tells real from simulated scans.
 
-    The result contains the AUC of the classifier for each group of features,
-    and the AUC of a control, which is the same classifier on two halves of the
-    simulated scans.
+    The result contains two AUCs for each group of features: the AUC of the
+    classifier, and the AUC of a control. The control is the same classifier on
+    two halves of the simulated scans.
     """
     names = common_names([real, simulated])
     groups = {"all": names}

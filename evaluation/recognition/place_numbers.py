@@ -38,12 +38,13 @@ def place_numbers(
             results that compare the condition with the baseline.
 
     Yields:
-        The metrics of the condition and, compared with the baseline, `kept`,
-        `kept_r1` and `kept_strict` (AUC, R@1 and strict AUC in the condition,
-        divided by the same metric in the baseline), `lost` (the number of
-        queries that are right only in the baseline), `found` (the number of
-        queries that are right only in the condition), and the result of the
-        function `visible_change_added`.
+        The metrics of the condition. If there is a baseline, the following
+        results come in addition. `kept`, `kept_r1` and `kept_strict` are AUC,
+        R@1 and strict AUC in the condition, divided by the same metric in the
+        baseline. `lost` is the number of queries that are right only in the
+        baseline; `found` is the number of queries that are right only in the
+        condition. The last result comes from the function
+        `visible_change_added`.
     """
     outcomes = now.outcomes
     values = now.by_mode["all"].main_metrics

@@ -6,9 +6,9 @@ direction: in the plane of the three returns nearest to the direction or, at
 edges and at grazing incidence, between the least and the greatest range of the
 four returns.
 
-A comparison with rays cast in the simulated world shows that shares of shown
-points are wrong by some hundredths for scans up to 30 m apart, and by more for
-scans farther apart (docs/notes/fitting.md).
+A comparison with rays cast in the simulated world shows the error of shares of
+shown points: some hundredths for scans up to 30 m apart, and more for scans
+farther apart (docs/notes/fitting.md).
 """
 
 from __future__ import annotations

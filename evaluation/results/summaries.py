@@ -1,9 +1,9 @@
 """Computes numbers from a table of results or of queries.
 
 Intervals of shares, of interaction effects of two causes (`excesses`), and of
-AUC differences come from a bootstrap over blocks of the route, which samples
-the same blocks for both results that are compared. Intervals of means are t
-intervals over maps or conditions. Intervals of rank correlations come from a
+AUC differences come from a bootstrap over blocks of the route. For two results
+that are compared, the bootstrap samples the same blocks. Intervals of means are
+t intervals over maps or conditions. Intervals of rank correlations come from a
 bootstrap over conditions.
 """
 

@@ -88,8 +88,8 @@ def draw_change_with_spread(
     """Draws the change between two drives, and returns it with its spread.
 
     The spread over shifted grids is measured here, and not by the task
-    `change`, because it takes sixteen times as long as the change itself, and
-    only drawn changes need it.
+    `change`. A measurement of the spread takes sixteen times as long as a
+    measurement of the change, and only drawn changes need a spread.
 
     Args:
         reporter: reports progress.

@@ -1,7 +1,7 @@
 """Values of plain data as bytes, which can be read without running code.
 
-Unlike a pickle, which can run any code when it is read, the bytes contain a
-tree of JSON, followed by the arrays as NumPy stores them.
+A pickle can run any code when it is read. The bytes of this module contain only
+a tree of JSON, followed by the arrays as NumPy stores them.
 """
 
 from dataclasses import fields, is_dataclass
