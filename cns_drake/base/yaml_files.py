@@ -19,8 +19,8 @@ _OCTAL = re.compile(r"([-+]?)0+([0-7_]+)")
 # Python reads these as numbers, YAML 1.2 as texts.
 _UNDERSCORES = re.compile(r"[-+]?[0-9][0-9_]*_[0-9_.]*")
 _WORDS = {"yes": "true", "on": "true", "no": "false", "off": "false"}
-# What PyYAML takes for numbers, without those to the bases 2, 8 and 60 and
-# those with underscores.
+# Texts that PyYAML reads as numbers, without numbers to the bases 2, 8 and 60
+# and without numbers with underscores.
 _FLOAT = "tag:yaml.org,2002:float"
 _MERGE = "tag:yaml.org,2002:merge"
 _RESOLVERS = (

@@ -16,10 +16,11 @@ _N0 = 0.1  # [cycles/m]
 
 # Spacings of the layers' lattices [m]. The sum of the layers has the spectrum
 # of the class for wavelengths from 0.35 to 90 m. Longer waves, which are hills,
-# are no stronger than those of 90 m; shorter ones are smoothed by the tyre.
+# are no stronger than waves of 90 m. Shorter waves than 0.35 m are smoothed by
+# the tyre.
 _SPACINGS = 0.05 * 2.0 ** np.arange(10)
-# The finest layer also stands for all finer ones: this is the sum of the
-# geometric series 1 + 1/4 + 1/16 + ...
+# The finest layer also stands for all layers that would be finer: this is the
+# sum of the geometric series 1 + 1/4 + 1/16 + ...
 _FINEST_SHARE = 4.0 / 3.0
 # Number of nodes in each direction after which a lattice repeats.
 _NODES = 512

@@ -80,8 +80,8 @@ class Suspension:
             (front, rates.roll_bar_rate.front),
             (~front, rates.roll_bar_rate.rear),
         ):
-            # The bar is twisted by the difference between the roll of the body
-            # and that of the axle.
+            # The bar is twisted by the difference between the body's roll and
+            # the axle's roll.
             twist = (np.sign(y[axle, None]) * springs[axle]).sum(axis=0)
             twist /= np.abs(y[axle]).sum()
             stiffness += rate * np.outer(twist, twist)
@@ -130,9 +130,9 @@ class Suspension:
         size, count = self._loads.shape
         to_rates = np.hstack([-self._stiffness, -self._damping, self._loads])
         to_rates /= self._mass[:, None]
-        # The motion within a step is that of a linear system whose state also
-        # contains the inputs and their slopes (Franklin, Powell and Workman,
-        # Digital Control of Dynamic Systems, the triangle hold).
+        # The motion within a step is the motion of a linear system whose state
+        # also contains the inputs and their slopes (Franklin, Powell and
+        # Workman, Digital Control of Dynamic Systems, the triangle hold).
         whole = np.zeros((2 * (size + count), 2 * (size + count)))
         whole[:size, size : 2 * size] = step * np.eye(size)
         whole[size : 2 * size, : 2 * size + count] = step * to_rates

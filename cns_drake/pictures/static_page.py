@@ -13,8 +13,8 @@ from cns_drake.base.complete_files import write_text
 
 # Level of compression. Higher levels take many times as long for a few percent.
 _LEVEL = 4
-# Bytes per row: those of a vertex or of a triangle. Rows differ little from the
-# row before, and the differences compress well.
+# Bytes per row: the size of a vertex or of a triangle. Rows differ little from
+# the row before, and the differences compress well.
 _ROW = 12
 
 # The form in which Meshcat.StaticHtml() embeds each of its commands.

@@ -11,7 +11,7 @@ from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.rays import Hits, Rays
 
 # Embree treats smaller direction components as positive, whatever their sign. A
-# packet that mixes such rays with truly positive ones loses hits.
+# packet that mixes such rays with rays of truly positive components loses hits.
 _TINY = 1e-18
 
 

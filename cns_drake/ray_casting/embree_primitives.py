@@ -147,7 +147,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         segments += [(index, piece) for piece in _cut_shape(ends, surface)]
         if is_cone:
             # Embree closes cones as well, but rounding of the axis tilts the
-            # ends of flat ones; discs do not tilt.
+            # ends of flat cones; discs do not tilt.
             discs.append((index, ends, [-axis, axis]))
 
     for kind, segments in (

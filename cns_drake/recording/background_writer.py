@@ -12,12 +12,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 # Number of batches that may wait to be written: about two frames with one LiDAR
-# and traffic, so that a frame does not wait for the one before. A batch is a
-# large message with the small ones before it. A killed process loses waiting
-# batches, at most eight frames.
+# and traffic, so that a frame does not wait for the frame before. A batch is a
+# large message with the small messages before it. A killed process loses
+# waiting batches, at most eight frames.
 _MOST_WAITING = 8
-# Messages with fewer bytes wait for the next large one: handing a small message
-# over takes longer than making it.
+# Messages with fewer bytes wait for the next large message: handing a small
+# message over takes longer than making it.
 _SMALL_BYTES = 1024
 # At most this many small messages wait.
 _MOST_HELD = 64

@@ -140,9 +140,9 @@ def _change_lanes(
     """Returns the points (N, 3) of the path with changes of lane [m].
 
     An episode lasts from the middle of the change to the other lane to the
-    middle of the change back. The logarithm of its length is drawn uniformly,
-    and the episode is cut off where the other lane ends. In a short episode the
-    car moves over only in part, as around an obstacle.
+    middle of the change back. The logarithm of the episode's length is sampled
+    uniformly, and the episode is cut off where the other lane ends. In a short
+    episode the car moves over only in part, as around an obstacle.
     """
     assert path.beside is not None  # Only routes have lanes.
     s = path.spacing * np.arange(len(path.points))

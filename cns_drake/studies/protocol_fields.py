@@ -10,8 +10,9 @@ from cns_drake.studies.conditions import Condition
 from cns_drake.studies.nested_fields import Changes
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 
-# The fields of a protocol that a study can vary. Both gates are measured in any
-# case; matches are by distance, and drives differ.
+# The fields of a protocol that a study can vary. Both settings of geometric
+# verification are measured in any case; matches are by distance, and drives
+# differ.
 _ProtocolFields = create_model(  # type: ignore[call-overload]  # Fields are computed.
     "_ProtocolFields",
     __config__=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False),

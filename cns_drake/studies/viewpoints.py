@@ -12,8 +12,8 @@ VIEWPOINTS: Mapping[str, tuple[float, float]] = {
     "lane": (5.0, 0.0),
     "reversed": (5.0, 180.0),
 }
-# The LiDAR of the database is this far ahead of the query's [m], because no two
-# drives stop at exactly the same places.
+# The LiDAR of the database is this far ahead of the query's LiDAR [m], because
+# no two drives stop at exactly the same places.
 _AHEAD = 1.25
 
 

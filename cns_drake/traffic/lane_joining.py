@@ -10,7 +10,7 @@ from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.polylines import SPACING, length_of, resampled
 
-# A lane must have room for any vehicle. A shorter one is part of the ways that
+# A lane must have room for any vehicle. A shorter lane is part of the ways that
 # lead over it [m].
 _SHORTEST_LANE = 14.0
 # Distance from a stop line to the end of its lane, in steps of `SPACING`.

@@ -65,8 +65,8 @@ _REQUEST_BRAKING = 1.4
 _REQUEST_AT_SIGNAL = 3.0
 # After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
-# If the green of pedestrians is too short for them, they may begin to cross
-# within its first part of this length [s].
+# If the green of a crossing is too short to cross, pedestrians may begin to
+# cross within this time after green begins [s].
 _LATE = 2.0
 # Time in which a group of pedestrians starts [s].
 WALK_GROUP = 3.0

@@ -19,7 +19,7 @@ _STOP_LINE_ALONE = 1.0
 CROSSING_PLACE = 1.7
 # Width of a crossing [m].
 _CROSSING_WIDTH = 2.4
-# Between its stop lines, a lane must have room for any vehicle. A shorter one
+# Between its stop lines, a lane must have room for any vehicle. A shorter lane
 # becomes part of the ways through the junctions at its ends [m].
 _SHORTEST_LANE = 14.0
 # Greatest number of junctions in one way.

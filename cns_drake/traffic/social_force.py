@@ -39,8 +39,8 @@ _BOX_GAP = 0.15
 # A pedestrian steps aside for another one ahead with at most this acceleration
 # [m/s^2].
 _STEP_ASIDE = 4.0
-# A pedestrian does not step aside for one that is at least this far to the side
-# [m].
+# A pedestrian does not step aside for a pedestrian who is at least this far to
+# the side [m].
 _PASSING_DISTANCE = 0.85
 # Part of the repulsion by pedestrians that turns to the right.
 _TO_THE_RIGHT = 0.3
@@ -71,8 +71,8 @@ WALKER = np.dtype(
         ("draws", int),  # Number of random numbers drawn.
     ]
 )
-# A walkway in one direction as a record; the number of the opposite one is its
-# own ^ 1.
+# A walkway in one direction as a record; the number of the opposite record is
+# the record's own number ^ 1.
 PATH = np.dtype(
     [
         ("first", int),  # Row of its first point.

@@ -9,7 +9,7 @@ from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.streets import Streets
 
 # Column of a vehicle's path with the piece of its front bumper. The columns
-# before it are for the rear, those behind it for pieces ahead.
+# before it are for the rear, and the columns behind it are for pieces ahead.
 CURRENT = 5
 NUM_PIECES = 8
 # Number of the ego car among occupants.

@@ -13,7 +13,7 @@ from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
-# velocities are those of B in W, expressed in B [m/s, rad/s].
+# velocities are velocities of B in W, expressed in B [m/s, rad/s].
 ODOMETRY_DTYPE = np.dtype(
     [
         ("stamp_ns", "<i8"),

@@ -306,8 +306,8 @@ def run_on_worker(name: str, job: bytes, topic: str) -> None:
             and task.state != "cancelled"
         )
 
-    # A worker of Dask is a daemon, which may not start processes. Those of jobs
-    # end with it nevertheless.
+    # A worker of Dask is a daemon, which may not start processes. The processes
+    # of jobs end with the worker nevertheless.
     multiprocessing.current_process().daemon = False
     report("started")
     try:

@@ -48,8 +48,8 @@ _MODULES_VARIABLE = "CNS_DRAKE_JOB_MODULES"
 
 # Settings of the C library's memory allocation [bytes]. A job allocates and
 # frees the same arrays thousands of times. By Dask's settings, and sometimes by
-# the library's own, their memory would go back to the system each time;
-# fetching it again takes longer than filling it.
+# the library's own, the memory of these arrays would go back to the system each
+# time; fetching the memory again takes longer than filling it.
 ALLOCATION = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),

@@ -26,8 +26,8 @@ _YARD = 3.1
 _DOORSTEP = 1.0
 # If a lot does not fit, the next one tried starts this much further on [m].
 _STEP = 1.0
-# Factors of the drawn width and depth that are tried in turn. The result is
-# never below the row's least width or depth.
+# Factors of the sampled width and depth, which are tried one after the other.
+# The result is never below the row's least width or depth.
 _SIZES = ((1.0, 1.0), (1.0, 0.7), (0.75, 1.0), (0.5, 1.0), (0.5, 0.5))
 # Rounding may make walls of adjoining houses overlap by this much [m].
 _TOUCH = 0.005

@@ -142,7 +142,7 @@ def _scatter(
         if chosen and np.hypot(*(chosen - dart).T).min() < plan.spacing:
             continue
         chosen.append(dart)
-        # Two numbers are drawn for every place, kept or not, so that another
+        # Two numbers are sampled for every place, kept or not, so that another
         # fill does not move the objects.
         keep = rng.uniform() < plan.fill
         yaw = rng.uniform(-math.pi, math.pi)

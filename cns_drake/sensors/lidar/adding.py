@@ -74,8 +74,8 @@ def add_lidar(
         X_PB: pose of the sensor B in P, as in Drake's RgbdSensor. In outputs,
             the frame of the sensor is S.
         pattern: beams of the LiDAR, or the name of a preset. With a name, the
-            LiDAR turns at the rate of its data sheet, and coordinates are not
-            rounded.
+            LiDAR makes as many revolutions per second as its data sheet states,
+            and coordinates are not rounded.
         name: name of the system, and of the LiDAR's frame and topics in a
             recording.
         unseen: bodies, frames and geometries that the LiDAR does not see; by

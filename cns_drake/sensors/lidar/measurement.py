@@ -16,8 +16,8 @@ _ATTENUATION_PER_M = 0.004
 # Step of the intensities of a LiDAR with finite resolution: 12 bits.
 _INTENSITY_STEP = 2.0**-12
 # Beams reach this many standard deviations beyond the maximum range, since
-# noise can bring a surface there into range. A million frames of noise have no
-# larger draw.
+# noise can bring a surface there into range. A million frames of noise contain
+# no larger deviation.
 _FARTHEST_NOISE = 8.0
 # Purposes of random numbers. Each purpose has its own stream, so that switching
 # one option does not change the draws of the others.

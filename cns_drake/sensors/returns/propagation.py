@@ -289,7 +289,7 @@ def _advance_to_hits(
             mirrored, through = pane_shares(cosine)
             if cosine > np.cos(flat):
                 # The mirrored light fills a cone of the beam's width; a
-                # Lambertian target spreads its own over pi.
+                # Lambertian target spreads its light over the solid angle pi.
                 energy[part] += sent * mirrored / flat**2
             for passing, turn in ((through, 0.0), (mirrored, 2.0 * cosine)):
                 # Light passes the pane there and back.
