@@ -79,9 +79,10 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
     """Delays interrupts until the block calls the yielded function.
 
     Without the delay, KeyboardInterrupt can be raised while the arguments of a
-    C++ function are being converted, which is reported as a wrong type. Only
-    the first interrupt is delayed. A second interrupt takes effect at once, and
-    further interrupts are ignored, so that files can be closed.
+    C++ function are being converted. The interrupt is then reported as an
+    argument of a wrong type. Only the first interrupt is delayed. A second
+    interrupt takes effect at once, and further interrupts are ignored, so that
+    files can be closed.
     """
     waiting: list[int] = []
     struck: list[int] = []

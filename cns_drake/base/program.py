@@ -269,7 +269,7 @@ def _check_arguments() -> None:
 def _forget_results() -> None:
     """Discards output that is still to be printed.
 
-    Python flushes once more at its end, which must not fail again.
+    Python flushes once more at its end, and this flush must not fail again.
     """
     # In a test the stream is no file.
     with contextlib.suppress(OSError):

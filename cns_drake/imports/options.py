@@ -25,8 +25,8 @@ class ImportOptions:
         seed: seed of everything that is sampled at random: the changes of
             `grow`, the details of `dressed`, and the buildings of a town that
             is built along a file's roads.
-        along: CSV file with the waypoints of a drive, which replaces the two
-            proposed drives; None for the proposed drives.
+        along: CSV file with the waypoints of a drive. This drive replaces the
+            two proposed drives; None for the proposed drives.
         within: greatest distance of structures from the drives [m]; None for no
             limit.
         drive_on: side of the street on which traffic keeps; None for the side

@@ -43,9 +43,9 @@ class _Built(NamedTuple):
 class EmbreeHierarchy:
     """A bounding volume hierarchy over the primitives of groups.
 
-    Rays are cast in packets marked as coherent, which is fast for neighbouring
-    beams of a LiDAR. Embree's robust mode is on, so that no ray passes through
-    an edge that two triangles share.
+    Rays are cast in packets that are marked as coherent. Such packets are fast
+    for neighbouring beams of a LiDAR. Embree's robust mode is on, so that no
+    ray passes through an edge that two triangles share.
 
     Attributes:
         rows: indices of the groups that have primitives in the hierarchy.

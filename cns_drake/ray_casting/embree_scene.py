@@ -8,7 +8,7 @@ move are therefore in a second hierarchy. The first hierarchy contains polyhedra
 around these shapes; only the few rays that hit a polyhedron are cast on the
 second hierarchy. Curved shapes that move are in the first hierarchy themselves,
 as instances, which few rays enter. Embree loses rays along the axis of a
-rounded segment, which are therefore cast in closed form (`CapsuleAxes`).
+rounded segment; such rays are therefore cast in closed form (`CapsuleAxes`).
 """
 
 from __future__ import annotations

@@ -208,8 +208,8 @@ def sight_structures(
     Args:
         reporter: unused.
         source: the drive.
-        first: the oldest drive of the database, whose city is the city before
-            all changes.
+        first: the oldest drive of the database. The city of this drive is the
+            city before all changes.
         spacing: distance driven between two scans that count [m].
     """
     drive = source()

@@ -42,7 +42,7 @@ class BodyShape(NamedTuple):
 
 
 class Limb(NamedTuple):
-    """A rigid part of a body, which swings about the y axis of its joint.
+    """A rigid part of a body; the part swings about the y axis of its joint.
 
     Attributes:
         name: name of the limb.

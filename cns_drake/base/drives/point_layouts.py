@@ -1,7 +1,7 @@
 """Conversion of points between the layouts (fields) of several programs.
 
 `cns` is the layout of this project. `ouster` is the layout of Ouster's driver
-with `ring` as uint8, which LIO-SAM and FAST-LIO2 read; `velodyne` is
+with `ring` as uint8, as LIO-SAM and FAST-LIO2 read it; `velodyne` is
 PointXYZIRT of Velodyne's ROS 2 driver; `autoware` is PointXYZIRCAEDT. Only
 `cns` has fields for labels and instances; with the other layouts, labels and
 instances are recorded in a second message.

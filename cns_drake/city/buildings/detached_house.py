@@ -208,7 +208,7 @@ def _add_chimney(p: DetachedHouse) -> None:
 def _chimney_breast(
     wall: WallFrame, x: float, width: float, reach: float, top: float
 ) -> Mesh:
-    """Returns a chimney in front of a wall, which narrows at its shoulders.
+    """Returns a chimney that narrows at its shoulders, in front of a wall.
 
     Args:
         wall: the wall.

@@ -189,7 +189,7 @@ def entrance(
 
 
 def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
-    """Returns a bay with the doorway of a house, which can be above steps.
+    """Returns a bay with a house's doorway; the doorway can be above steps.
 
     The door has two leaves, a fanlight and a flat surround.
 

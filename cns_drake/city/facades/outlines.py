@@ -222,8 +222,7 @@ def u_shape(
         x1: right end [m].
         y1: back [m].
         wing: width of the two wings, left and right of the court [m].
-        back: depth of the part in front of the court, which joins the wings
-            [m].
+        back: depth of the part that joins the wings, in front of the court [m].
     """
     a, b, c = x0 + wing, x1 - wing, y0 + back
     xs = (x0, x1, x1, b, b, a, a, x0)

@@ -217,8 +217,8 @@ def _add_wall(
     """Adds a wall with its openings.
 
     The `area` (see `_within_outline`) is cut out and filled with the openings.
-    Without recesses, panes and doors lie on the wall, which needs far fewer
-    triangles.
+    Without recesses, panes and doors lie on the wall. This needs far fewer
+    triangles than recesses.
     """
     x0, z0, x1, z1 = area
     fronts = [

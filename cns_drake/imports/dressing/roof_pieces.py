@@ -66,7 +66,8 @@ def add_roof_pieces(
     Args:
         out: the building under assembly, which gets the parts.
         roof: triangles (M, 3, 3) of the roof [m].
-        style: style of the building, whose use decides what is added.
+        style: style of the building; the use of the building decides what is
+            added.
         is_flat: whether the roof is flat.
     """
     items = _ITEMS.get(style.use, "").split()

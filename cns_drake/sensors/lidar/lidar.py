@@ -82,8 +82,8 @@ class Lidar(LeafSystem):
     A scan is one revolution of the LiDAR. The revolution starts at the time of
     the output. With a causal LiDAR, the revolution ends at this time instead,
     so that a controller may use the scan at once. By default all beams are cast
-    from the pose of S at the time of the output, which follows from the pose of
-    P in the SceneGraph (a deskewed scan).
+    from a single pose of S, the pose at the time of the output (a deskewed
+    scan). This pose follows from the pose of P in the SceneGraph.
 
     If the port `sweep` is connected, the poses of P come from a `Sweep` and not
     from the SceneGraph: one pose for the whole revolution or, with motion

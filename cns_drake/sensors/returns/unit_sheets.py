@@ -21,7 +21,7 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Response:
-    """How a unit converts energy to intensity, which no data sheet states.
+    """How a unit converts energy to intensity; no data sheet states this.
 
     Attributes:
         slope: the intensity of a diffuse target is `full` plus `slope` times
