@@ -1,4 +1,4 @@
-"""The ego car in a simulation of traffic, which follows other vehicles."""
+"""The ego car, which follows other vehicles in a simulation of traffic."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _AHEAD = 0.05
 
 
 class Follower:
-    """The ego car in a simulation of traffic, which follows other vehicles.
+    """The ego car, which follows other vehicles in a simulation of traffic.
 
     The car drives along its path by the Intelligent Driver Model, asks for the
     right of way like other vehicles, and keeps the speed limits of its drive.
