@@ -212,7 +212,7 @@ class McapRecorder(LeafSystem):
         )
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
-        if period is not None:
+        if schedule is None:
             topics = recorded_topics.recording_topics(
                 X_BSs,
                 camera_names=cameras,
@@ -220,19 +220,19 @@ class McapRecorder(LeafSystem):
                 further=[sensor.topic for sensor in further.values()],
                 depth_camera_names=own_depth,
             )
+            assert period is not None
             schedule = make_schedule({topic.name: period for topic in topics})
-        assert schedule is not None
         self._schedule = schedule
         self._bag = bag
         self._start_ns = start_ns
         self._X_BI = None if X_BI is None else RigidTransform(X_BI)
         self._imu_variances = imu_variances
-        # Frame of a sensor with a fixed place -> its pose on the vehicle.
         X_BCs = {
             **X_BSs,
             **({} if X_BI is None else {IMU_FRAME: X_BI}),
             **{s.frame or n: s.X_BC for n, s in further.items()},
         }
+        # Frame of a sensor with a fixed place -> its pose on the vehicle.
         self._X_BCs = {
             name: RigidTransform(X)
             for name, X in X_BCs.items()
@@ -250,14 +250,7 @@ class McapRecorder(LeafSystem):
 
         # The following lines determine the order of the ports.
         self._odometry = self._declare_port("odometry", object())
-        self._imu_samples: InputPort | None = None
-        if with_imu_samples:
-            self._imu_samples = self._declare_port("imu_samples", object())
-        else:
-            self._specific_force, self._angular_velocity = (
-                self.DeclareVectorInputPort(name, 3)
-                for name in ("specific_force", "angular_velocity")
-            )
+        self._declare_imu_ports(with_imu_samples=with_imu_samples)
         if with_objects:
             self._add_objects_port()
         for name in X_BSs:
@@ -275,11 +268,7 @@ class McapRecorder(LeafSystem):
                     RigidTransform(),
                 )
         for name, camera in cameras.items():
-            self._add_image_ports(name, camera)
-            port = self._declare_pose_port(name)
-            self._poses[name] = port, camera.X_BC
-            if camera.depth is not None:
-                self._poses[depth_frame(name)] = port, camera.depth.X_BC
+            self._add_camera_ports(name, camera)
         for name, sensor in further.items():
             self._add_sensor_port(name, sensor)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
@@ -296,6 +285,16 @@ class McapRecorder(LeafSystem):
         if self.HasInputPort(name):
             raise ValueError(f"name: two sensors would have the port '{name}'")
         return self.DeclareAbstractInputPort(name, Value(example))
+
+    def _declare_imu_ports(self, *, with_imu_samples: bool) -> None:
+        self._imu_samples: InputPort | None = None
+        if with_imu_samples:
+            self._imu_samples = self._declare_port("imu_samples", object())
+        else:
+            self._specific_force, self._angular_velocity = (
+                self.DeclareVectorInputPort(name, 3)
+                for name in ("specific_force", "angular_velocity")
+            )
 
     def _declare_pose_port(self, name: str) -> InputPort:
         return self._declare_port(f"{name}_pose", RigidTransform())
@@ -325,6 +324,13 @@ class McapRecorder(LeafSystem):
             return {} if value is None else make(value, stamp_ns)
 
         self._streams.append((topic, make_all))
+
+    def _add_camera_ports(self, name: str, camera: RecordedCamera) -> None:
+        self._add_image_ports(name, camera)
+        port = self._declare_pose_port(name)
+        self._poses[name] = port, camera.X_BC
+        if camera.depth is not None:
+            self._poses[depth_frame(name)] = port, camera.depth.X_BC
 
     def _add_objects_port(self) -> None:
         detections = object_messages.BoxMessages(

@@ -212,15 +212,11 @@ def add_dormer(
     back = (edge + rise - base) / slope + _SUNK
     if roof == "gable":
         line = roofs.gable_line(a, b, edge, edge + rise)
-        wide = roofs.with_eaves(line, 0.15, 0.15)
-        lid = roofs.shell(
-            wide, -back, 0.2 - setback, _DORMER_THICKNESS, along_y=True
-        )
+        lid = _gable_lid(line, -back, -setback)
     else:
         line = [(a, edge), (b, edge)]
         fall = [(-back, edge + rise), (-setback, edge)]
-        fall = roofs.with_eaves(fall, 0.0, 0.25)
-        lid = roofs.shell(fall, a - 0.15, b + 0.15, _DORMER_THICKNESS)
+        lid = _sloping_lid(fall, a, b)
     under = [(u, z - _DORMER_THICKNESS) for u, z in line]
     low = foot - _SUNK
     hole = Patch(
@@ -239,6 +235,29 @@ def add_dormer(
     out.add_to("walls", wall.place(front.moved(shift)), *cheeks)
     out.add_to("glass", wall.place(pane.moved(shift)))
     out.add_to("roof", wall.place(lid))
+
+
+def _gable_lid(line: roofs.Line, back: float, front: float) -> Mesh:
+    """Returns the gable roof of a dormer, in wall coordinates.
+
+    Args:
+        line: (x, z) points of the roof line, without eaves [m].
+        back: y of the roof's back [m].
+        front: y of the dormer's front [m].
+    """
+    wide = roofs.with_eaves(line, 0.15, 0.15)
+    return roofs.shell(wide, back, 0.2 + front, _DORMER_THICKNESS, along_y=True)
+
+
+def _sloping_lid(line: roofs.Line, a: float, b: float) -> Mesh:
+    """Returns the shed or flat roof of a dormer, in wall coordinates.
+
+    Args:
+        line: (y, z) points of the roof line, without eaves [m].
+        a, b: x of the dormer's two sides [m].
+    """
+    fall = roofs.with_eaves(line, 0.0, 0.25)
+    return roofs.shell(fall, a - 0.15, b + 0.15, _DORMER_THICKNESS)
 
 
 def add_dormers(

@@ -1,5 +1,7 @@
 """Objects on construction sites and at roadworks."""
 
+from collections.abc import Iterator
+import functools
 import math
 
 import numpy as np
@@ -9,12 +11,18 @@ from cns_drake.city.furniture.object_data import CHOICES, COLOURS
 from cns_drake.city.geometry import (
     Builder,
     Model,
+    Part,
     assemble,
     bar,
     block,
     in_a_row,
     mesh_part,
 )
+
+# Length of a section of a crane's mast or jib [m].
+_SECTION_M = 4
+# Number of sections that carry the counterweight behind the mast.
+_REAR_SECTIONS = 3
 
 
 def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
@@ -111,8 +119,29 @@ def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
     )
 
 
-# Length of a section of a crane's mast or jib [m].
-_SECTION_M = 4
+def _on_jib(
+    yaw: float, distance: float, z: float
+) -> tuple[float, float, float]:
+    """Returns a point at a height z, at a distance along a crane's jib [m]."""
+    return (distance * math.cos(yaw), distance * math.sin(yaw), z)
+
+
+def _crane_sections(storeys: int, bays: int, yaw: float) -> Iterator[Part]:
+    """Yields the sections of a crane's mast and jib.
+
+    Args:
+        storeys: number of sections of the mast.
+        bays: number of sections of the jib in front of the mast.
+        yaw: heading of the jib [rad].
+    """
+    crane = COLOURS["crane"]
+    for k in range(storeys):
+        foot = (0, 0, _SECTION_M * k)
+        yield mesh_part(f"mast_{k:02d}", "crane_mast", foot, rgb=crane)
+    z = _SECTION_M * storeys + 0.6
+    for k in range(bays + _REAR_SECTIONS):
+        start = _on_jib(yaw, _SECTION_M * (k - _REAR_SECTIONS), z)
+        yield mesh_part(f"jib_{k:02d}", "crane_jib", start, yaw, crane)
 
 
 def tower_crane(
@@ -134,37 +163,16 @@ def tower_crane(
     height = drawn_height if height is None else height
     reach = drawn_reach if reach is None else reach
     yaw = dice.uniform(-math.pi, math.pi, 3)
-    c, s = math.cos(yaw), math.sin(yaw)
     storeys = max(3, round(height / _SECTION_M))
     bays = max(3, round(reach / _SECTION_M))
     top = _SECTION_M * storeys
     peak = (0, 0, top + 7.5)
     hook = top - 0.45 * top
     crane, concrete = COLOURS["crane"], COLOURS["concrete"]
-
-    def along(distance: float, z: float) -> tuple[float, float, float]:
-        """Returns a point along the jib, at the height z."""
-        return (distance * c, distance * s, z)
-
+    along = functools.partial(_on_jib, yaw)
     return assemble(
         block("base", (5, 5, 1), (0, 0, 0.2), rgb=concrete),
-        *(
-            mesh_part(
-                f"mast_{k:02d}", "crane_mast", (0, 0, _SECTION_M * k), rgb=crane
-            )
-            for k in range(storeys)
-        ),
-        # Three sections carry the counterweight behind the mast.
-        *(
-            mesh_part(
-                f"jib_{k:02d}",
-                "crane_jib",
-                along(_SECTION_M * (k - 3), top + 0.6),
-                yaw,
-                crane,
-            )
-            for k in range(bays + 3)
-        ),
+        *_crane_sections(storeys, bays, yaw),
         mesh_part("cab", "crane_cab", (0, 0, top), yaw, crane),
         bar("peak", (0, 0, top), peak, 0.25, crane),
         bar("stay", peak, along(2.8 * bays, top + 1.8), 0.06),

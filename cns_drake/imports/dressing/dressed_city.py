@@ -18,6 +18,7 @@ from cns_drake.imports.dressing.missing_sidewalks import missing_sidewalks
 from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.dressing.paving import near_drives
 from cns_drake.imports.dressing.street_dressing import dress_streets
+from cns_drake.imports.dressing.street_room import PlacedObjects
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.foreign_city import ForeignCity
@@ -99,21 +100,13 @@ def dress_city(
     )
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
-    terrain = [one for one in kept if one.kind == "TINRelief"]
-    # True if the file gives only the height of the ground, not its kind.
-    if is_paved and sum(one.is_ground for one in kept) == len(terrain):
-        changed |= {
-            one: replace(one, structure=in_paving_colour(one.structure))
-            for one in terrain
-        }
+    if is_paved:
+        changed |= _paved_terrain(kept)
     if drives:
         walks = [one for one in kept if one.kind == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
     added += placed.structures
-    for one in city.small_objects:
-        if one.source in placed.sources:
-            placed.sources.remove(one.source)
-            city.faults.take_back(f"{one.element}, left out")
+    _take_back_placed(city, placed)
     origins = {one.structure.name: "dressed" for one in changed.values()}
     names = {one.structure.name for one in added} - placed.from_file
     origins |= dict.fromkeys(names, "lot")
@@ -127,15 +120,52 @@ def dress_city(
     dressed = staged.replaced({**changed, **placed.moved}).with_structures(
         added
     )
-    if len(dressed.kept) >= MAX_INSTANCE:
-        raise InputError(
-            f"--plain: without it the city has {len(dressed.kept)} structures,"
-            f" more than instance ids can count ({MAX_INSTANCE}); or give"
-            " --within"
-        )
+    _check_number(len(dressed.kept))
     if is_paved:
         bottom = list(map(in_paving_colour, bottom))
     return Dressing(dressed, origins, facts, bottom)
+
+
+def _paved_terrain(
+    kept: Sequence[ImportedStructure],
+) -> dict[ImportedStructure, ImportedStructure]:
+    """Returns terrain -> the same terrain in the colour of paving.
+
+    The result is empty if the file has other ground: only a file without it
+    gives the height of the ground, but not its kind.
+
+    Args:
+        kept: structures of the city.
+    """
+    terrain = [one for one in kept if one.kind == "TINRelief"]
+    if sum(one.is_ground for one in kept) != len(terrain):
+        return {}
+    return {
+        one: replace(one, structure=in_paving_colour(one.structure))
+        for one in terrain
+    }
+
+
+def _take_back_placed(city: ForeignCity, placed: PlacedObjects) -> None:
+    """Takes back the faults of small objects of the file that were placed."""
+    for one in city.small_objects:
+        if one.source in placed.sources:
+            placed.sources.remove(one.source)
+            city.faults.take_back(f"{one.element}, left out")
+
+
+def _check_number(number: int) -> None:
+    """Checks that there are ids for a number of structures.
+
+    Raises:
+        InputError: there are too few ids.
+    """
+    if number >= MAX_INSTANCE:
+        raise InputError(
+            f"--plain: without it the city has {number} structures,"
+            f" more than instance ids can count ({MAX_INSTANCE}); or give"
+            " --within"
+        )
 
 
 def _laid_paving(

@@ -121,9 +121,7 @@ def _build(
     with value_errors(source):
         bands = [band for road in roads.roads for band in lane_bands(road)]
     ground, raised = split_levels(bands)
-    for band in raised:
-        if band.lane.inner_height and is_raised(band.kind, band.lane.height):
-            faults.add("kerb on a bridge, level with its road", band.road.name)
+    _count_raised_kerbs(raised, faults)
     ends = bridges.bridge_ends(raised)
     streets = ImportedStreets(ground, ends)
     _check_extent(source, streets.areas.carriageway)
@@ -134,29 +132,26 @@ def _build(
     )
     kerb = _median_kerb_height(ground)
     kerbs = KerbHeights(ground, kerb)
+    own_kerbs = kerbs if kerbs.differ else None
+    surfaces = street_surfaces(
+        streets.areas,
+        surface,
+        kerb if own_kerbs is None else own_kerbs,
+        streets.coverings,
+        ends,
+    )
     doing(f"building along {len(roads.roads)} roads")
     city = build_along(
         Streets(
             areas=streets.areas,
             surface=surface,
             kerb_height=kerb,
-            kerbs=kerbs if kerbs.differ else None,
+            kerbs=own_kerbs,
             junctions=streets.junctions,
             margins=streets.margins,
-            reserved=shapely.union_all(
-                [
-                    *(imported_streets.lane_polygon(band) for band in raised),
-                    *(one.footprint_W for one in of_file.things),
-                ]
-            ),
+            reserved=_reserved_area(raised, of_file.things),
             structures=(
-                *street_surfaces(
-                    streets.areas,
-                    surface,
-                    kerbs if kerbs.differ else kerb,
-                    streets.coverings,
-                    ends,
-                ),
+                *surfaces,
                 *of_file.decks,
                 *of_file.things,
                 *of_file.marks,
@@ -245,6 +240,18 @@ def _structures_of_file(
     return _StructuresOfFile(list(bridges.bridge_decks(raised)), things, marks)
 
 
+def _reserved_area(
+    raised: Sequence[LaneBand], things: Sequence[Structure]
+) -> BaseGeometry:
+    """Returns the area below bridges and things, which stays free in W [m]."""
+    return shapely.union_all(
+        [
+            *(imported_streets.lane_polygon(band) for band in raised),
+            *(one.footprint_W for one in things),
+        ]
+    )
+
+
 def _check_extent(source: Path, carriageway: BaseGeometry) -> None:
     """Checks that an area is not too large to be filled with a town.
 
@@ -291,6 +298,15 @@ def _near_drives(
             kind = "structure far from the drives, left out"
             faults.add(kind, one.name)
     return City(tuple(kept), city.cars)
+
+
+def _count_raised_kerbs(
+    raised: Sequence[LaneBand], faults: ImportFaults
+) -> None:
+    """Counts kerbs on bridges, which are not built."""
+    for band in raised:
+        if band.lane.inner_height and is_raised(band.kind, band.lane.height):
+            faults.add("kerb on a bridge, level with its road", band.road.name)
 
 
 def _count_spans(

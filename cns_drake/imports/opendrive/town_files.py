@@ -1,6 +1,6 @@
 """Writes the files of a town that was built on an imported road network."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -73,10 +73,22 @@ def write_town(
         "# Where the roads of this map come from; all else is random."
         "\n# A place of the map plus the origin is one of the source [m].\n",
     )
+    _write_drives(draft, town)
+    overview.draw_overview(
+        draft / "from_above.png",
+        list(_seen_from_above(town.city.structures)),
+        None,
+        town.drives,
+    )
+    return _report_of(town, sizes), sizes
+
+
+def _write_drives(draft: Path, town: Town) -> None:
+    stages = list(town.stages.stages)
     map_files.write_drives(
         draft,
         {
-            stage: "" if stage == list(stages)[-1] else ", not all of it built"
+            stage: "" if stage == stages[-1] else ", not all of it built"
             for stage in stages
         },
         [drive.waypoints for drive in town.drives],
@@ -85,13 +97,12 @@ def write_town(
             for drive in town.drives
         ],
     )
-    overview.draw_overview(
-        draft / "from_above.png",
-        list(_seen_from_above(town.city.structures)),
-        None,
-        town.drives,
-    )
-    report = ImportReport(
+
+
+def _report_of(
+    town: Town, sizes: Mapping[str, tuple[int, int]]
+) -> ImportReport:
+    return ImportReport(
         kinds=town.kinds,
         triangles=sum(one.model.num_triangles for one in town.city.structures),
         stages={stage: size[0] for stage, size in sizes.items()},
@@ -100,7 +111,6 @@ def write_town(
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
     )
-    return report, sizes
 
 
 def _seen_from_above(
