@@ -62,7 +62,7 @@ def stale() -> list[str]:
     ]
 
 
-def _function(name: str) -> Callable[..., None]:
+def function_of(name: str) -> Callable[..., None]:
     """Returns the function that draws a picture."""
     return {**vars(chart_pictures), **vars(scene_pictures)}[name]
 
@@ -79,7 +79,7 @@ def main(names: Sequence[str]) -> None:
             subprocess.run(command, shell=True, check=True, cwd=ROOT)
         if draw:
             with rc_context(FONT):
-                _function(draw)(PICTURES / name, **entry)
+                function_of(draw)(PICTURES / name, **entry)
         head, mark, rest = REGISTRY.read_text().partition(f"\n{name}:")
         rest = rest.replace(f"digest: {made}", f"digest: {digest(data)}", 1)
         REGISTRY.write_text(head + mark + rest)

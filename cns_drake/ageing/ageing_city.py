@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing.buildings import Buildings
+from cns_drake.ageing.lots import find_lots
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.street_renewal import StreetRenewal
@@ -45,12 +46,14 @@ class AgeingCity:
         Raises:
             InputError: the city has no building.
         """
+        # Trees grow within distances from buildings, which stand on lots.
+        lots = find_lots(world, kept_free)
         self.standing = StandingStructures(world)
         draws = YearlyDraws(self.standing, rates, seed)
         self.tally = draws.tally
         self._trees = Trees(world, self.standing, draws, seed)
         self._buildings = Buildings(
-            world, self.standing, draws, self._trees, kept_free
+            world, self.standing, draws, self._trees, lots, kept_free
         )
         self._streets = StreetRenewal(world, self.standing, draws, kept_free)
 

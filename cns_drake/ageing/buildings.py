@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import alterations, kinds, new_buildings
-from cns_drake.ageing.lots import Lot, find_lots
+from cns_drake.ageing.lots import Lot
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import PARTY_WALL, Plot, building_plot
 from cns_drake.ageing.standing_structures import StandingStructures
@@ -54,6 +54,7 @@ class Buildings:
         standing: StandingStructures,
         draws: YearlyDraws,
         trees: Trees,
+        lots: list[Lot],
         kept_free: BaseGeometry,
     ) -> None:
         """Begins with the buildings of today.
@@ -63,12 +64,10 @@ class Buildings:
             standing: the ageing city.
             draws: its random numbers.
             trees: its trees, which are felled for buildings.
+            lots: its lots.
             kept_free: area in W [m] on which nothing is built.
-
-        Raises:
-            InputError: the city has no building.
         """
-        self.lots = find_lots(world, kept_free)
+        self.lots = lots
         self._world = world
         self._standing = standing
         self._draws = draws

@@ -104,7 +104,7 @@ def vehicle_limbs(
             _mesh_shape("trim", f"{name}_trim", TRIM),
         ]
         if name == "box_truck":
-            found.append(_mesh_shape("box", f"{name}_box_shape", WHITE))
+            found.append(_mesh_shape("box", f"{name}_box", WHITE))
         shapes = tuple(found)
     return (Limb("body", (0.0, 0.0, 0.0), 0.0, shapes),)
 

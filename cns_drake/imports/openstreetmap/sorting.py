@@ -17,7 +17,8 @@ from cns_drake.imports.faults import ImportFaults
 _FIRST_NEW = 10**12
 _KINDS = ("Node", "Way", "Relation")
 # Indices of kinds.
-_NODE, _WAY = 0, 1
+_NODE = 0
+_WAY = 1
 # An object: the index of its kind, and its id.
 _Key = tuple[int, int]
 # Number of bytes of a file that are searched at a time.
