@@ -176,19 +176,29 @@ def _build(
         faults.add(
             "no lanes for traffic: each comes to a dead end", source.name
         )
-    missing = {} if options.grow is None else {"missing": options.grow}
-    stages = starter_stages(City(tuple(generated), city.cars), **missing)
     return Town(
-        roads,
-        options.seed,
-        city,
-        Stages.model_validate(stages),
-        streets,
-        drives,
-        lanes_of_traffic,
-        _counts_by_kind(roads, of_file, generated),
-        faults,
+        roads=roads,
+        seed=options.seed,
+        city=city,
+        stages=_make_stages(City(tuple(generated), city.cars), options.grow),
+        streets=streets,
+        drives=drives,
+        lanes=lanes_of_traffic,
+        kinds=_counts_by_kind(roads, of_file, generated),
+        faults=faults,
     )
+
+
+def _make_stages(generated: City, grow: float | None) -> Stages:
+    """Returns the stages of a town.
+
+    Args:
+        generated: the structures that may be missing in the first stage.
+        grow: share of the buildings that the first stage lacks; None for the
+            usual share.
+    """
+    missing = {} if grow is None else {"missing": grow}
+    return Stages.model_validate(starter_stages(generated, **missing))
 
 
 class _StructuresOfFile(NamedTuple):
