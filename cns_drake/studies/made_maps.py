@@ -24,6 +24,8 @@ from cns_drake.studies.map_step import MakeMap, make_maps
 from cns_drake.studies.redrawing import RedrawCity
 
 _FACTOR = "factor"
+# Seeds of redraws are below this number.
+_SEEDS = 2**31
 # The only stage of a city that is drawn anew.
 ONLY_STAGE = "01"
 
@@ -148,8 +150,10 @@ class MadeMaps:
         Raises:
             InputError: the seed is out of range.
         """
-        if type(seed) is not int or not 0 <= seed < 2**31:
-            raise InputError(f"redraw: {seed!r} is no number from 0 on")
+        if type(seed) is not int or not 0 <= seed < _SEEDS:
+            raise InputError(
+                f"redraw: {seed!r} is no whole number from 0 to {_SEEDS - 1}"
+            )
         source = drive.folder.path.resolve()
         folder, stage = self.redrawn(drive, seed)
         path = Path(folder)

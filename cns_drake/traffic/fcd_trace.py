@@ -114,11 +114,11 @@ def read_fcd(path: Path) -> FcdTrace:
         for what, names in left_out.items()
         if names
     ]
-    jumps: list[str] = []
-    vehicles = _without_jumps(
-        vehicles, [kind_name(one) for one in vehicles], times, jumps
+    vehicles, jumps = _without_jumps(
+        vehicles, [kind_name(one) for one in vehicles], times
     )
-    persons = _without_jumps(persons, ["person"] * len(persons), times, jumps)
+    persons, others = _without_jumps(persons, ["person"] * len(persons), times)
+    jumps += others
     if len(jumps) > _MOST_JUMPS:
         raise InputError(
             f"{path}: {len(jumps)} jumps from one timestep to the next, such as"
@@ -236,20 +236,22 @@ def _without_jumps(
     objects: Sequence[TracedObject],
     kinds: Sequence[str],
     times: np.ndarray,
-    jumps: list[str],
-) -> tuple[TracedObject, ...]:
+) -> tuple[tuple[TracedObject, ...], list[str]]:
     """Returns objects without the steps that are too fast for their kind.
 
     An object that jumps ends before the jump, and another object of the same
-    name begins after the jump. A text on each jump is added to `jumps`.
+    name begins after the jump.
 
     Args:
         objects: vehicles or persons.
         kinds: kind of each object.
         times: times of the trace [s].
-        jumps: list to which texts are added.
+
+    Returns:
+        The objects, and a text on each jump.
     """
     found = []
+    jumps: list[str] = []
     for one, kind in zip(objects, kinds, strict=True):
         steps = np.diff(one.steps)
         speeds = np.linalg.norm(np.diff(one.xy, axis=0), axis=1) / np.diff(
@@ -273,7 +275,7 @@ def _without_jumps(
                     },
                 )
             )
-    return tuple(found)
+    return tuple(found), jumps
 
 
 def kind_name(one: TracedObject) -> str:

@@ -30,6 +30,8 @@ from evaluation.results.keys import (
 _FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
 # Type -> value that stands for an empty cell.
 _EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
+# Greatest whole number, so that it fits in 64 bits.
+_LARGEST = 2**63 - 1
 _NUMBER = re.compile(
     r"[-+]?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.ASCII | re.IGNORECASE
 )
@@ -106,8 +108,10 @@ class TableLine:
             return float(cell)
         # Programs with NaN for empty cells write whole numbers with a point.
         whole = int(cell) if cell.isdigit() else float(cell)
-        if not 0 <= whole < 2**63 or whole != int(whole):
-            raise self.fault(column, f"{cell!r} is no whole number from 0 on")
+        if not 0 <= whole <= _LARGEST or whole != int(whole):
+            raise self.fault(
+                column, f"{cell!r} is no whole number from 0 to {_LARGEST}"
+            )
         return int(whole)
 
     def factor(self, column: str) -> object:

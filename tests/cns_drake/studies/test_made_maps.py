@@ -140,7 +140,9 @@ def test_years_that_cannot_be(town, tmp_path, years, rates, fault):
 @pytest.mark.parametrize("version", [-1, 2**31, 1.5, True, "one", None])
 def test_versions_that_cannot_be(town, tmp_path, version):
     drive = load_scenario(town / "sequence_02.yaml")
-    with pytest.raises(InputError, match=r"^redraw: .* is no number from 0"):
+    with pytest.raises(
+        InputError, match=r"^redraw: .* is no whole number from 0"
+    ):
         MadeMaps(tmp_path).want_redrawn(drive, version)
 
 
