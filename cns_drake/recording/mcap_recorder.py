@@ -227,17 +227,7 @@ class McapRecorder(LeafSystem):
         self._start_ns = start_ns
         self._X_BI = None if X_BI is None else RigidTransform(X_BI)
         self._imu_variances = imu_variances
-        X_BCs = {
-            **X_BSs,
-            **({} if X_BI is None else {IMU_FRAME: X_BI}),
-            **{s.frame or n: s.X_BC for n, s in further.items()},
-        }
-        # Frame of a sensor with a fixed place -> its pose on the vehicle.
-        self._X_BCs = {
-            name: RigidTransform(X)
-            for name, X in X_BCs.items()
-            if X is not None
-        }
+        self._X_BCs = _fixed_poses(X_BSs, X_BI, further)
         # Frame C that moves in the map -> the port with the pose of a frame P,
         # and the pose X_PC. Several frames may share a port.
         self._poses: dict[str, tuple[InputPort, RigidTransform]] = {}
@@ -520,6 +510,28 @@ class McapRecorder(LeafSystem):
         if not isinstance(message, bytes):
             message = ros_types.serialize(message)
         self._bag.write(topic.name, stamp_ns, message, sequence)
+
+
+def _fixed_poses(
+    X_BSs: Mapping[str, RigidTransform | None],
+    X_BI: RigidTransform | None,
+    further: Mapping[str, RecordedSensor],
+) -> dict[str, RigidTransform]:
+    """Returns frame of a sensor with a fixed place -> its pose on the vehicle.
+
+    Args:
+        X_BSs: LiDAR name -> pose of its frame; None if it is not fixed.
+        X_BI: pose of the IMU; None without an IMU.
+        further: name -> further sensor.
+    """
+    X_BCs = {
+        **X_BSs,
+        **({} if X_BI is None else {IMU_FRAME: X_BI}),
+        **{s.frame or n: s.X_BC for n, s in further.items()},
+    }
+    return {
+        name: RigidTransform(X) for name, X in X_BCs.items() if X is not None
+    }
 
 
 def _warn_of_early_start(context: Context) -> EventStatus:
