@@ -19,9 +19,9 @@ Years = Annotated[
     typer.Option(
         "--years",
         metavar="YEAR ...",
-        help="Years for which to make stages, counted from today, in ascending "
-        "order and at most 200. Negative years lie in the past; they need a "
-        "map whose buildings have years of construction.",
+        help="Years for which to make stages, as numbers of years from today: "
+        "in ascending order, and none above 200. Negative numbers are years in "
+        "the past; they need a map whose buildings have years of construction.",
     ),
 ]
 
@@ -31,7 +31,7 @@ RateFactor = Annotated[
         min=0.0,
         metavar="FACTOR",
         help="Factor by which all yearly rates are multiplied. With 2, the "
-        "city changes twice as fast.",
+        "city changes twice as fast as by default.",
     ),
 ]
 RatesFile = Annotated[
@@ -92,8 +92,8 @@ def age(
 
     Every year, each lot, tree and street object may change, with a given
     probability: buildings are built, torn down and replaced, trees die, lamps
-    and signs move. Writes a map with a stage for today and a stage for each
-    given year, a table of all events, the observed rates, and pictures.
+    and signs move. Writes pictures, a table of all events, the observed rates,
+    and a map with a stage for today and a stage for each given year.
 
     Args:
         source: Name of a shipped map, or folder of a map.

@@ -118,35 +118,34 @@ def export(
 
     The formats pointnetvlad, overlap and overlap-table are data for training
     place recognition: point clouds with exact positives, negatives and
-    overlaps. Each DRIVE is a shipped drive or a scenario file, which is
+    overlaps. Each DRIVE is a shipped drive or a scenario file. The drives are
     simulated but not recorded. To resume after an interruption, run the same
     command again.
 
     The format map-truth is the ground truth for change detection: maps of two
-    drives through the same place, the older drive first, with an exact label
-    for each point. Points of the older map are kept, gone or unobserved in the
-    newer drive; points of the newer map are kept, new or newly seen. Each DRIVE
-    is a recording of cns-drake, a shipped drive or a scenario file. cns-eval
-    map-update compares the labels of your own change detector with this ground
-    truth.
+    drives through the same place, with an exact label for each point. Name the
+    older drive first. The labels of the older map are kept, gone, and
+    unobserved by the newer drive; the labels of the newer map are kept, new,
+    and newly seen. Each DRIVE is a recording of cns-drake, a shipped drive or a
+    scenario file. cns-eval map-update compares the labels of your own change
+    detector with this ground truth.
 
-    The format map-sessions contains the same maps without labels, from
-    recordings whose world is unknown, such as real drives. Before cns-eval
-    map-update can use these maps, add ground truth of your own: A/truth.npy and
-    B/truth.npy.
+    The format map-sessions contains two maps without labels, from recordings
+    whose world is unknown, such as real drives. Before cns-eval map-update can
+    use these maps, add ground truth of your own: A/truth.npy and B/truth.npy.
 
     The format bev-images contains a bird's-eye image and a pose for each scan
     of a recording or of a real drive. cns-eval real reads this format.
 
-    The format film shows the same stretch of a shipped drive or of a scenario
-    file in each stage of the city: first in one shot per stage from behind the
-    car, with the points that the LiDAR measures, then in one shot per stage
-    from above.
+    The format film shows one stretch of a shipped drive or of a scenario file
+    in every stage of the city. The film begins with one shot per stage from
+    behind the car, with the points that the LiDAR measures. Then follows one
+    shot per stage from above.
 
     Args:
         drives: Drives to export. With --format pointnetvlad or overlap, you can
-            leave them out: then all shipped drives are exported, or with --vary
-            only the drives of the experiment.
+            leave them out: then the drives of the experiment that --vary names
+            are exported, or all shipped drives if --vary is not given.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
             mulran (MulRan), tum (only the trajectory), mcap (a repaired copy),
             pointnetvlad (clouds and pickle files for PointNetVLAD), overlap
@@ -179,11 +178,12 @@ def export(
         seconds: Length of the whole film, with all of its shots [s].
         size: Width and height of the film in pixels, each from 32 to 1920.
         start_time: Time in the drive at which the filmed stretch begins [s]. By
-            default, the stretch begins where the road ahead is straightest.
+            default, the film shows the stretch of the drive whose two ends lie
+            farthest apart.
         traffic: Number of moving vehicles in the film. The same number of
             pedestrians is added. By default the traffic of the scenario; if the
-            scenario has no traffic, up to 60 vehicles, as many as the streets
-            have room for.
+            scenario has no traffic, as many vehicles as the streets have room
+            for, but at most 60.
     """
     _check_options(commands.given_options(context), layout)
     words = drives or []

@@ -46,16 +46,16 @@ def import_city(
 ) -> None:
     """Make a map from data of a real city.
 
-    Writes the stages of the map, two drives along its streets and a picture of
-    the map from above.
+    Writes the stages of the map, a picture of the map from above, and two
+    drives along the map's streets.
 
     Args:
         source: File of the city: CityJSON 1.0 to 2.0 (.json), CityJSONSeq
             (.jsonl), OpenStreetMap (.osm, .pbf) or OpenDRIVE (.xodr).
         output: Folder of the map to write; its name becomes the map's name.
-        years: Years for which to make stages. Each stage contains the buildings
-            that were built by its year.
-        year_attribute: Name of the attribute in the file that contains each
+        years: Years for which to make stages. The stage of a year contains the
+            buildings that were built in that year or earlier.
+        year_attribute: Name of the file's attribute that contains each
             building's year of construction. By default the command tries the
             usual names.
         undated: Stages that contain the buildings without a year of
@@ -75,14 +75,15 @@ def import_city(
             structure is left out.
         drive_on: Side of the street on which cars drive; by default the side
             that the file names, or right if the file names none.
-        grow: Share of today's buildings, from 0.01 to 0.9, that are missing or
-            lower in the first stage, which the import adds; by default 0.3. The
-            buildings are sampled at random. For an OpenDRIVE file, the
-            buildings farthest east are missing, and the default is 0.35. Not
-            with --years or --plain, which add no such stage.
+        grow: Share of today's buildings, from 0.01 to 0.9, that change between
+            the first stage, which the import adds, and today. By default, 0.3
+            of the buildings, sampled at random, are missing or lower in the
+            first stage. For an OpenDRIVE file, this share of the buildings is
+            missing: the buildings farthest east, by default 0.35 of all
+            buildings. Not with --years or --plain, which add no such stage.
         plain: Do not add windows, lamps, parked cars and other details that the
-            file does not contain. Only OpenDRIVE files, which contain no
-            buildings, still get buildings along their roads.
+            file does not contain. A map from an OpenDRIVE file, which contains
+            no buildings, still gets buildings along its roads.
     """
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]

@@ -48,7 +48,7 @@ def train(
             interruption, the same command resumes from this file.
         minutes: Approximate computing time on one core in minutes. The numbers
             of cities and of training steps follow from this time. The training
-            ends after these steps, even if they take more or less time.
+            ends after these steps, however long they take.
         cities: Number of cities to train on; by default the number follows from
             --minutes.
         steps: Number of training steps; by default the number follows from
@@ -66,7 +66,7 @@ def train(
         graded: Train with exact overlaps, so that a place ranks higher if it
             shows more of the query's scan. Without --graded, all places within
             7.5 m of a query are equally good matches. With --graded, the
-            training takes about 1.5 times as long.
+            training takes about 1.5 times as long as without.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -49,7 +49,7 @@ def list_drives(
     ] = None,
     json: shared_options.Json = False,
 ) -> None:
-    """List drives with their lengths, times and sizes.
+    """List drives with their lengths, durations and sizes.
 
     The columns are the length and duration of each drive, its number of frames,
     and the numbers of structures and triangles in its stage. A narrow terminal
@@ -135,16 +135,16 @@ def city(
             writes the stages to this folder, and updates the folder's table of
             drives.
         new: Start from a folder with only roads.yaml: first write the missing
-            files, which are a city.yaml with a district for each block, two
-            stages, and a drive for each stage. Existing files are not changed.
+            files, which are two stages, a drive for each stage, and a city.yaml
+            with a district for each block. Existing files are not changed.
         seed: Seed of the random districts and drives that --new writes; by
             default 0.
         check: Write nothing. List the files that would change, and exit with
             status 1 if any would.
         repair_stages: Update the names of structures in stages.yaml. Use this
-            option after additions to city.yaml, which renumber the structures.
-            The command recognises structures by their coordinates in the
-            structures.csv of the last run.
+            option after you have added something to city.yaml, because
+            additions renumber the structures. The command recognises structures
+            by their coordinates in the structures.csv of the last run.
     """
     with uninterrupted():
         from cns_drake.city.generation.generate import (

@@ -35,8 +35,8 @@ DriveNames = Annotated[
     typer.Argument(
         metavar="NAME",
         help="Names of shipped drives, or scenario files. If you name none, "
-        "all shipped drives are recorded, or with --vary only the drives of "
-        "the experiment.",
+        "the drives of the experiment that --vary names are recorded, or all "
+        "shipped drives if --vary is not given.",
     ),
 ]
 Fog = Annotated[
@@ -128,9 +128,9 @@ def simulate(
 ) -> None:
     """Simulate a drive and record it.
 
-    Writes a rosbag2 folder, which ROS 2 tools can read. The folder contains an
-    MCAP file with the scans, the poses and the data of all other sensors, and a
-    file with metadata.
+    Writes a rosbag2 folder, which ROS 2 tools can read. The folder contains a
+    file with metadata, and an MCAP file with the scans, the poses and the data
+    of all other sensors.
 
     Args:
         scenario: Name of a shipped drive, as cns-drake list shows it, or a
@@ -150,8 +150,8 @@ def simulate(
             does not shake. By default the class that the scenario sets.
         imu_rate: Sampling rate of the IMU [Hz]; by default the rate that the
             scenario sets.
-        camera: Add a camera that looks ahead, such as 640x480@2: width and
-            height of an image in pixels, and images per second. The camera also
+        camera: Add a camera that looks ahead: width and height of an image in
+            pixels, and images per second, such as 640x480@2. The camera also
             records depth images and images of semantic classes.
     """
     with uninterrupted():
@@ -231,9 +231,9 @@ def scan(
         output: File for the scan; its name ends in .pcd, .bin or .npy.
         seed: Seed of the random noise and weather. A different seed gives
             different errors with the same statistics.
-        model_path: Folder with model:// files of the world, which is searched
-            before the folders in the environment variables GZ_SIM_RESOURCE_PATH
-            and SDF_PATH. May be repeated.
+        model_path: Folder with the world's model:// files. The command searches
+            this folder before the folders in the environment variables
+            GZ_SIM_RESOURCE_PATH and SDF_PATH. May be repeated.
     """
     with uninterrupted():
         import numpy as np
@@ -289,9 +289,9 @@ def generate(
 ) -> None:
     """Record many drives.
 
-    Simulates and records the named drives one by one, or several at once on
-    several cores. To resume after an interruption, run the same command again:
-    finished recordings are skipped.
+    Simulates and records the named drives, as many at the same time as --jobs
+    says. To resume after an interruption, run the same command again: finished
+    recordings are skipped.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

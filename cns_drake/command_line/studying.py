@@ -38,17 +38,17 @@ def reproduce(
     tables: shared_options.Tables = False,
     protocol: RetrievalProtocol,
 ) -> None:
-    """Simulate the drives of maps and report on them.
+    """Simulate the drives of maps, and write a report.
 
     Records all drives of the maps, measures place recognition and structural
-    change between them, and writes a report.
+    change between these drives, and writes a report.
 
     Args:
         pages: Whether to write a web page of each drive as well. By default
             yes, except with --no-recordings.
         recordings: Whether to record the drives. With --no-recordings, the
-            drives are only simulated, which saves time and disk space; the
-            report is the same.
+            drives are simulated but not recorded. This saves time and disk
+            space, and does not change the report.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -28,8 +28,8 @@ class _Model(BaseModel):
 class RoadStyle(_Model):
     """The style of a road.
 
-    The field `defaults` of the file sets the style of all roads. Each road can
-    have these fields as well, and overrides the defaults.
+    The field `defaults` of the file sets the following fields for all roads. A
+    road that sets one of these fields itself overrides the default.
 
     Attributes:
         lanes: numbers of lanes in the direction of the road's centreline and
@@ -101,7 +101,7 @@ class JunctionEntry(_Model):
 
 
 class RoadsFile(_Model):
-    """The file `roads.yaml`: a common style, junctions and roads.
+    """The file `roads.yaml`: junctions, roads, and a style for all roads.
 
     Attributes:
         defaults: style of all roads, from which a road takes all fields that it

@@ -38,10 +38,10 @@ class Losses(Section):
 
     Attributes:
         missing: share of the buildings and plants to remove, from 0 to 1. The
-            structures nearest to a place that the seed of the condition selects
-            are removed.
+            seed of the condition selects a place, and the structures nearest to
+            this place are removed.
         scattered: structures to remove at random all over the map, in addition
-            to those of `missing`: for each class that you name, the share of
+            to the share `missing`: for each class that you name, the share of
             its structures to remove, such as `{pole: 0.3}`. The key `seed`
             replaces the seed of the condition, so that the two drives can lack
             different structures.

@@ -136,7 +136,7 @@ class Scenario(Section):
         waypoints: CSV file of points for the car to pass. Required with
             `world`, because an SDF world has no roads.
         u_turns: whether the car makes a U-turn where the waypoints lead
-            straight back.
+            straight back. Without `u_turns`, such waypoints are an error.
         aside: lateral offset of the car from the centreline of its lane,
             positive to the right [m]. The offset applies between junctions, as
             far as the road has room.

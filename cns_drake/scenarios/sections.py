@@ -15,7 +15,7 @@ _MOST_TRAFFIC = 2000
 
 
 class RideConfig(Section):
-    """How the vehicle's body moves on its springs along its path.
+    """How the vehicle's body moves on its springs during the drive.
 
     Attributes:
         roughness: roughness of the road that shakes the vehicle, as a class of
@@ -52,12 +52,12 @@ class DriverConfig(Section):
         wander: standard deviation of the car's lateral offset from the middle
             of its lane [m], where the road is wide enough. The offset between
             the paths of two such drives has a standard deviation 1.4 times as
-            large.
+            large as `wander`.
         wander_length: distance along the road after which the autocorrelation
             of the lateral offset (`wander`) has fallen to 1/e [m].
-        lane_changes: average number of changes to a neighbouring lane per
-            kilometre [1/km], where there is such a lane. The car returns after
-            15 to 270 m.
+        lane_changes: average number of lane changes per kilometre [1/km], where
+            there is a neighbouring lane. The car returns to its lane after 15
+            to 270 m.
         follows: whether the car moves among the vehicles of `traffic` and keeps
             its distance to the vehicle ahead.
         seed: seed of all random choices of the driver: a number or a text. By

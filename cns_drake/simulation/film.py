@@ -106,7 +106,7 @@ def make_film(
         seconds: length of the film [s].
         size: width and height of the film's images [pixels].
         start: time of the drive at which the stretch begins [s]; by default the
-            time at which the road ahead is straightest.
+            stretch whose two ends lie farthest apart is shown.
         on_note: called with notes for the user.
 
     Returns:

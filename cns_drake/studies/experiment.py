@@ -98,8 +98,8 @@ class MadeMap(Section):
             between the first stage and today: in the first stage they are
             missing, or lower than today.
         plain: whether the city has only the windows, roofs and kerbs that the
-            file contains. By default, missing ones are sampled at random, as by
-            `cns-drake import`.
+            file contains. By default, windows, roofs and kerbs that the file
+            lacks are sampled at random, as in `cns-drake import`.
         seed: seed of all random numbers.
     """
 
@@ -147,7 +147,7 @@ class Experiment(Section):
         about: the question in words.
         maps: maps to use: names of shipped maps, folders of maps, folders of
             recordings, or maps to make. By default the shipped maps.
-        files: folder with the files of real cities that `maps` import.
+        files: folder with the files that the field `import` of a map names.
         drives: which drives of a map are compared. `same-route`: the last drive
             is the query, and the database is recorded along the same route.
             `stages`: the last drive is the query for each earlier drive.
@@ -169,25 +169,26 @@ class Experiment(Section):
             sets the levels of a case, the weakest first. Each case is measured
             by itself and compared with the case `none`, which changes nothing.
         levels: which levels of each case to measure, as numbers from 1; by
-            default all. A case that lacks a level in this list is measured at
-            its own last level instead.
+            default all. If a number in this list exceeds the number of a case's
+            levels, the last level of the case is measured instead.
         design: how factors are combined. `product`: each value of a factor with
             each value of all other factors. `one-at-a-time`: each value of a
             factor, while all other factors have the baseline's values.
-        tasks: tasks to measure: a list of names, or for each name its settings.
-        methods: methods to run: a list of names or Python files, or for each
-            name its settings. A setting with a list of values is a factor. By
-            default all shipped methods.
+        tasks: tasks to measure, as a list of names; to change settings, a
+            mapping from each name to its settings.
+        methods: methods to run, as a list of names or Python files; to change
+            settings, a mapping from each name to its settings. A setting with a
+            list of values is a factor. By default all shipped methods.
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
-            or fields of a protocol of your own. The field `base` then names the
-            protocol from which all other fields come.
+            or fields of a protocol of your own. The field `base` then names a
+            protocol, which provides the fields that you leave out.
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
-        frozen: table with a fingerprint of each level's drives, which protects
-            a benchmark from changes: if a drive no longer has its fingerprint,
-            the study stops with an error.
+        frozen: table with a fingerprint of each level's drives. The table
+            protects a benchmark from changes: if a drive no longer has its
+            fingerprint, the study stops with an error.
         charts: charts to show on the page of the experiment.
         quick: fields to replace if `--quick` is given. `tasks`, `methods` and
             lists are replaced as a whole; in other mappings, only the fields

@@ -34,11 +34,12 @@ def compare(
     means over the conditions that all tables share.
 
     From four maps on, each mean has a 95 % t interval over maps. With one map,
-    the interval is over conditions, if there are at least four conditions. If
-    each table has a queries.csv next to it, the command also prints the
-    difference in AUC between any two methods, with a p-value that is corrected
-    for the number of differences by Holm's method. With --rankings, the command
-    prints Kendall's tau between the rankings of any two tables.
+    the interval is over conditions, if there are at least four conditions. With
+    two or three maps, there is no interval. If each table has a queries.csv
+    next to it, the command also prints the difference in AUC between any two
+    methods, with a p-value that Holm's method corrects for the number of
+    differences. With --rankings, the command prints Kendall's tau between the
+    rankings of any two tables.
 
     Args:
         tables: Tables of results to compare, or folders with a results.csv.
@@ -47,14 +48,15 @@ def compare(
             metrics.
         protocol: Protocol of the results to compare; own stands for results
             that were measured with changed options. By default results of all
-            protocols are used, each compared only with results of the same
-            protocol.
+            protocols are used, and each result is compared only with results of
+            the same protocol.
         verified: Rank the results that were measured with geometric
             verification. By default, the results without geometric verification
             are ranked.
-        rankings: Compare only how the tables rank the methods. Each table is
-            ranked over its own conditions, so that tables with different
-            conditions can be compared, such as simulated and real drives.
+        rankings: Compare only how the tables rank the methods. The methods of
+            each table are ranked over the conditions of that table, so that you
+            can compare tables with different conditions, such as a table of
+            simulated drives and a table of real drives.
     """
     from evaluation.results.table_comparison import compare_tables
 

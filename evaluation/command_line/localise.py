@@ -70,11 +70,12 @@ def localise(
     scans are merged at their ground-truth poses. If QUERY is a point cloud, it
     counts as one scan, whose ground-truth pose is the origin of the map.
 
-    With --estimate, the command only measures the errors of poses that another
-    program estimated. MAP is then the drive with the ground truth, and there is
-    no QUERY. The command prints two errors: ATE, as evo defines it, is the root
-    mean square of the distances from the ground truth after rigid alignment;
-    drift, as KITTI defines it, is the error of the motion over 100 m of path.
+    With --estimate, the command localises no scans. It measures the errors of
+    poses that another program estimated. MAP is then the drive with the ground
+    truth, and there is no QUERY. The command prints two errors: ATE, as evo
+    defines it, is the root mean square of the distances from the ground truth
+    after rigid alignment; drift, as KITTI defines it, is the error of the
+    motion over 100 m of path.
 
     Args:
         place: Drive or point cloud to use as the map.

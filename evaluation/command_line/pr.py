@@ -99,8 +99,8 @@ def pr(
             car had another heading. By default as --protocol says.
         tilt_queries: Greatest angle of the random roll and pitch by which each
             query is tilted [deg]. By default as --protocol says.
-        hide_sector: Angular width of the sector, in a random direction, in
-            which the points of each query are removed [deg], as if a truck
+        hide_sector: Angular width of a sector in a random direction [deg]. The
+            points of each query in this sector are removed, as if a truck
             beside the car occluded them.
         seed: Seed of the random yaws, tilts and occluded sectors of the
             queries.

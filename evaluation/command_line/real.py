@@ -21,12 +21,13 @@ def real(
     """Measure place recognition and registration on real scans.
 
     DIR contains excerpts of public data sets: KITTI 00 and its revisits,
-    nuScenes 1072, Newer College, NCLT, HeLiPR, bird's-eye images of KITTI with
-    poses, and results of other programs over sessions. The page "Real drives"
-    of the documentation lists the name of each data set's folder. The command
-    names missing data sets, and measures all others. The results are written to
-    results.csv and queries.csv, which cns-eval compare reads. To resume after
-    an interruption, run the same command again.
+    nuScenes 1072, Newer College, NCLT, HeLiPR, and bird's-eye images of KITTI.
+    DIR can also contain tables with the results of other programs for several
+    sessions of a data set. The page "Real drives" of the documentation lists
+    the name of each data set's folder. The command names missing data sets, and
+    measures all others. The results are written to results.csv and queries.csv,
+    which cns-eval compare reads. To resume after an interruption, run the same
+    command again.
 
     Args:
         folder: Folder with the excerpts of public data sets.
@@ -37,11 +38,12 @@ def real(
             methods of place recognition. By default all shipped methods run.
             May be repeated.
         simulated: Folder with simulated recordings. The scans of a recording
-            are added as distractors to the database of each data set with the
-            same model of LiDAR. A classifier is also trained to distinguish
-            simulated from real scans, which shows how realistic the simulation
-            is. If the folder contains a folder kitti_bev with bird's-eye
-            images, the classifier uses these images as well.
+            are added as distractors to the database of each data set that was
+            recorded with the same model of LiDAR. The command also trains a
+            classifier to distinguish simulated from real scans. The worse the
+            classifier, the more realistic the simulation. If the folder
+            contains a folder kitti_bev with bird's-eye images, the classifier
+            uses these images as well.
         queries: Number of queries in each sequence of bird's-eye images, at
             equal intervals among the queries with a match. The database then
             contains one random match of each query. By default all queries and

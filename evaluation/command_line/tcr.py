@@ -47,15 +47,16 @@ def tcr(
         source: Drive or map before the change.
         target: Drive or map after the change.
         control: Third drive, on A's route in B's stage or on B's route in A's
-            stage. With the control, the command also prints TCR_sym of two
-            drives in the same stage, which differ only in their routes.
+            stage. With the control, the command also prints TCR_sym between C
+            and the drive in the same stage. These two drives differ only in
+            their routes.
         paths: Compare the paths and speeds of the two drives, instead of
             measuring change. Every 5 m along A, the command measures how B
             differs from A in lateral offset, lane, heading and height. The
             command also prints the speeds of each car, and the share of the
-            time during which the car stands. For comparison, it prints the same
-            numbers of two pairs of real drives: two drives of Boreas, 28 days
-            apart, and KAIST 01 and 02 of MulRan.
+            time during which the car stands. For comparison, the command prints
+            the same numbers for two pairs of real drives: a pair of Boreas, 28
+            days apart, and the pair KAIST 01 and 02 of MulRan.
     """
     if paths:
         commands.check_only_with(context, "paths", _WITH_PATHS)

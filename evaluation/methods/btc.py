@@ -78,7 +78,7 @@ class BtcConfig(MethodConfig):
             [O] 2.
         max_sparse_points: number of points that a voxel must exceed to be
             checked for a plane; [O] 10.
-        flatness: largest variance along the normal at which points count as a
+        flatness: largest variance of a plane's points along the normal of the
             plane [m^2]; [O] 0.01.
         merge_normal_limit: largest difference between the normals of two planes
             that are merged; [O] 0.1.
@@ -90,8 +90,8 @@ class BtcConfig(MethodConfig):
             `evaluation.methods.btc_keypoints.image_axes`). `orthogonal`
             corrects this error. [P] public.
         resolution: side of a cell of the image on a plane [m]; [O] 0.5.
-        height_range: lowest and highest height above the ground of the points
-            that are used [m]; [O] -1, 4.
+        height_range: smallest and largest height of a point that is used,
+            measured from the ground [m]; [O] -1, 4.
         height_step: thickness of each layer of the image [m]; [O] 0.1.
         num_layers: number of layers of the image; [P] 49. The range of heights
             divided by the step is 50, but a rounding error in the authors'

@@ -81,8 +81,9 @@ class LayeredOverlapConfig(MethodConfig):
             third.
         candidates: number of places that the third search passes to the last,
             which compares maps cell by cell.
-        weights: weights of a common cell in the score, by layer: low, middle
-            and high points, poles, kerbs.
+        weights: weights that a cell has in the score if both scans fill this
+            cell, one weight per layer: low, middle and high points, poles,
+            kerbs.
         least_cells: number that the score adds to the weighted number of filled
             cells of each scan, so that two nearly empty scans do not look
             alike.

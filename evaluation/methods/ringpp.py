@@ -53,10 +53,10 @@ class RingPlusPlusConfig(MethodConfig):
             `round` only the points within `half_width` of the map's centre. If
             the LiDAR is rotated, a square contains other points than before,
             but a circle contains the same points.
-        min_height: smallest height above the ground of a point that is used
-            [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
-        max_height: largest height above the ground of a point that is used [m];
-            the authors have z < 10 m for a LiDAR at 1.73 m.
+        min_height: smallest height of a point that is used, measured from the
+            ground [m]; the authors have z > -1.0 m for a LiDAR at 1.73 m.
+        max_height: largest height of a point that is used, measured from the
+            ground [m]; the authors have z < 10 m for a LiDAR at 1.73 m.
         height_unit: length by which heights are divided before the shape around
             a point is described [m]. Horizontal coordinates are divided by
             `half_width`.

@@ -80,9 +80,9 @@ class ScanContextConfig(MethodConfig):
         candidates: number of contexts that the search in the KD-tree returns
             for each context of a place: n * `candidates` contexts if a place
             has n contexts; [E] 50.
-        search_ratio: which share of all shifts of the context is compared.
-            These shifts lie around the one that fits the aligning key best; [C]
-            0.1.
+        search_ratio: share of all shifts of the context that are compared. The
+            compared shifts lie around the shift that fits the aligning key
+            best; [C] 0.1.
     """
 
     variant: Variant = "augmented-polar"

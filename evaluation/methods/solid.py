@@ -35,11 +35,12 @@ class SolidConfig(MethodConfig):
 
     Attributes:
         voxel_size: side of the voxels to which each cloud is first downsampled
-            [m]; [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs with a field
-            of view like that of the `cns` LiDAR.)
+            [m]; [P] 1.0. ([C] has 0.4, but only [P] is for LiDARs whose field
+            of view resembles the field of view of the `cns` LiDAR.)
         min_range: smallest range of a point that is used [m]; [P] 3.
         max_range: largest range of a point that is used [m]; [P] 80, for a
-            LiDAR with a field of view like that of `cns`.
+            LiDAR whose field of view resembles the field of view of the `cns`
+            LiDAR.
         ranges: number of bins of equal length in range, from 0 to `max_range`;
             [P], [C] 40.
         azimuths: number of equal cells of azimuth, over 360 deg; [P], [C] 60.

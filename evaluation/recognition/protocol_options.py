@@ -77,8 +77,8 @@ _FIELDS: Options = {
             "Measure loop closure: also compare each drive with itself. S is "
             "the shortest time between a place and a query of the same drive "
             "[s], such as 30: a query is compared only with places that the "
-            "car passed at least S before. Every method, even "
-            "scan-context++, then scores all places that remain. Otherwise "
+            "car passed at least S seconds before the query. With this option, "
+            "every method scores all of these places. Without this option, "
             "scan-context++ scores only a few candidates.",
             "S",
         ),

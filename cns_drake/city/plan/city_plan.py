@@ -129,8 +129,8 @@ class PatchPlan(_Model):
         area: corners of the patch [m]. Give `area` or `line`.
         line: points of the centre line of a path [m]. Give `area` or `line`.
         width: width of the path along `line` [m].
-        level: height of a level patch [m]. By default the patch follows the
-            ground around it.
+        level: height of the patch, which is then level [m]. By default the
+            patch follows the ground around it.
     """
 
     ground: Ground
@@ -165,19 +165,20 @@ class ParkingPlan(_Model):
 
 
 class ScatterPlan(_Model):
-    """Plants or objects at random places on a district's open ground.
+    """Plants or other objects at random places on a district's open ground.
 
     Attributes:
         objects: names of objects, each with its weight in the random choice.
         spacing: smallest distance between two objects [m].
-        fill: share of the possible places that get an object.
+        fill: share of the possible places at which an object stands.
         within: corners of an area [m]. The objects stand only in this area.
         clearance: smallest distance of the objects from buildings and streets
             [m].
         ground: kinds of ground on which the objects can stand.
-        kind: first part of the objects' names in the tables. By default, the
-            name of the object's model, or a common word for several models,
-            such as `tree` for `lime_tree`.
+        kind: first part of the objects' names in the tables. By default `tree`
+            for all trees, `car` for all cars, `truck` for all trucks, `sign`
+            for all traffic signs, and the key in `objects` for all other
+            objects.
     """
 
     objects: Weights = Field(min_length=1)
@@ -197,14 +198,15 @@ class LinePlan(_Model):
         points: points of the line [m]. The objects face to the right of the
             line's direction.
         spacing: smallest and largest distance between two objects [m]. Without
-            `spacing`, each straight part of the line becomes one object of the
-            same length, such as a fence or a hedge. Long or steep parts become
-            several objects, end to end.
+            `spacing`, one object, such as a fence or a hedge, fills each
+            straight part of the line, or several objects end to end if the part
+            is long or steep.
         yaw_deg: angle by which each object is rotated from its usual heading
             along the line [deg].
-        kind: first part of the objects' names in the tables. By default, the
-            name of the object's model, or a common word for several models,
-            such as `tree` for `lime_tree`.
+        kind: first part of the objects' names in the tables. By default `tree`
+            for all trees, `car` for all cars, `truck` for all trucks, `sign`
+            for all traffic signs, and the key in `objects` for all other
+            objects.
         parameters: settings of the objects, such as `{height: 1.1}` for a
             `garden_wall`.
     """
@@ -224,9 +226,10 @@ class ObjectPlan(_Model):
         object: name of the object to place.
         at: `[x, y]` of the object's position [m].
         yaw_deg: heading of the object [deg].
-        kind: first part of the object's name in the tables. By default, the
-            name of the object's model, or a common word for several models,
-            such as `tree` for `lime_tree`.
+        kind: first part of the object's name in the tables. By default `tree`
+            for all trees, `car` for all cars, `truck` for all trucks, `sign`
+            for all traffic signs, and the value of `object` for all other
+            objects.
         parameters: settings of the object, such as `{height: 1.1}` for a
             `garden_wall`.
     """
@@ -277,8 +280,8 @@ class DistrictPlan(_Model):
         ground: kind of ground of the district.
         relief: height of the swells (gentle hills) in the district's lawns [m];
             0 for level ground.
-        relief_margin: distance from paths and buildings over which the swells
-            rise to their full height [m].
+        relief_margin: width of the strip along paths and around buildings in
+            which the swells rise to their full height [m].
         patches: parts of the district with another kind of ground.
         buildings: single buildings.
         rows: rows of buildings along the streets.
@@ -287,7 +290,7 @@ class DistrictPlan(_Model):
         lines: objects along lines.
         scatter: objects scattered at random.
         street: objects on the sidewalks in front of the district; by default
-            the field `street` of the city.
+            the objects that the field `street` of the city lists.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")

@@ -49,10 +49,10 @@ class Stage(_Model):
             stage, each group under a heading of your choice. The last stage
             cannot have this field.
         sites: groups of buildings that are under construction in this stage
-            only, each group under a heading of your choice. Each building is
-            shown as a frame of the given height with scaffolds and a crane, and
-            needs a lot of at least 16 m by 16 m. The last stage cannot have
-            this field.
+            only, each group under a heading of your choice. Instead of each
+            building, the stage shows a frame that has the given height,
+            scaffolds and a crane. The lot of the building must measure at least
+            16 m by 16 m. The last stage cannot have this field.
     """
 
     story: str
@@ -64,11 +64,11 @@ class Stage(_Model):
 class Stages(_Model):
     """The file `stages.yaml`: how the city looked in each stage.
 
-    The last stage is the whole city. Each earlier stage lists its differences
-    from the next stage: the structures that are missing, and the structures
-    that are lower. A city therefore only grows from stage to stage, with one
-    exception: temporary objects on an empty lot, such as a market, are removed
-    when the lot is built on.
+    The last stage is the whole city. Each earlier stage lists the structures
+    that exist in the next stage but not in this stage, and the structures that
+    are lower than in the next stage. A later stage therefore contains all
+    structures of the earlier stages, with one exception: temporary objects,
+    such as a market on an empty lot, are removed when the lot is built on.
 
     Attributes:
         stages: stages by number, in ascending order. A number has two digits in

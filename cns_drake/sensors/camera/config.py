@@ -15,7 +15,7 @@ FORMER_ANGLES: Mapping[str, str] = {"fov_y": "fov_y_deg", "rpy": "rpy_deg"}
 
 
 class CameraSection(Section):
-    """A pinhole camera without distortion, which does not see its own car.
+    """A pinhole camera without distortion. It does not see its own car.
 
     Attributes:
         width: width of the image in pixels, at least 2.

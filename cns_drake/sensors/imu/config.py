@@ -31,7 +31,8 @@ class ImuSection(Mount):
         rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. The
             rate must be at most 1000 and at least the scan rate, and the time
             between two samples must be a whole number of nanoseconds. By
-            default the rate in the file `kalibr`, or else one sample per scan.
+            default the rate in the file `kalibr`; without this file, one sample
+            per scan.
         kalibr: file in Kalibr's format with the four noise densities of the
             IMU. By default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias that

@@ -70,8 +70,9 @@ class LidarSection(Mount):
             from the LiDAR's pose at the firing time of this column, `stamp +
             t`, and expressed in the LiDAR's frame at that time. By default the
             whole scan is measured from one pose.
-        returns: model of the returns: `ideal`, or `calibrated` with the losses,
-            errors and intensities of the unit's data sheet.
+        returns: model of the returns. `ideal` returns are exact, apart from the
+            errors that you set; `calibrated` returns have the losses, errors
+            and intensities of the unit's data sheet.
         echoes: which echoes of a beam are reported. `dual` reports the
             strongest and the last echo. Fog has an echo only in beams without
             any other echo. Only with calibrated returns.
@@ -80,8 +81,10 @@ class LidarSection(Mount):
             same unit. Only with calibrated returns.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
             drive must be a multiple of this rate. If the lasers of a unit fire
-            at a fixed rate, a lower `rate` gives a revolution more columns.
-        layout: driver or program whose format the recorded points have.
+            at a fixed frequency, a revolution has more columns at a lower
+            `rate`.
+        layout: LiDAR driver, or other program, whose format the recorded points
+            have.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
