@@ -109,8 +109,8 @@ class TrafficConfig(Section):
         vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
             that drive along the map's roads.
         walkers: number of pedestrians on the map's sidewalks and crossings.
-        seed: seed of the random kinds, starting places and routes of vehicles
-            and pedestrians.
+        seed: seed of all random choices for vehicles and pedestrians: their
+            kinds, starting places and routes.
         fcd: file of a SUMO trace (floating-car data) to replay instead of
             planned traffic; `vehicles` and `walkers` must then be 0.
         queues: whether vehicles stand in queues in all lanes, as in a rush

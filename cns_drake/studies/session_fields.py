@@ -20,7 +20,7 @@ _FRAME_FIELDS = ("map", "world")
 def session_fields(
     database: Changes, seed: int, source: str
 ) -> dict[str, dict[str, Any]]:
-    """Returns place in the file -> fields, for each drive of a database.
+    """Returns the fields of each drive of a database.
 
     Each drive has the fields of the database. A field of the drive's own
     replaces the same field of the database.
@@ -30,9 +30,12 @@ def session_fields(
         seed: seed of a fleet that has no own seed.
         source: file of the experiment, for errors.
 
+    Returns:
+        Path of a drive in the file, such as `database.sessions.2` -> fields.
+
     Raises:
-        InputError: the drives are no list of fields, or a drive has a field
-            that it cannot have.
+        InputError: the drives are not a list of mappings, or a drive has a
+            field that it cannot have.
     """
     shared = dict(database)
     for name in _OF_DATABASE:

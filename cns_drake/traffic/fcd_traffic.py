@@ -50,7 +50,7 @@ def play_trace(
         path: file of the trace, for error messages.
         graph, walkways: lanes and walkways of the map, from which the heights
             of road users follow.
-        seed: seed of the random kinds of cars.
+        seed: seed by which the kinds of cars are sampled.
         duration: time of the last frame [s].
         end: time at which the ego car arrives [s].
         ego: motion of the ego car.

@@ -32,7 +32,8 @@ def plan_queues(
 
     Args:
         graph: lanes and crossings.
-        seed: seed of the random kinds of vehicles and gaps between them.
+        seed: seed by which kinds of vehicles, and gaps between them, are
+            sampled.
         duration: duration of the drive [s].
         ego: function that takes times (K,) [s], and returns positions (K, 2)
             [m] and headings (K,) [rad] of the ego car.

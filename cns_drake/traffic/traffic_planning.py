@@ -44,7 +44,7 @@ def plan_traffic(
         graph: lanes and crossings.
         walkways: sidewalks on which pedestrians walk, and crossings.
         vehicles, walkers: requested numbers of vehicles and pedestrians.
-        seed: seed of the random kinds, places and routes.
+        seed: seed of all random choices: kinds, places and routes.
         duration: duration of the drive [s]. If the ego car follows other
             vehicles, this is the longest time that the drive may take.
         ego: function that takes times (K,) [s], and returns positions (K, 2)

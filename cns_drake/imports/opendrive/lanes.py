@@ -111,9 +111,9 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle outwards.
 
     Raises:
-        ValueError: the road bends so often that it would need too many places,
-            or a lane leads out of the world. The message names the road and the
-            fault.
+        ValueError: the road bends so often that too many sample points would be
+            needed, or a lane leads out of the world. The message names the road
+            and the fault.
     """
     for k, section in enumerate(road.sections):
         s, inside = stations(
@@ -261,7 +261,7 @@ def stations(
         of the road (see `ImportedRoad.reference`) [m].
 
     Raises:
-        ValueError: there are too many places.
+        ValueError: there are too many sample points.
     """
     cubics: list[Cubics] = [
         road.elevation,

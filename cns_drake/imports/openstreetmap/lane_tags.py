@@ -38,7 +38,8 @@ class LaneLayout(NamedTuple):
     def offset(self, is_forward: bool, number: int) -> float:
         """Returns the distance of a lane from the middle of the street [m].
 
-        The distance is positive towards the side on which traffic keeps.
+        Seen in the lane's direction, the distance is positive to the right if
+        traffic drives on the right, and to the left if it drives on the left.
 
         Args:
             is_forward: whether the lane is in the direction of the street's

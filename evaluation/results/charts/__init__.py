@@ -3,7 +3,7 @@
 - `dumbbell` (`over`, `metric`): a metric at the first and the last value of a
   factor.
 - `lines` (`over`, `metric`): a metric over a numeric factor, with a band from
-  the least to the greatest result of a single seed.
+  the lowest to the highest result among the seeds.
 - `matrix` (`over`, `metric`, `strips`): a metric for each method and each value
   of a factor. With `strips`, each cell is divided by the values of a second
   factor. A retained share is bold if its 95 % interval lies below 1.
@@ -11,12 +11,13 @@
   smooth curve and its 95 % band where there are enough points.
 
 The names in brackets are keys of the mapping; `kind` names the kind of chart.
-All other keys select rows: each is a column of the table with the values to
-show. By default, `gate` is 0 (without geometric verification). The default task
-is `place`, or the first task with the metric if `place` does not have it. Each
-method has the same colour in all charts. The title says in words what the chart
-shows. If the answers to all queries are known, the title also says which
-methods differ by the test of `evaluation.recognition.significance`.
+All other keys select rows: the key is a column of the table, its value the
+entries of this column to show. By default, `gate` is 0 (without geometric
+verification). The default task is `place`, or the first task with the metric if
+`place` does not have it. Each method has the same colour in all charts. The
+title says in words what the chart shows. If the answers to all queries are
+known, the title also says which methods differ by the test of
+`evaluation.recognition.significance`.
 
 `kinds` checks and draws a chart of any kind.
 """
