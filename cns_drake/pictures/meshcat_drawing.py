@@ -97,7 +97,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 
     Args:
         meshcat: Meshcat's server.
-        path: path of the cone in Meshcat, to which the frame belongs.
+        path: path of the cone in Meshcat; the frame is that of this path.
     """
     meshcat.SetObject(
         path,

@@ -283,8 +283,8 @@ def named_programs(fields: Any) -> list[str]:
 def in_long_form(values: Mapping[str, Any]) -> dict[str, Any]:
     """Returns fields of an experiment, with long forms in place of short forms.
 
-    A field that cannot be used stays as it is, for the validation of
-    `Experiment` to name it.
+    A field that cannot be used is left unchanged, so that `Experiment` reports
+    it.
 
     Args:
         values: fields of an experiment as its file contains them.

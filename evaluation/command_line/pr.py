@@ -106,12 +106,12 @@ def pr(
             queries.
         output: Folder for the tables results.csv and queries.csv, which have
             the columns of a study's tables; created if it does not exist.
-        scores: CSV file for the score of each pair of a query and a place. Use
-            this option for scans without poses: DATABASE and QUERY are then
-            folders with .bin, .pcd, .npy or .ply files, and no results are
-            computed. Every query is compared with every place, even if the
-            method usually skips some places to save time. The score of a place
-            that the method rejects is empty.
+        scores: CSV file for the score of each pair of a query and a place. With
+            this option, the scans need no poses: DATABASE and QUERY are folders
+            with .bin, .pcd, .npy or .ply files, and the command computes only
+            scores, no AUC and no other metric. Every query is compared with
+            every place, even if the method usually skips some places to save
+            time. The score of a place that the method rejects is empty.
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)

@@ -66,7 +66,7 @@ class _Kind(NamedTuple):
         row: function that returns a decoded message as a row.
         frames: function that returns the names of its frames.
         dtype: dtype of the rows.
-        layout: the doubles at the end of a message.
+        layout: dtype of the float64 values that end a serialised message.
     """
 
     row: Callable[[Any], tuple]

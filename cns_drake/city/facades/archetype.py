@@ -23,8 +23,8 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         any_outline: whether the footprint can be any simple polygon; otherwise
             the footprint must be a rectangle.
         party_walls: whether a building can stand wall to wall with a neighbour;
-            otherwise a building keeps the distance `overhang` from the edges of
-            its footprint towards neighbours.
+            otherwise the walls that face a neighbour stand back from the edges
+            of the footprint by `overhang`.
         colours: name of a part -> colours, one of which each building gets at
             random; or the name of an earlier part with the same colour. Parts
             without an entry have the colour of the first part.

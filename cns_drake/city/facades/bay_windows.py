@@ -80,9 +80,10 @@ def _plan(
 
 
 def _storeys(height: float, count: int, flush: frozenset[int]) -> Facade:
-    """Returns walls with windows in each storey, except at the edges `flush`.
+    """Returns walls with windows in each storey.
 
-    `height` is the height of all storeys together [m].
+    `height` is the height of all storeys together [m]. The walls on the edges
+    `flush` have no windows.
     """
     step = height / count
 
