@@ -68,12 +68,12 @@ class Command(TyperCommand):
 def former_options(
     replaced: Mapping[str, str],
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that names the new spelling of a command's options.
+    """Returns a decorator for a command some of whose options were replaced.
 
     Args:
-        replaced: option of an earlier version -> the option that replaces it,
-            such as `--lidar`. If a user gives the earlier option, an error
-            names the new option.
+        replaced: maps an option of an earlier version to the option that
+            replaces it, such as `--lidar`. If a user gives the earlier option,
+            an error names the new option.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:

@@ -71,7 +71,7 @@ class _ByContent:
     def from_function(
         cls, function: Callable, file: str
     ) -> "_ByContent | None":
-        """Returns the place of a function; none if it cannot be written to."""
+        """Returns a function's locator; None if its folder is read-only."""
         place = cls(function, Path(file).parent)
         try:
             place.ensure_cache_path()
@@ -98,9 +98,10 @@ def _compiling_once(
 ) -> Callable[[tuple], object]:
     """Returns a function that compiles once for all processes.
 
-    Processes that run side by side wait for the result of the first process. A
-    literal number among the arguments counts by its type; otherwise numba would
-    compile the function for that single number.
+    Processes that run side by side wait for the result of the first process.
+    For a literal number among the arguments, the compiled function takes all
+    numbers of the same type; otherwise numba would compile the function for
+    that single number.
 
     Args:
         compile_for: function that compiles for types of arguments.

@@ -181,7 +181,7 @@ def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:
 
 
 def _new_part(path: Path) -> Path:
-    """Returns the part name of a file that may be written.
+    """Returns the temporary name of a file, if the file may be written.
 
     Raises:
         InputError: the path is a folder, link, device or pipe.

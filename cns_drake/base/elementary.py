@@ -22,7 +22,7 @@ power = np.vectorize(math.pow, otypes=[float])
 
 
 def smooth_step(u: np.ndarray) -> np.ndarray:
-    """Returns a quintic from 0 at u = 0 to 1 at u = 1.
+    """Returns the value at u of a quintic polynomial: 0 at u = 0, 1 at u = 1.
 
     The first and second derivatives of the quintic are zero at both ends.
     """

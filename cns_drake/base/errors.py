@@ -160,7 +160,7 @@ def _urgency(fault: Mapping[str, Any]) -> int:
 
 
 def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
-    """Returns advice on what to write instead; "" if none is obvious."""
+    """Returns advice on how to mend a fault; "" if no remedy is obvious."""
     place, given = fault["loc"], fault["input"]
     if fault["type"] == "extra_forbidden" and model is not None and place:
         name = nearest_field(model, place)
@@ -199,7 +199,7 @@ def _nearest(given: object, names: Iterable[str]) -> str | None:
 
 
 def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:
-    """Yields field names of the models found by following keys from a type."""
+    """Yields the fields that a value of the type `kind` can have at `place`."""
     if hasattr(kind, "model_fields"):
         for name, field in kind.model_fields.items():
             if not place:

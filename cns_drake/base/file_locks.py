@@ -1,4 +1,4 @@
-"""Locks of files, so that one process at a time does a piece of work."""
+"""File locks, with which only one process at a time does a piece of work."""
 
 from collections.abc import Callable, Iterator
 import contextlib

@@ -1,4 +1,4 @@
-"""Files that a user names: their checks, and reading within a limit."""
+"""Checks files that a user names, and reads files up to a size limit."""
 
 import codecs
 from collections.abc import Iterator
@@ -86,7 +86,7 @@ def read_text(path: Path, limit: int = _WRITTEN_BYTES) -> str:
 
 
 def decode_text(data: bytes) -> str:
-    """Returns the text in UTF-8 bytes, or in UTF-16 with a byte order mark.
+    """Returns bytes as text, from UTF-8 or from UTF-16 with a byte order mark.
 
     A byte order mark, with which editors of Windows begin files, is removed.
 

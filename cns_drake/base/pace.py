@@ -70,7 +70,7 @@ _REAL_SHARE = 0.05
 
 
 class TimeLeft:
-    """Estimates the time left for jobs from those that have ended.
+    """Estimates the time left for jobs from the jobs that have ended.
 
     The methods take the present time `now` [s], always of the same clock.
     """

@@ -108,7 +108,7 @@ def doing(activity: str, done: int = 0, total: int = 0, unit: str = "") -> None:
 def interlude(activity: str) -> Iterator[None]:
     """Reports an activity for the time of the `with` block.
 
-    Afterwards, what was done before is reported again.
+    Afterwards, the earlier activity is reported again.
     """
     before = _latest.get()
     doing(activity)

@@ -42,7 +42,8 @@ class _Task:
         total: how much there is to do; 0 if that is not known.
         unit: what `done` and `total` count.
         since: when the activity was counted for the first time [s].
-        first: how much was done then, for example in an earlier run.
+        first: how much was done at the time `since`, for example by an earlier
+            run.
         pace: pace of the activity.
     """
 
@@ -284,7 +285,7 @@ def show_progress() -> Iterator[None]:
 
 
 class _JobsDisplay(JobsListener):
-    """What jobs do that run side by side: a line for all, and one for each."""
+    """Shows jobs that run side by side: one line for all, and one for each."""
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ def attach(
     """Returns the functions `__getattr__` and `__dir__` and the list `__all__`.
 
     A package that assigns them in its `__init__.py` imports each of its public
-    names when the name is first used. The stub `__init__.pyi` next to this file
+    names when the name is first used. The stub `__init__.pyi` next to `file`
     lists the public names and the modules that define them.
 
     Args:

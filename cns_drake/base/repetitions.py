@@ -25,7 +25,7 @@ def check_once(values: Iterable[object]) -> None:
     """Checks that all values differ.
 
     Raises:
-        ValueError: a value is there twice.
+        ValueError: a value occurs twice.
     """
     for value in repeated(values):
         raise ValueError(f"{value!r} is there twice")

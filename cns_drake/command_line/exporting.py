@@ -442,9 +442,10 @@ def _write_training_data(
     cluster: Cluster,
     json: bool,
 ) -> None:
-    """Writes clouds of simulated drives with positives or overlaps.
+    """Writes training data: clouds, and their positives or overlaps.
 
-    `held_out` names the drives for evaluation, which are not learned from.
+    The clouds come from the simulated drives `learned`. `held_out` names the
+    drives for evaluation, which are not used for training.
     """
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario

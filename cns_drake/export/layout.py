@@ -73,9 +73,10 @@ def checked_name(drive: McapDrive, text: str) -> str:
 
 
 def scenario_files(drive: McapDrive, name: str | None = None) -> dict[str, str]:
-    """Returns the file `scenario.yaml` of a drive: file name -> text.
+    """Returns the file `scenario.yaml`, the scenario of a drive.
 
-    The result is empty if the recording contains no scenario.
+    The result maps the file name to its text. The result is empty if the
+    recording contains no scenario.
 
     Args:
         drive: the recording.

@@ -18,8 +18,8 @@ class RideMoments(NamedTuple):
     """Heave, roll and pitch of a vehicle's body at N times, with derivatives.
 
     Attributes:
-        q: (N, 3) upward motion of the body [m], and its roll and pitch about
-            the x and y axis of the vehicle [rad].
+        q: (N, 3) upward motion of the body [m], its roll about the vehicle's x
+            axis [rad], and its pitch about the vehicle's y axis [rad].
         dq, ddq: (N, 3) first and second time derivatives of `q`.
         pivot: x of the point on the ground about which the body rotates [m].
     """

@@ -21,7 +21,7 @@ _SMOOTHING_SLACK = 0.2
 
 
 class SpeedProfile(NamedTuple):
-    """The speeds of the fastest drive along a path, from rest to rest.
+    """Speeds of the fastest permitted drive along a path, from rest to rest.
 
     Attributes:
         u: (N,) evenly spaced places on the path [m].
@@ -48,7 +48,7 @@ def make_time_scaling(positions: np.ndarray) -> BsplineTrajectory:
 def find_speed_profile(
     path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
 ) -> SpeedProfile:
-    """Returns the fastest drive within all limits along a path.
+    """Returns the speeds of the fastest drive along a path within all limits.
 
     The drive starts and ends at rest. The acceleration is piecewise constant.
 

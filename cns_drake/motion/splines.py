@@ -44,7 +44,7 @@ def make_uniform_spline(
 
 
 class SplineDerivatives:
-    """A spline and its lower derivatives, to evaluate at many parameters.
+    """A spline and its first few derivatives, to evaluate at many parameters.
 
     Attributes:
         end: greatest parameter of the spline.

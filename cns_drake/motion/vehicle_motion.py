@@ -142,7 +142,7 @@ class VehicleMotion(LeafSystem):
     def _find_joint_motion(
         self, joint: Joint
     ) -> tuple[Callable[[Moments], JointMotion], float]:
-        """Returns the function for the motion of a joint, and its sign."""
+        """Returns a function for a joint's motion, and the sign of its axis."""
         base = self._base.body_frame()
         X_BJ = joint.frame_on_child().CalcPose(self._default, base)
         R_BJ = X_BJ.rotation().matrix()

@@ -82,7 +82,7 @@ class View(BaseModel):
 
 
 def load_views(path: Path) -> dict[str, View]:
-    """Returns name -> view, from a YAML file.
+    """Returns the views in a YAML file, by name.
 
     Raises:
         InputError: the file is missing or not a mapping of views.

@@ -64,7 +64,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns name -> parts, for the structures of a world that cannot move."""
+    """Returns the parts of structures that cannot move, by structure."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(
@@ -96,7 +96,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns which parts of structures exist in one or in both stages.
+    """Returns the parts of structures that two stages share or do not share.
 
     A structure that was moved, or has another shape of the same height, counts
     as common to both stages.

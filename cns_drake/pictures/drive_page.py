@@ -1,4 +1,4 @@
-"""Makes a web page of a drive through a city, which needs no server."""
+"""Makes a web page of a drive through a city; the page needs no server."""
 
 from __future__ import annotations
 

@@ -15,19 +15,19 @@ class DriveRecord:
         period: time between frames [s].
         X_WBs: poses of the vehicle.
         X_WFs: id of a geometry frame that moves -> its poses.
-        scans: the scans to show: index of the frame, and positions (N, 3) of
-            the points in W [m].
+        scans: for each scan to show, the index of the frame, and the positions
+            (N, 3) of the points in W [m].
         speeds: forward speed of the vehicle [m/s].
         specific_forces_I: specific force in the IMU's frame I [m/s^2].
         angular_velocities_I: angular velocity w_WI_I [rad/s].
         num_points: number of points in each scan as measured.
-        limbs: the parts of each moving object other than the vehicle: id of the
-            object's root frame -> {id of each of its geometry frames: constant
-            pose in the root frame}. The root frame is the frame whose poses are
-            recorded.
+        limbs: maps the id of each moving object's root frame to the parts of
+            the object. The parts map the id of a geometry frame to its constant
+            pose in the root frame. Only the poses of the root frame are
+            recorded. The vehicle has no entry.
         names: id of an object's root frame -> name of the object in the page.
-        images: name of a camera -> the images to show: index of the frame, and
-            JPEG.
+        images: maps the name of a camera to the images to show. Each image is
+            the index of its frame, and the image as JPEG.
     """
 
     period: float

@@ -97,7 +97,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
 
     Args:
         meshcat: Meshcat's server.
-        path: path of the cone in Meshcat; the frame is that of this path.
+        path: path in Meshcat of the cone; the frame is the frame of this path.
     """
     meshcat.SetObject(
         path,
@@ -251,7 +251,7 @@ def _draw_mesh(
 def _linear_light(srgb: np.ndarray) -> np.ndarray:
     """Returns colours of vertices and points in linear light, for the page.
 
-    Only the colour of a whole object is taken as sRGB.
+    Meshcat takes only the colour of a whole object as sRGB.
     """
     return srgb**2.2
 

@@ -72,10 +72,10 @@ class Plot:
 
 
 def _ticks(low: float, high: float) -> list[tuple[str, float]]:
-    """Returns ticks for zero, and for a round value above and below it.
+    """Returns ticks for zero, a round value above it, and its negative.
 
-    Values outside of the range are left out. Each tick has its place as a share
-    of the height, from the top.
+    Values outside of the range from `low` to `high` are left out. A tick is a
+    label, and its distance from the top as a share of the height.
     """
     reach = max(-low, high)
     power = 10.0 ** math.floor(math.log10(reach))
@@ -88,7 +88,7 @@ def _ticks(low: float, high: float) -> list[tuple[str, float]]:
 
 
 def time_scale(duration: float) -> list[tuple[str, float]]:
-    """Returns at most seven round times of a drive, and their shares of it."""
+    """Returns up to seven round times, each with its share of the duration."""
     step = next((s for s in _TIME_STEPS if duration <= 6 * s), 3600)
     return [
         (f"{t // 60}:{t % 60:02d}", t / max(duration, 1.0))

@@ -166,7 +166,7 @@ def _shade(
 def _openness(
     scene: RayCastingScene, p_W: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:
-    """Returns the share of short rays around the normal that hit nothing."""
+    """Returns which share of the short rays around a normal hits nothing."""
     reach = 6.0
     total = np.zeros(len(p_W))
     tilts = ([0.6, 0.3, 0.4], [-0.5, 0.6, 0.5], [0.1, -0.8, 0.3])

@@ -113,10 +113,10 @@ def _meet_capsule(
     """Returns the hits of N rays on a capsule along z, in closed form.
 
     Args:
-        p: (N, 3) origins, relative to its middle [m].
+        p: (N, 3) origins, relative to the capsule's middle [m].
         d: (N, 3) unit directions.
-        half: half the length of its straight part [m].
-        radius: its radius [m].
+        half: half the length of the capsule's straight part [m].
+        radius: radius of the capsule [m].
 
     Returns:
         (N,) ranges, inf for a miss [m]; and (N, 3) normals of any length.

@@ -121,7 +121,9 @@ class _SortedBalls(NamedTuple):
         reaches: (M,) radii of the balls [m].
         X_GOs: (M, 4, 4) maps from O to the shapes' own frames; not rigid for an
             ellipsoid, which is a ball in its own frame.
-        halves, radii: (M,) half the length along z, and the radius around it.
+        halves: (M,) half the length of each shape along its own z axis.
+        radii: (M,) greatest distance of a polyhedron from its shape's axis, or
+            from the shape's centre, in the shape's own frame.
         begins: (M,) least x of each ball [m].
         ends: (M,) greatest x of this ball and all balls before it [m].
     """

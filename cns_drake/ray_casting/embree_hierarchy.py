@@ -34,7 +34,7 @@ _BLOCK = 1024
 
 
 class _Built(NamedTuple):
-    """The RTCScene of a group, 0 if empty, and the owners of its geometries."""
+    """The RTCScene of a group (0 if empty), and the geometries' owners."""
 
     scene: int
     owners: tuple[np.ndarray, ...]
@@ -295,7 +295,7 @@ class EmbreeHierarchy:
 
 
 def _ray_ranges(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
-    """Returns the ranges of rays that threads take, the largest first.
+    """Returns ranges of ray indices for threads to take, the longest first.
 
     Some directions meet more geometry than others, so a thread that finishes
     early takes another range. Later ranges are shorter, so that all threads

@@ -182,7 +182,7 @@ def _cut_shape(
 ) -> list[np.ndarray]:
     """Cuts a long shape; returns the ends (2, 4) of each piece.
 
-    The ends are centre and radius. Rays that start inside the shape hit the
+    Each end is a centre and a radius. Rays that start inside the shape hit the
     joints.
     """
     slenderness = surface.length / surface.radius

@@ -121,7 +121,7 @@ def _cast_on_group(
     d_Oset: np.ndarray,
     hits: Hits,
 ) -> None:
-    """Casts rays on one group; R_LO may also stretch.
+    """Casts rays on one group; the matrix R_LO may scale as well as rotate.
 
     After Moeller and Trumbore (1997), with a tolerance at edges. The function
     is compiled, because single rays and triangles are slow in Python.

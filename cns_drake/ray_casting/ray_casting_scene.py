@@ -73,9 +73,9 @@ class RayCastingScene:
             geometries: the geometries that rays can hit. A hit contains the
                 index of its geometry in this sequence.
             anchored_frames: frames that never move.
-            calc_X_WF: returns the pose of a frame.
-            num_threads: threads that share the rays of a cast; hits do not
-                depend on it.
+            calc_X_WF: function that returns the pose of a frame in the world.
+            num_threads: number of threads that share the rays of a cast; hits
+                do not depend on this number.
             previous: a scene of similar geometry, which the new scene replaces.
                 Parts of the previous scene are reused where the surfaces are
                 still the same objects. None to build all anew.
@@ -275,7 +275,8 @@ def _face_origins(
     is compiled, because NumPy would take a quarter of a frame's time.
 
     Returns:
-        (N,) whether each ray has met the outside of a surface, by its winding.
+        (N,) whether each ray has met the outside of a surface, according to the
+        winding of the surface's triangles.
     """
     is_outside = np.zeros(len(hits.group), np.bool_)
     n = np.empty(3)

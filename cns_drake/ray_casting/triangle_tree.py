@@ -25,11 +25,11 @@ class TriangleTree(NamedTuple):
     Attributes:
         corners: (T, 3, 3) corners of each triangle in the group's frame L [m],
             sorted by leaves.
-        owners: (T,) the group's member to which each belongs.
+        owners: (T,) index of the group's member to which each triangle belongs.
         boxes: (K, 2, 3) least and greatest coordinates of each node [m]; node 0
-            contains all.
-        begins: (K,) first triangle of a leaf, or first of the two children of
-            another node.
+            contains all triangles.
+        begins: (K,) index of a leaf's first triangle, or of the first of
+            another node's two children.
         counts: (K,) number of triangles of a leaf, 0 for other nodes.
     """
 
@@ -66,7 +66,7 @@ def make_tree(surface: TriangleSurface, owners: np.ndarray) -> TriangleTree:
 
 @compiled
 def _half_area(box: np.ndarray) -> float:
-    """Returns half the surface area of a box, 0 for an empty one."""
+    """Returns half the surface area of a box; 0 for an empty box."""
     x, y, z = (
         box[1, 0] - box[0, 0],
         box[1, 1] - box[0, 1],

@@ -89,7 +89,7 @@ class RecordedSensor(NamedTuple):
 
 
 def depth_frame(camera_name: str) -> str:
-    """Returns the frame of depth images with a pose of their own."""
+    """Returns the frame's name for depth images that have their own pose."""
     return f"{camera_name}_depth"
 
 
@@ -265,9 +265,9 @@ class McapRecorder(LeafSystem):
         self._declare_events()
 
     def _declare_port(self, name: str, example: object) -> InputPort:
-        """Declares an abstract port for values of the type of the example.
+        """Declares an abstract port for values of the same type as `example`.
 
-        For an `object` as the example, values can have any type.
+        If `example` is an `object()`, values can have any type.
 
         Raises:
             ValueError: there is a port with this name.
@@ -454,7 +454,7 @@ class McapRecorder(LeafSystem):
         return made
 
     def _imu_message(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the message of the ports with the present sample, if any."""
+        """Returns the message of the IMU's present values, by topic."""
         rate = optional_value(self._angular_velocity, context)
         force = optional_value(self._specific_force, context)
         if rate is None and force is None:
@@ -472,7 +472,7 @@ class McapRecorder(LeafSystem):
     def _write_imu_samples(
         self, context: Context, tick: int
     ) -> dict[Topic, Any]:
-        """Writes samples of earlier ticks; returns the message of this one.
+        """Writes samples of earlier ticks; returns the message of this tick.
 
         Raises:
             ValueError: the port shows too few samples.
@@ -517,7 +517,7 @@ def _fixed_poses(
     X_BI: RigidTransform | None,
     further: Mapping[str, RecordedSensor],
 ) -> dict[str, RigidTransform]:
-    """Returns frame of a sensor with a fixed place -> its pose on the vehicle.
+    """Returns the poses on the vehicle of all fixed sensors, by frame name.
 
     Args:
         X_BSs: LiDAR name -> pose of its frame; None if it is not fixed.

@@ -146,7 +146,7 @@ def make_imu(
 
 
 def _covariance(value: object, variance: float) -> np.ndarray:
-    """Returns the covariance of a value, row by row; -1 first for None."""
+    """Returns the covariance of a value by rows; it starts with -1 for None."""
     covariance = np.zeros(9)
     if value is None:
         covariance[0] = -1.0

@@ -102,7 +102,7 @@ def points_topic(lidar_name: str) -> Topic:
 
 
 def labels_topic(lidar_name: str) -> Topic:
-    """Returns the topic of the labels of points that have another layout."""
+    """Returns the topic of labels for points whose layout is not `cns`."""
     return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
 
 
@@ -122,5 +122,5 @@ def camera_topic(camera_name: str, kind: str) -> Topic:
 
 
 def depth_info_topic(camera_name: str) -> Topic:
-    """Returns the topic of depth images' intrinsics, if they are their own."""
+    """Returns the topic of the intrinsics that only the depth images have."""
     return Topic(f"/{camera_name}/depth/camera_info", CAMERA_INFO)

@@ -38,7 +38,7 @@ def deskewed_notes(drive: Drive) -> list[str]:
 
 
 def deskewed_scan(drive: Drive, index: int) -> np.ndarray:
-    """Returns a scan, without its motion distortion if that is known.
+    """Returns a scan, deskewed if it is known to have motion distortion.
 
     Raises:
         InputError: see `deskew`.
@@ -113,7 +113,7 @@ def deskew(drive: Drive, index: int) -> np.ndarray:
 def _interpolate_poses(
     times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
 ) -> np.ndarray:
-    """Returns poses (M, 4, 4) at (M,) times by splines through N poses [s]."""
+    """Returns poses (M, 4, 4) at M times [s], by splines through N poses."""
     p = CubicSpline(times, X_WS[:, :3, 3])(wanted)
     R = RotationSpline(times, Rotation.from_matrix(X_WS[:, :3, :3]))(wanted)
     return poses.make_pose(R.as_matrix(), p)

@@ -221,7 +221,7 @@ class Drive(abc.ABC):
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        """Instance id -> structure; None if not recorded.
+        """Maps instance ids to structures; None if not recorded.
 
         A structure is a mapping with the keys `name`, `class` and `label`. The
         points of the scans carry the same instance ids and labels.
@@ -230,7 +230,7 @@ class Drive(abc.ABC):
 
 
 def index_instances(table: Any, source: str) -> dict[int, Mapping]:
-    """Converts the structure table of a recording to instance id -> structure.
+    """Returns the structures in a recording's structure table, by instance id.
 
     Args:
         table: parsed JSON: a list of structures, each a mapping with the key
@@ -238,7 +238,7 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
         source: name of the file, with which an error message begins.
 
     Raises:
-        InputError: if the JSON is no such table.
+        InputError: if `table` is not such a list.
     """
     try:
         return {entry["instance"]: entry for entry in table}

@@ -1,4 +1,4 @@
-"""The scenario of a recorded drive: its file, and the path that it gives."""
+"""The scenario of a recorded drive: its file, and the path it describes."""
 
 from collections.abc import Mapping
 from pathlib import Path

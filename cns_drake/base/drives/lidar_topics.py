@@ -9,7 +9,7 @@ LIDAR_TOPIC = "/lidar/points"
 
 
 def cloud_topics(topics: Mapping[str, Iterable[str]]) -> list[str]:
-    """Returns the topics with point clouds, except those of labels.
+    """Returns the topics with point clouds, except topics of labels.
 
     Args:
         topics: topic -> message types, as in `McapFile.topics`.

@@ -58,9 +58,9 @@ class Contents:
             [bytes].
         attachments: (name, offset in the file [bytes]) of each attachment.
         metadata: (name, offset in the file [bytes]) of each metadata record.
-        found: channel id -> (block, offset in it, log time [ns]) of each
-            message; None if the index has them.
-        statistics: the file's own, if any.
+        found: maps a channel id to (block, offset in the block, log time [ns])
+            of each message; None if `indexes` are used to find the messages.
+        statistics: the file's statistics record; None without one.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -185,7 +185,7 @@ class Contents:
 
 
 def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
-    """Returns where a chunk begins, and channel id -> offset of its index."""
+    """Returns the offset of a chunk, and of each channel's index in it."""
     start, size = _CHUNK_INDEX.unpack_from(body)
     table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
     if len(table) != size:

@@ -398,7 +398,7 @@ class McapDrive(Drive):
 
     @cached_property
     def _logged_stamps_ns(self) -> np.ndarray | None:
-        """Stamps (N,) of all scans from the file's index; None if not there."""
+        """Stamps (N,) of all scans, if the file's index has them, or None."""
         return self._topics.logged_stamps_ns(self._lidar_topic)
 
     @cached_property
@@ -430,10 +430,10 @@ class McapDrive(Drive):
         return self._topics.first(self._lidar_topic).header.frame_id
 
     def _check_frame(self, frame: str) -> None:
-        """Refuses a scan in another frame than the first.
+        """Refuses a scan whose frame differs from the first scan's frame.
 
         Raises:
-            ValueError: the frame is another.
+            ValueError: the frames differ.
         """
         if frame != self._lidar_frame:
             raise ValueError(

@@ -115,7 +115,7 @@ class McapFile:
 
     @property
     def topics(self) -> dict[str, list[str]]:
-        """Topic -> sorted message types and encodings, `<type> in <encoding>`.
+        """Maps topics to sorted types of messages, as `<type> in <encoding>`.
 
         In an intact recording each topic has exactly one such entry.
         """
@@ -125,7 +125,7 @@ class McapFile:
         }
 
     def locate(self, topic: str) -> np.ndarray:
-        """Returns the places of a topic's messages in the file, sorted by time.
+        """Returns the locations of a topic's messages in the file, by time.
 
         Returns:
             (N,) of dtype `cns_drake.base.drives.mcap_file.LOCATION`: chunk,
@@ -139,10 +139,11 @@ class McapFile:
         return self._locations[topic]
 
     def step_back_ns(self, topic: str) -> int:
-        """Returns the largest decrease of the log time between messages [ns].
+        """Returns the largest decrease of log time between two messages [ns].
 
-        The messages belong to one topic, and are taken in the order in which
-        they were written. The result is 0 if the log times never decrease.
+        The two messages are consecutive messages of one topic, in the order in
+        which they were written. The result is 0 if the log times never
+        decrease.
 
         Raises:
             InputError: if the index cannot be read.

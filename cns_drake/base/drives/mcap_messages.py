@@ -126,7 +126,7 @@ def xyzw(q: Any) -> tuple[float, float, float, float]:
 
 
 class StaticTransforms:
-    """The tree of frames in /tf_static, with the pose of each in its parent."""
+    """The frames in /tf_static: a tree with each frame's pose in its parent."""
 
     def __init__(self, messages: Iterable[Any], where: str):
         """Collects the transforms of messages of /tf_static.
@@ -136,7 +136,7 @@ class StaticTransforms:
             where: file or topic, with which an error message begins.
 
         Raises:
-            InputError: two messages place one frame differently.
+            InputError: two messages give different poses for one frame.
         """
         self._where = where
         # Frame C -> its parent P, p_PC, quat_xyzw_PC.

@@ -305,9 +305,10 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
 def _records_in(
     opcode: int, content: bytes
 ) -> Iterator[tuple[int, McapRecord]]:
-    """Yields the records of interest that a record is or contains.
+    """Yields a record itself or, for a chunk, the records in the chunk.
 
-    Each comes with its offset in an uncompressed chunk [bytes].
+    Types of records that no caller needs are left out. Each record comes with
+    its offset in the uncompressed chunk [bytes], which is 0 outside of chunks.
     """
     if opcode == Opcode.CHUNK:
         chunk = Chunk.read(RecordContent(content))

@@ -67,11 +67,11 @@ class McapTopics:
         return found
 
     def message(self, topic: str, place: np.void) -> Any:
-        """Returns the decoded message at a place.
+        """Returns the decoded message at a location in the file.
 
         Args:
             topic: topic of the message.
-            place: a row of `McapFile.locate`.
+            place: the location, a row of `McapFile.locate`.
 
         Raises:
             InputError: the message cannot be read or decoded.
@@ -118,7 +118,7 @@ class McapTopics:
         return places["log_time_ns"].astype(np.int64)
 
     def json(self, name: str) -> Any:
-        """Returns the value of an attachment in JSON; None without it.
+        """Returns the value of a JSON attachment; None if the file lacks it.
 
         Raises:
             InputError: the attachment cannot be read, or is not JSON.

@@ -167,7 +167,7 @@ class MessageRows:
         self._rows[index] = row
 
     def _learn(self, data: memoryview, row: tuple) -> None:
-        """Takes over the layout of a message if it gives the same row."""
+        """Keeps a message's layout if copied bytes give the same `row`."""
         split = len(data) - self._kind.layout.itemsize
         if split < 12 or data[:4] != _LITTLE_ENDIAN:
             return

@@ -134,8 +134,9 @@ def from_layout(
         points: (N,) in any layout.
         labels: (N,) records with further fields of the same points, such as
             `label`; by default none.
-        is_calibrated: returns whether intensities of the `autoware` layout are
-            calibrated. Calibrated intensities keep their range of 0 to 255.
+        is_calibrated: function that returns whether intensities of the
+            `autoware` layout are calibrated. Calibrated intensities keep their
+            range of 0 to 255.
 
     Returns:
         (N,) points; `points` itself if nothing changes. Fields that `cns` does

@@ -18,7 +18,7 @@ def check_topic_part(name: str) -> None:
     """Checks that a name can be a part of a ROS 2 topic.
 
     Raises:
-        ValueError: it cannot.
+        ValueError: the name cannot be a part of a topic.
     """
     if not isinstance(name, str) or not _TOPIC_PART.fullmatch(name):
         raise ValueError(
@@ -30,12 +30,12 @@ def check_topic_part(name: str) -> None:
 def check_sensor_name(
     name: str, taken: Collection[str] = (), own: str | None = None
 ) -> None:
-    """Checks the name of a sensor, which no other sensor may have.
+    """Checks that the name of a sensor is allowed and not yet taken.
 
     Args:
         name: the name.
         taken: names of the other sensors.
-        own: a reserved name that this sensor can have.
+        own: a reserved name that this sensor may nevertheless have.
 
     Raises:
         ValueError: the name cannot be a part of a ROS 2 topic, or belongs to

@@ -71,7 +71,7 @@ def _state_and_digest(path: str, known: list | None) -> list:
 
 
 def _state(path: str) -> list[int]:
-    """Returns size, times and number of a file.
+    """Returns the size, the times and the inode number of a file.
 
     A program can set back the time of the content's last change, but not the
     time of the inode's last change.

@@ -88,10 +88,11 @@ class _Imports(NamedTuple):
     """The imports of a module.
 
     Attributes:
-        names: (module, name imported from it or "") of each import that runs.
-        offered: name -> module, of imports under TYPE_CHECKING. In a package,
-            these imports tell which modules define the names that the package
-            imports on first use.
+        names: for each import that runs, the module, and the name that is
+            imported from it ("" for the module itself).
+        offered: maps each name that is imported under TYPE_CHECKING to its
+            module. In a package, these modules define the names that the
+            package imports on first use.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -115,8 +116,9 @@ def _source(module: _Module) -> Path | None:
 def _imported_modules(module: _Module) -> Iterator[_Module]:
     """Yields imported modules of this project, and modules beside a script.
 
-    Beside an installed package stand all other installed packages. Their
-    versions count (`_LIBRARIES`), not their sources.
+    For a module of this project, modules beside the project are left out: they
+    can be any installed packages. Of these packages, only the versions count
+    (`_LIBRARIES`).
     """
     for home, name in _imports_of(module).names:
         own = _is_ours(home)
@@ -227,7 +229,7 @@ def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
 
 
 def _data_files(module: Path) -> Iterator[Path]:
-    """Yields data files that a module names: beside it or in folders there."""
+    """Yields a module's data files, beside it or in folders beside it."""
     text = module.read_bytes()
     for path in sorted(module.parent.iterdir()):
         if path.suffix == ".py" or path.name.encode() not in text:

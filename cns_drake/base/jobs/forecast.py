@@ -25,7 +25,7 @@ _JOB_MEMORY = 1.2e9
 
 
 def measure_slowness() -> float:
-    """Returns the ratio of this machine's time to the time of the job costs.
+    """Returns how many times slower this machine is than `Job.cost` assumes.
 
     A fixed piece of work is timed, which takes about a second. Other load on
     the machine during this second makes the result greater.
@@ -51,7 +51,7 @@ def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
 
 
 def _end_times(jobs: Mapping[str, Job]) -> dict[str, float]:
-    """Returns when each job ends if none waits for a worker [s]."""
+    """Returns when each job ends, if no job waits for a worker [s]."""
     ends: dict[str, float] = {}
 
     def end(name: str) -> float:

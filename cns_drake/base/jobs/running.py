@@ -169,7 +169,7 @@ class _Run:
         self._workers.submit(name, step, self._urgency[name])
 
     def _receive(self, timeout: float) -> None:
-        """Acts on the next message of a job, if one comes in time [s]."""
+        """Acts on the next message of a job, waiting at most `timeout` [s]."""
         try:
             kind, name, *values = self._messages.get(timeout=timeout)
         except queue.Empty:
