@@ -1,6 +1,6 @@
 """Ageing of cities year by year, at the rates of change of real cities.
 
-- Today: `old_world` reads it; `lots` and `plots` are its building land.
+- Today: `old_world` reads the city; `lots` and `plots` are the building land.
 - A year: `ageing_city` simulates it by `buildings`, `trees` and
   `street_renewal`, with random numbers of `yearly_draws` at the `rates`;
   `standing_structures` says what stands. `new_buildings`, `alterations` and

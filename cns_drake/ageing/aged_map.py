@@ -149,13 +149,15 @@ def _write_stages(
     city: AgeingCity,
     stages: Mapping[str, int],
 ) -> list[Event]:
-    """Writes all stages but today's, while the city ages; returns the events.
+    """Writes all stages except today's; returns the events in order of time.
+
+    The city ages from stage to stage.
 
     Args:
-        writing: writes a stage.
+        writing: the object that writes the stages.
         world: the city of today.
         city: the same city, which ages up to the last stage.
-        stages: stage -> its year, ascending after today.
+        stages: stage -> its year. Years after today must ascend.
     """
     events: list[Event] = []
     for stage, year in stages.items():

@@ -174,7 +174,14 @@ def _fitting_plot(
     within: BaseGeometry,
     taken: Sequence[BaseGeometry],
 ) -> Polygon | None:
-    """Returns the widest free rectangle along a line; None if none fits."""
+    """Returns the widest free plot at a line; None if no plot fits.
+
+    Args:
+        line: edge of a street in W [m].
+        start: distance along the line at which the plot begins [m].
+        within: area in which the plot must lie, in W [m].
+        taken: areas that the plot must not touch, in W [m].
+    """
     for width in _PLOT_WIDTHS:
         lot = lot_at(line, start, width, min(_PLOT_DEPTH, width))
         if lot is None or not within.contains(lot.footprint_W):

@@ -93,9 +93,9 @@ def new_building(
 
 
 def _blind_edges(footprint: Polygon, near: Sequence[BaseGeometry]) -> set[int]:
-    """Returns the edges of a rectangle that have neighbours.
+    """Returns the numbers of a rectangle's edges that have a neighbour.
 
-    They are numbered from the front on.
+    Edge 0 is the front; the others follow counter-clockwise.
     """
     x0, y0, x1, y1 = footprint.bounds
     g, e = PARTY_WALL, 0.5

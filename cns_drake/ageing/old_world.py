@@ -175,19 +175,22 @@ class OldWorld:
         )
 
     def tags(self, name: str) -> tuple[str, ...]:
-        """Returns the tags of a structure; none without a row in the table."""
+        """Returns a structure's tags; empty if the table has no such row."""
         return tuple(self.rows.get(name, {}).get("tags", "").split())
 
     @cached_property
     def shapes(self) -> dict[str, list[Shape]]:
-        """Name of a structure -> its shapes of the kinds that can change."""
+        """The shapes of each structure, by its name.
+
+        Shapes of kinds that the city generator does not use are left out.
+        """
         return {
             name: [s for p in one.parts if (s := self._shape(p)) is not None]
             for name, one in self.things.items()
         }
 
     def _shape(self, part: LoadedPart) -> Shape | None:
-        """Returns the shape of a part; None for other kinds of shapes."""
+        """Returns a part's shape; None if the city generator lacks its kind."""
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
         if isinstance(shape, Mesh) and shape.source().is_path():
@@ -248,7 +251,7 @@ class OldWorld:
         return one.semantic_class == "sidewalk" or is_bay
 
     def junctions(self) -> dict[str, BaseGeometry]:
-        """Returns name -> area of each junction in W; empty without roads."""
+        """Returns junctions' areas in W by name; empty without `roads.yaml`."""
         if not is_there(self.folder.roads):
             return {}
         network = load_road_network(self.folder.roads)
@@ -261,7 +264,7 @@ def _is_open(one: LoadedStructure) -> bool:
 
 
 def _read_visuals(path: Path) -> dict[str, list[str]]:
-    """Returns name of a structure -> SDF texts of its visuals."""
+    """Returns the SDF texts of each structure's visuals, by its name."""
     root = read_elements(path)
     visuals = root.findall("world/model/link/visual")
     if len(root.findall("world/model")) != 1 or not all(

@@ -1,4 +1,4 @@
-"""The city of a past year, from the years of construction of today's."""
+"""The city of a past year, from the years in which buildings were built."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -24,7 +24,10 @@ DEFAULT_RATES: Mapping[str, float] = {
 
 
 def read_rates(path: Path | None, factor: float = 1.0) -> dict[str, float]:
-    """Returns event -> rate per year, and `moved` -> distance [m].
+    """Returns the rate per year of each event, by the event's name.
+
+    The key `moved` has a distance instead: the greatest distance between a
+    piece of furniture and the piece that replaces it [m].
 
     Args:
         path: a YAML file that maps events to rates from 0 to 1, and `moved` to

@@ -114,7 +114,10 @@ class StageWriter:
         self.sizes[stage] = number + len(old), triangles
 
     def _write_mesh(self, name: str, meshes: Mapping[str, Mesh]) -> None:
-        """Writes a mesh of the city of today, or else one of `meshes`."""
+        """Copies a mesh from today's map, or writes it from `meshes`.
+
+        Does nothing if the mesh was written before.
+        """
         if name in self._triangles:
             return
         place = Path(map_folder.MESH_FOLDER) / f"{name}.obj"
@@ -175,7 +178,11 @@ class StageWriter:
         write_csv(self._draft / map_folder.STRUCTURES_NAME, columns, cells)
 
     def _cell_of_old(self, row: Mapping[str, str]) -> str:
-        """Returns the materials of a structure of today, with its new parts."""
+        """Returns the cell `material` of a structure of today.
+
+        The cell also contains the materials of parts that the structure got
+        while the city aged. `row` is the structure's row in today's table.
+        """
         cell = row.get("material", "")
         known = read_materials(cell)
         usual = known.get("", USUAL_MATERIALS[row["class"]])

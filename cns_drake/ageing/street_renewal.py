@@ -82,7 +82,9 @@ class StreetRenewal:
         self._paint_markings()
 
     def _replace(self, first: str) -> None:
-        """Replaces a piece of furniture nearby, on the same side of the kerb.
+        """Puts a new piece of furniture in place of an old one.
+
+        The new piece stands close to the old one, on the same side of the kerb.
 
         Args:
             first: name of the piece that stands there today.
@@ -112,7 +114,7 @@ class StreetRenewal:
     def _free_place(
         self, name: str, footprint: BaseGeometry, rng: np.random.Generator
     ) -> tuple[np.ndarray, float, float]:
-        """Returns the way from a piece of furniture to its new place.
+        """Returns how a piece of furniture moves to its new place.
 
         Args:
             name: name of the piece.
@@ -120,8 +122,8 @@ class StreetRenewal:
             rng: random generator for the place.
 
         Returns:
-            (2,) offset in W [m], rise of the ground [m] and turn [rad]; all are
-            zero if no place that was tried is free.
+            (2,) offset in W [m], rise of the ground [m] and turn [rad]. All are
+            zero if none of the tried places is free.
         """
         ground = self._world.ground
         middle = np.array(footprint.centroid.coords[0])

@@ -161,7 +161,7 @@ def _about_its_foot(whole: Structure, seen: LoadedStructure) -> Structure:
 
     Args:
         whole: the tree.
-        seen: the same tree, in W.
+        seen: the same tree, as Drake loaded it, in W.
     """
     *xy, z = whole.xyz
     is_below = seen.outline.covers(shapely.Point(xy))

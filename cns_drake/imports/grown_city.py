@@ -31,7 +31,7 @@ _LOWER_HEIGHTS = (0.4, 0.7)
 def grow(
     city: StagedCity, part: float, seed: int
 ) -> tuple[StagedCity, dict[str, Any]]:
-    """Returns a city with an additional first stage, and its differences.
+    """Returns a city with a new first stage, and how this stage differs.
 
     In the first stage, buildings that no longer exist today stand in place of
     the structures that replaced them. Some of the other buildings, sampled at
@@ -94,7 +94,7 @@ def grow(
 def _heights_of_lower(
     chosen: Sequence[ImportedStructure], seed: int
 ) -> dict[ImportedStructure, float]:
-    """Returns building -> share of its height, for buildings that are lower."""
+    """Returns the share of its height that remains of each lower building."""
     least, most = _LOWER_HEIGHTS
     heights = {}
     for one in chosen:
@@ -134,7 +134,7 @@ def _choose_buildings(
 
 
 def _block_numbers(buildings: Sequence[ImportedStructure]) -> np.ndarray:
-    """Returns (N,) the number of the block to which each building belongs."""
+    """Returns for each building the number (N,) of its block."""
     if not buildings:
         return np.zeros(0, dtype=int)
     outlines = [one.structure.model.footprint for one in buildings]

@@ -187,7 +187,7 @@ def _check_options(source: Path, output: Path, options: ImportOptions) -> None:
     """Checks the options before the file is read.
 
     Raises:
-        InputError: naming the option that cannot be used.
+        InputError: an option cannot be used; the message names the option.
     """
     if source.suffix == ".xodr":
         for option, value, lacking in (

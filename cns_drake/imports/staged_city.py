@@ -170,7 +170,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def _without_outliers(city: ForeignCity) -> list[ImportedStructure]:
-    """Returns the structures of a city without those far from its middle."""
+    """Returns a city's structures, except structures far from the middle."""
     if not city.structures:
         return []
     boxes = boxes_of(city.structures)
@@ -204,7 +204,7 @@ def _why_never(one: ImportedStructure, options: ImportOptions) -> str:
 def _may_be_missing(one: ImportedStructure) -> bool:
     """Returns whether a structure may be missing at some stages.
 
-    Of the structures without a year, only buildings may.
+    Among the structures without a year, only buildings may be missing.
     """
     is_dated = one.year is not None or one.until is not None
     return not one.is_ground and (is_dated or one.is_building)

@@ -42,7 +42,7 @@ class Street:
 
 
 def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
-    """Returns node -> number of street ends at the node.
+    """Returns the number of street ends at each node.
 
     A street that passes through a node counts as two ends.
     """

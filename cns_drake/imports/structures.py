@@ -69,8 +69,8 @@ class ImportedStructure:
         """Number of triangles that only this structure has.
 
         A building has its own meshes, and their triangles are counted, with all
-        details. The meshes of any other structure may be shared, as trees share
-        meshes; the triangles in the attribute `triangles` are counted then.
+        details. Any other structure may share its meshes, as trees do.
+        Therefore, the triangles in its attribute `triangles` are counted.
         """
         if self.is_building:
             return self.structure.model.num_triangles

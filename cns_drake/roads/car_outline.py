@@ -14,10 +14,10 @@ HALF_WIDTH = 1.03
 
 
 def swept_area(points: ArrayLike) -> BaseGeometry:
-    """Returns the area that a car covers while its rear axle follows points.
+    """Returns the area that a car covers while its rear axle follows a path.
 
-    The points (N, 2) are positions of the axle's middle and close to one
-    another [m].
+    `points` (N, 2) are closely spaced positions of the axle's middle on the
+    path [m].
     """
     points = np.asarray(points, dtype=float)
     along = directions(points)
@@ -44,7 +44,7 @@ def outlines(
 
     Args:
         places: (..., 2) positions of the cars' frames [m].
-        ahead: (..., 2) unit vectors in the direction of the cars.
+        ahead: (..., 2) unit vectors in which the cars point.
         rear, front: distances from the frames' origins to the rear and front
             ends of the cars, both positive [m].
         half_width: half the width of the cars [m].

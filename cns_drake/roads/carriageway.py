@@ -42,8 +42,9 @@ class Areas:
         sidewalks: areas beside the roads and around all corners, at kerb
             height.
         medians: strips with kerbs between the two directions.
-        parking_bays: (name of the road, side) -> area of the bays. The side is
-            "left" or "right", as seen in the road's direction `forward`.
+        parking_bays: maps (name of the road, side) to the area of the bays. The
+            side is "left" or "right", as seen in the road's direction
+            `forward`.
     """
 
     carriageway: MultiPolygon
@@ -91,7 +92,7 @@ def _band(
 ) -> BaseGeometry:
     """Returns the area between two lateral offsets from the centreline [m].
 
-    The area keeps `clearance` from both ends of the road [m].
+    The area ends `clearance` before each end of the road [m].
     """
     stations = road.stations(clearance=clearance)
     outline = [
@@ -131,7 +132,7 @@ def junction_area(
 def _extended_roads(
     roads: Mapping[str, Road], junction: Junction
 ) -> BaseGeometry:
-    """Returns the union of a junction's roads, extended to its position.
+    """Returns the union of all roads, each extended to the junction's position.
 
     A dead end includes the disc in which its road ends.
     """
@@ -204,7 +205,10 @@ def make_areas(
 def _parking_bays(
     roads: Mapping[str, Road],
 ) -> dict[tuple[str, str], BaseGeometry]:
-    """Returns (name of the road, side) -> area of the parking bays."""
+    """Returns the area of the parking bays on each side of each road.
+
+    The result maps (name of the road, side) to the area.
+    """
     bays = {}
     for name, road in roads.items():
         if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
@@ -229,9 +233,9 @@ def _median(road: Road) -> BaseGeometry:
 def _simplified(area: BaseGeometry) -> BaseGeometry:
     """Returns an area without unnecessary vertices of its outline.
 
-    On an evenly sampled arc, many vertices are equally unnecessary. Rounding
-    first makes the choice independent of the last bits, which differ between
-    versions of the numerical libraries.
+    Coordinates are rounded first. Otherwise their last bits, which differ
+    between versions of the numerical libraries, would decide which vertices are
+    removed: on an evenly sampled arc, many vertices are equally unnecessary.
 
     Raises:
         ValueError: if the outline crosses itself.

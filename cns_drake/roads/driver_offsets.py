@@ -51,9 +51,10 @@ _ITERATIONS = 40
 
 
 def kerbs(network: RoadNetwork) -> STRtree:
-    """Returns the edges of lanes: kerbs, medians and bays of parked cars.
+    """Returns an index of the edges of lanes, divided into short pieces.
 
-    The edges are divided into pieces of a few metres.
+    The edges are kerbs, medians and parking bays. Each piece is a line of a few
+    metres.
     """
     outline = np.asarray(shapely.get_parts(network.areas.lane_area.boundary))
     corners, line = shapely.get_coordinates(outline, return_index=True)
@@ -142,7 +143,7 @@ def _change_lanes(
     An episode lasts from the middle of the change to the other lane to the
     middle of the change back. The logarithm of the episode's length is sampled
     uniformly, and the episode is cut off where the other lane ends. In a short
-    episode the car moves over only in part, as around an obstacle.
+    episode the car does not reach the other lane, as if it avoided an obstacle.
     """
     assert path.beside is not None  # Only routes have lanes.
     s = path.spacing * np.arange(len(path.points))
@@ -203,7 +204,7 @@ def _offset_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the least and greatest offsets (N,) to the left of a path [m].
 
-    At each point, the two offsets are the limits of that free interval which is
+    At each point, the two offsets are the limits of the free interval that is
     nearest to the path. The interval is narrowed so that it is free over the
     whole length over which offsets are smoothed. Both offsets are 0 where there
     is no room.

@@ -195,7 +195,7 @@ class RoadNetwork:
 
     @cached_property
     def junction_areas(self) -> dict[str, BaseGeometry]:
-        """Name -> area of each junction, bounded by road ends and kerbs."""
+        """The area of each junction by name, bounded by road ends and kerbs."""
         return {
             name: carriageway.junction_area(self.roads, junction)
             for name, junction in self.junctions.items()
@@ -217,14 +217,17 @@ def _turn_deg(a: _Pose, b: _Pose) -> float:
 
 
 def _turn_of(angle_deg: float, num_arms: int) -> Turn:
-    """Returns the kind of turn; straight on wherever two roads only join."""
+    """Returns the kind of turn for an angle, positive to the left.
+
+    Where a junction has only two roads, all turns are straight on.
+    """
     if num_arms == 2 or abs(angle_deg) <= STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
 
 
 class _RoadEnd(NamedTuple):
-    """An end of a road at a junction, as in `Arm`, without its setback."""
+    """An end of a road at a junction: an `Arm` whose setback is unknown."""
 
     heading: float
     road: str

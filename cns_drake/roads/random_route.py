@@ -57,9 +57,11 @@ def _make_leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
 def _successors(
     network: RoadNetwork,
 ) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
-    """Returns lane -> its continuations, as pairs: exit lane, next lane.
+    """Returns for each lane how a route can continue.
 
-    Lanes from which no endless route leads on are left out.
+    A continuation is a pair: the number of the lane in which the car leaves the
+    road, and the first lane of the next road. Lanes from which no endless route
+    leads on are left out.
     """
     ways = defaultdict(list)
     for junction in network.junctions:

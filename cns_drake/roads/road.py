@@ -35,11 +35,12 @@ class LaneRef(NamedTuple):
 class Road:
     """A road between two junctions, which ends at the junctions' areas.
 
-    The centreline is the middle of the carriageway, also on a one-way road or a
-    road with more lanes in one direction. Arc lengths ("stations") are measured
-    along the whole centreline, from the position of the start junction; the
-    road itself extends from `first_station` to `last_station`. Lateral offsets
-    are positive to the left of the direction `forward`.
+    The centreline is the middle of the carriageway, also if the road is one-way
+    or has more lanes in one direction than in the other. Arc lengths
+    ("stations") are measured along the whole centreline, from the position of
+    the start junction; the road itself extends from `first_station` to
+    `last_station`. Lateral offsets are positive to the left of the direction
+    `forward`.
     """
 
     def __init__(

@@ -129,7 +129,7 @@ def read_roads_file(path: Path | str) -> RoadsFile:
 def _with_defaults(content: Any) -> Any:
     """Returns a file's content with its defaults copied to each road.
 
-    Faults are left for the validation to find.
+    The content is not checked here: faults stay in it until the validation.
     """
     if not isinstance(content, dict):
         return content

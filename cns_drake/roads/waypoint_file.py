@@ -54,7 +54,14 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
 
 
 def _columns(cells: list[str], where: str) -> list[int]:
-    """Returns the columns of x, y and, if present, z, from the first line."""
+    """Returns the indices of the columns x, y and, if present, z.
+
+    `cells` is the first line of the file. If the line has no names, the columns
+    are in this order. `where` begins the error messages.
+
+    Raises:
+        InputError: the first line has neither such names nor such numbers.
+    """
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
         wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]

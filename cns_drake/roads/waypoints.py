@@ -195,7 +195,11 @@ def _rounded_path(
 
 
 def _loop_approach(turns: np.ndarray) -> np.ndarray:
-    """Returns the lengths (N,) that loops need before and behind them [m]."""
+    """Returns how far before its waypoint each of N loops begins [m].
+
+    The loop also ends at this distance (N,) behind the waypoint. `turns` (N,)
+    contains the angles by which the path turns at the waypoints [rad].
+    """
     aside = cos(turns / 2)
     return LOOP_RADIUS * (
         np.abs(sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)

@@ -18,7 +18,7 @@ _BEYOND = "coordinates beyond the area of their reference system"
 
 
 def settle_axes(city: CityFile, vertices: np.ndarray) -> None:
-    """Decides on the order of the first two coordinates, if the place allows.
+    """Decides which of the first two coordinates is east, if it can.
 
     Many programs write east first although the definition of the reference
     system says north first. East first is assumed if only this order brings the
@@ -28,8 +28,8 @@ def settle_axes(city: CityFile, vertices: np.ndarray) -> None:
     the faces: both orders bring the vertex into the area, or the system is
     defined as east first and only north first brings the vertex there.
 
-    An exchange counts as a fault of the city. If the order is not exchanged
-    here, a vertex that the defined order leaves outside the area also counts.
+    An exchange counts as a fault of the city. It also counts as a fault if the
+    vertex is outside the area and the order is not exchanged here.
 
     Args:
         city: the city, whose objects are not read yet. Without a reference

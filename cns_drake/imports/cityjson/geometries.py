@@ -24,14 +24,15 @@ class Templates:
     """Geometry templates of a file, which objects place in the world.
 
     Attributes:
-        vertices: (N, 3) vertices of the document whose objects are read [m].
+        vertices: (N, 3) vertices of the document that is being read [m]. The
+            caller sets them for each document.
         system: reference system of the templates.
     """
 
     def __init__(self, whole: dict, where: str):
         """Takes the templates in a document of type CityJSON.
 
-        `where` is the place of the document, for error messages.
+        `where` names the file and the line of the document in error messages.
 
         Raises:
             InputError: the vertices of the templates cannot be used.
@@ -122,7 +123,7 @@ def _level_of_detail(value: object) -> float:
 
 
 def _face_of_boundary(boundary: Any, vertices: np.ndarray) -> Face | None:
-    """Returns a face; None if an index is not that of a vertex."""
+    """Returns a face; None if an index belongs to no vertex."""
     face = []
     try:
         for ring in boundary:
@@ -140,7 +141,7 @@ def _face_of_boundary(boundary: Any, vertices: np.ndarray) -> Face | None:
 
 
 def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
-    """Returns the type of each of a number of faces; "" if unknown."""
+    """Returns the types of `number` faces; "" for an unknown type."""
     unknown = [""] * number
     if not isinstance(semantics, dict):
         return unknown

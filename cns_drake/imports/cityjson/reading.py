@@ -63,7 +63,7 @@ def read_cityjson(path: Path) -> CityFile:
 
 
 def _read_documents(path: Path) -> CityFile:
-    """Returns the objects of all documents of a file.
+    """Returns the content of a file: the objects of all its documents.
 
     Raises:
         InputError: a document cannot be read, or is not CityJSON.
@@ -102,7 +102,10 @@ def _check_version(document: dict, where: str) -> None:
 
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
-    """Yields each JSON object with its line number, 0 for a whole file."""
+    """Yields each JSON object of a file, after the number of its line.
+
+    The number is 0 if the whole file is one object.
+    """
     check_regular(path)
     with user_errors(path):
         if path.suffix == ".jsonl":
@@ -185,7 +188,7 @@ def _read_objects(
 
 
 def _count_assumptions(city: CityFile) -> None:
-    """Counts what is assumed of the reference system as faults of the city."""
+    """Adds assumptions about the reference system to the city's faults."""
     system = city.system
     if not system.name:
         city.faults.add(

@@ -90,10 +90,10 @@ class ReferenceSystem:
 
 
 def horizontal_system(name: str) -> pyproj.CRS:
-    """Returns the system of the first two coordinates of a system, by name.
+    """Returns the horizontal part of a reference system, by its name.
 
     A system that is composed of codes, such as EPSG:31468+5783, has no area of
-    use; its horizontal part does.
+    use, but its horizontal part has one.
     """
     system = pyproj.CRS.from_user_input(name)
     return (system.sub_crs_list or [system])[0]

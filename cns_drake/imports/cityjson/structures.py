@@ -56,7 +56,9 @@ _LONGEST_NAME = 80
 def import_cityjson(
     path: Path, lod: float | None, year_attribute: str | None
 ) -> ForeignCity:
-    """Imports a city from a CityJSON file; the origin is its centre.
+    """Imports a city from a CityJSON file.
+
+    The origin of the map is the centre of the city.
 
     `lod` is the level of detail to read; None for the highest level of each
     object. `year_attribute` is the attribute with the year of construction;
@@ -134,7 +136,10 @@ def import_structures(
 
 
 def _families(city: CityFile) -> dict[str, list[CityObject]]:
-    """Returns id of each object without parents -> the object and its parts."""
+    """Returns each object that has no parent, together with its parts.
+
+    The key of such a group is the id of the object without a parent.
+    """
     groups: dict[str, list[CityObject]] = {}
     for name, one in city.objects.items():
         root = name
@@ -156,7 +161,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
 
 
 def _unique_names(ids: Iterable[str]) -> dict[str, str]:
-    """Returns id -> unique name of letters, digits, dots and dashes."""
+    """Returns a unique name for each id: letters, digits, dots and dashes."""
     plain = {
         one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
         or "object"
@@ -213,7 +218,10 @@ def _chosen_geometries(
 
 
 def _is_building_body(one: CityObject) -> bool:
-    """Returns whether an object is a building or its part, not a balcony."""
+    """Returns whether an object is a building or a `BuildingPart`.
+
+    The other children of a building are installations such as balconies.
+    """
     return not one.parents or one.kind.endswith("Part")
 
 
@@ -240,7 +248,7 @@ def _triangles_by_part(
     faults: ImportFaults,
     origin: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Returns `body` and `roof` -> triangles (M, 3, 3) in the world [m].
+    """Returns the triangles (M, 3, 3) of `body` and of `roof` in W [m].
 
     Surfaces without triangles are left out.
     """

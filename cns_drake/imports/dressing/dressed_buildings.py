@@ -58,8 +58,8 @@ class DressedBuildings:
     Attributes:
         buildings: original building -> building with details.
         at_random: kind of detail -> number of random details.
-        by_file: kind of appearance, such as a colour -> number of buildings for
-            which the file determines it.
+        by_file: kind of appearance, such as a colour -> number of buildings of
+            which the file states this appearance.
     """
 
     buildings: Mapping[ImportedStructure, ImportedStructure]
@@ -76,7 +76,7 @@ def dress_buildings(
     always: Collection[ImportedStructure] | None = None,
     paving: np.ndarray = _NO_TRIANGLES,
 ) -> DressedBuildings:
-    """Returns the buildings of a city with windows, doors and shops.
+    """Returns the buildings of a city, with added windows, doors and shops.
 
     A building looks the same in each stage and each import, because its random
     numbers depend only on the seed and on the building's name. Only walls near
@@ -166,7 +166,7 @@ def _plan_facades(
     views: DriveViews,
     paving: UpperSides,
 ) -> dict[int, list[FacadePlan]]:
-    """Returns number of a building -> plans of its walls to dress."""
+    """Returns the plans of the walls to dress, by the building's number."""
     walls = [
         some.walls if some.one.lod < _LOD_WITH_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
@@ -206,7 +206,7 @@ def _plan_facades(
 def _with_fronts(
     plans: Sequence[FacadePlan], to_way: np.ndarray, paving: UpperSides
 ) -> dict[int, list[FacadePlan]]:
-    """Returns number of a building -> its plans, with doors and shops.
+    """Adds doors and shops to plans; returns the plans by building number.
 
     Args:
         plans: plans of walls.

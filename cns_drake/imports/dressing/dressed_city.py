@@ -129,10 +129,11 @@ def dress_city(
 def _paved_terrain(
     kept: Sequence[ImportedStructure],
 ) -> dict[ImportedStructure, ImportedStructure]:
-    """Returns terrain -> the same terrain in the colour of paving.
+    """Returns for each terrain the same terrain in the colour of paving.
 
-    The result is empty if the file has other ground: only a file without it
-    gives the height of the ground, but not its kind.
+    The result is empty if the file has other ground, such as roads. Without
+    other ground, the file does not state what is paved, and the whole terrain
+    is taken as paved.
 
     Args:
         kept: structures of the city.
@@ -147,7 +148,7 @@ def _paved_terrain(
 
 
 def _take_back_placed(city: ForeignCity, placed: PlacedObjects) -> None:
-    """Takes back the faults of small objects of the file that were placed."""
+    """Removes small objects from the city's faults if they were placed."""
     for one in city.small_objects:
         if one.source in placed.sources:
             placed.sources.remove(one.source)

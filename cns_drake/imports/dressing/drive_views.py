@@ -39,7 +39,7 @@ class DriveViews:
         ground: Ground,
         solids: np.ndarray,
     ):
-        """Prepares the places of at least one drive.
+        """Takes viewpoints along the drives, of which there is at least one.
 
         `solids` (M, 3, 3) are the triangles that occlude walls in all stages
         [m].

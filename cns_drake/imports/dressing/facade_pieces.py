@@ -133,7 +133,7 @@ def _add_in_wall(
 def _within_outline(
     plan: FacadePlan,
 ) -> tuple[FacadePlan, list[tuple[Relief, str]], tuple[float, ...]]:
-    """Returns a plan without the rows that leave the panel's outline.
+    """Returns a plan without rows of openings outside the panel's outline.
 
     Returns:
         The plan, its reliefs with their materials, and the rectangle x0, z0,
@@ -268,7 +268,10 @@ def _add_plinth(
 
 
 def _has_balcony(opening: Opening) -> bool:
-    """Returns whether a window has a balcony, as every other upper one has."""
+    """Returns whether a window gets a balcony.
+
+    Every other window above the ground floor gets one.
+    """
     return opening.row >= 1 and opening.nth % 2 == 1
 
 

@@ -76,7 +76,7 @@ def park_along(
     """Parks cars at random on the sides of a street that allow parking.
 
     Args:
-        room: room in the city, where cars are placed.
+        room: the city, which places cars where there is room.
         row: the street.
         lines: middle lines of all streets, near whose crossings no car parks.
         rng: random generator for places and kinds of cars.
@@ -106,7 +106,7 @@ def fill_car_park(room: StreetRoom, one: ImportedStructure, seed: int) -> None:
     """Parks cars at random along the longer sides of a car park.
 
     Args:
-        room: room in the city, where cars are placed.
+        room: the city, which places cars where there is room.
         one: the car park.
         seed: seed of the random draws.
     """

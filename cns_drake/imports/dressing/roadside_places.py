@@ -16,7 +16,7 @@ FROM_EDGE = 0.6
 def beside_street(
     xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
 ) -> tuple[np.ndarray, float]:
-    """Returns a place, moved beside its nearest street, and a heading to it.
+    """Returns a place beside the nearest street, and the heading to the street.
 
     A place on or close to the carriageway is moved to 0.6 m from the edge of
     the carriageway. Any other place stays. The heading is from the place to the

@@ -81,7 +81,7 @@ def add_roof_pieces(
 
 
 def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
-    """Returns the largest level part of a roof, without holes, and its z."""
+    """Returns a roof's largest level part, without holes, and the part's z."""
     level = roof[unit_normals(roof)[:, 2] > _LEVEL_COSINE]
     best: tuple[Polygon, float] | None = None
     if not len(level):
@@ -102,7 +102,7 @@ def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
 
 
 def _without_holes(area: Polygon) -> Polygon:
-    """Returns the largest piece of an area that is divided at its holes."""
+    """Divides an area at its holes, and returns the largest piece."""
     while area.interiors:
         x0, y0, x1, y1 = area.bounds
         x = Polygon(area.interiors[0]).centroid.x

@@ -147,7 +147,7 @@ def _place_from_file(
     """Places a small object of the file, moved off the carriageway.
 
     Args:
-        room: room in the city.
+        room: the city, which places objects where there is room.
         one: the small object.
         number: number of the object among all small objects.
         streets: the streets near drives.
@@ -199,7 +199,7 @@ def _place_lamps(
 def _place_small_objects(
     room: StreetRoom, row: DressedStreet, rng: np.random.Generator
 ) -> None:
-    """Places small objects along a street if the file has none at all."""
+    """Places random small objects along a street, for a file without any."""
     s = float(rng.uniform(3.0, 12.0))
     while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0

@@ -87,7 +87,7 @@ class StreetRoom:
         bottom: Sequence[Structure],
         found: PlacedObjects,
     ):
-        """Takes the room of everything that stands already.
+        """Takes what already stands, and the drives whose paths stay free.
 
         Args:
             structures: structures of the city.

@@ -138,9 +138,9 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Returns a style for a building: from its tags, or else at random.
+    """Returns a building's style: as its tags state, and otherwise random.
 
-    The number of random numbers that are used does not depend on the tags.
+    Whatever the tags state, the function samples equally many random numbers.
 
     Args:
         tags: tags of the building, as in OpenStreetMap.

@@ -154,7 +154,7 @@ def _plane_pieces(
     normals: np.ndarray,
     areas: np.ndarray,
 ) -> list[Panel]:
-    """Returns a wall that bends as plane pieces, as long as possible.
+    """Divides a wall that bends into plane pieces, each as long as possible.
 
     `facets` (M,) are the numbers of the plane facets to which triangles belong.
     The other arguments are as in `_make_panel`.

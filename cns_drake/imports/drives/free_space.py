@@ -145,7 +145,7 @@ def _is_water(one: ImportedStructure) -> bool:
 def _covered_cells(
     triangles: np.ndarray, window: _Window, ground: Ground | None = None
 ) -> Iterator[np.ndarray]:
-    """Yields rows and columns (2, N) that triangles (M, 3, 3) cover.
+    """Yields row and column (2, N) of cells that triangles (M, 3, 3) cover.
 
     With a ground, only places that a car on this ground could hit count.
     """
@@ -191,7 +191,7 @@ def _with_enclosed(
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
-    """Returns the distance of each cell to the nearest one not free [m]."""
+    """Returns the distance from each cell to the nearest cell not free [m]."""
     # Padded, since no car can drive beyond the grid.
     return ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 

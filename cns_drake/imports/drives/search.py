@@ -98,11 +98,11 @@ def _longest_way(graph: WayGraph) -> list[int]:
 def _longest_way_from(
     graph: WayGraph, links: csr_array, start: int, longest: float = LONGEST
 ) -> list[int]:
-    """Returns the longest of the shortest ways from a piece, up to a length.
+    """Returns the way from a piece to the piece that is farthest from it.
 
-    Ways that pass a place twice do not count. Ways follow links between usable
-    pieces, up to the length `longest` [m]. With transposed links, the way leads
-    to the piece, in reverse order.
+    The way is the shortest way to that piece along `links`, cut to the length
+    `longest` [m]. A way that passes a place twice does not count. If the matrix
+    `links` is transposed, the way leads to `start`, and is in reverse order.
     """
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
@@ -158,9 +158,10 @@ def _nearest_index(values: np.ndarray, wanted: float) -> int:
 
 
 def _spaced_places(places: np.ndarray, along: np.ndarray) -> list[int]:
-    """Returns some of the places, at least `_APART` from each other.
+    """Returns at most `_MOST_PLACES` of the places, `_APART` or more apart.
 
-    They are at most `_MOST_PLACES`.
+    A place is the index of a piece in a way. `along` contains the distance
+    along the way at which each piece begins [m].
     """
     kept: list[int] = []
     for place in places.tolist():

@@ -28,7 +28,7 @@ class WayGraph(ABC):
         after: np.ndarray,
         costs: np.ndarray | None = None,
     ):
-        """Links pieces: each of `before` (L,) leads into one of `after` (L,).
+        """Links pieces: `before[k]` leads into `after[k]`, for L links.
 
         `lengths` (N,) contains the lengths of the pieces [m]. `costs` (L,)
         contains the cost of each link, from the middle of a piece to the middle

@@ -43,7 +43,7 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
 
 
 def _link_at(road: Element, end: str) -> tuple[str, str | None]:
-    """Returns kind and id of the link at an end of a road; None if none."""
+    """Returns kind and id of the link at a road's end; None without a link."""
     link = road.first("link", end)
     if link is None:
         return "road", None
@@ -78,7 +78,7 @@ def _lanes_beyond(
 
     Args:
         road: the road.
-        own: the sections of its lanes, along the road.
+        own: the road's lane sections, in their order along the road.
         k: index of the section.
         end: `predecessor` or `successor`.
         roads: name of a road -> the road.

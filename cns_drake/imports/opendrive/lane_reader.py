@@ -17,10 +17,11 @@ _HIGHEST_LANE = 1.0
 def read_cubics(
     elements: Iterable[Element], start: str, offset: float = 0.0
 ) -> road_model.Cubics:
-    """Returns the function of the distance along a road that elements define.
+    """Returns the function that elements define along a road.
 
     Each element has the coefficients `a` to `d` of a cubic polynomial. The
-    polynomial begins at the value of the attribute `start`, plus `offset` [m].
+    attribute named `start` contains the distance at which the polynomial
+    begins; `offset` is added to this distance [m].
     """
     return road_model.Cubics(
         [

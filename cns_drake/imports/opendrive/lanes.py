@@ -171,7 +171,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
 def _across(
     heading: np.ndarray, roll: np.ndarray, width: np.ndarray
 ) -> np.ndarray:
-    """Returns the steps (N, 3) across the road to the left, of a width (N,)."""
+    """Returns vectors (N, 3) to the left across a road, with lengths (N,)."""
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     flat = left * (width * np.cos(roll))[:, None]
     return np.column_stack([flat, width * np.sin(roll)])
@@ -185,7 +185,7 @@ def _edge_heights(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def _at_own_height(band: LaneBand) -> LaneBand:
-    """Returns a lane with its own height, if it is at road level."""
+    """Returns a lane at the height from the file, unless it is above a kerb."""
     if not band.lane.inner_height or is_raised(band.kind, band.lane.height):
         return band
     up = np.array([0.0, 0.0, 1.0])
@@ -251,8 +251,8 @@ def stations(
 
     Args:
         road: the road.
-        start: where the first place is [m].
-        end: where the last place is [m].
+        start: the first distance [m].
+        end: the last distance [m].
         more: functions along the road whose shape matters in addition to the
             shape of the road.
 

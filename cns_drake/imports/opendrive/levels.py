@@ -48,9 +48,9 @@ def split_levels(
 
 
 def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
-    """Returns road -> distances at which it passes over another road [m].
+    """Returns where each road passes over another road.
 
-    The distances are increasing.
+    The result maps the name of a road to increasing distances along it [m].
     """
     number_of = {band.road.name: k for k, band in enumerate(bands)}
     rows = [np.zeros((0, 5))]

@@ -235,10 +235,12 @@ class Thing(NamedTuple):
         z: height above the road [m].
         heading: heading relative to the heading of the road [rad].
         size: length, width and height; 0 where unknown [m].
-        outline: (N, 4) corners as u, v, height of the foot above the foot of
-            the object, and height above this foot [m]; None if not in the file.
-        road_outline: (N, 4) corners as s, t, height of the foot above the road,
-            and height above this foot [m]; None if not in the file.
+        outline: (N, 4) corners [m]: u, v, height of the corner's foot above the
+            foot of the object, and height of the corner above its own foot.
+            None if not in the file.
+        road_outline: (N, 4) corners [m]: s, t, height of the corner's foot
+            above the road, and height of the corner above its own foot. None if
+            not in the file.
         is_open: whether the outline is a line, not the edge of an area.
         swept: (2, 5) s, t, height of the foot above the road, width and height
             [m] at both ends of an object without gaps along the road, such as a

@@ -107,7 +107,8 @@ def _repetitions(
     Args:
         thing: the object.
         repeat: how the object is repeated, in the file.
-        number: number of `repeat` among the object's own, part of the names.
+        number: number of `repeat` among the object's repetitions. The new names
+            contain this number.
         faults: counts objects that are left out.
 
     Raises:

@@ -91,10 +91,11 @@ def build_town(
 
     Args:
         source: the file.
-        options: `seed` of all random draws; `dressed`: whether to paint the
-            road marks of the file; `grow`: the share of the buildings that the
-            first stage lacks, beginning in the east; `within`: the greatest
-            distance of structures from the drives [m].
+        options: options of the import. `seed` is the seed of all random draws.
+            `dressed` says whether to paint the road marks of the file. `grow`
+            is the share of the buildings that the first stage lacks, beginning
+            in the east. `within` is the greatest distance of structures from
+            the drives [m].
         own: drives that replace the proposed drives; None to use the proposed
             drives.
 
@@ -253,7 +254,7 @@ def _structures_of_file(
 def _reserved_area(
     raised: Sequence[LaneBand], things: Sequence[Structure]
 ) -> BaseGeometry:
-    """Returns the area below bridges and things, which stays free in W [m]."""
+    """Returns the area in W that stays free: below bridges and things [m]."""
     return shapely.union_all(
         [
             *(imported_streets.lane_polygon(band) for band in raised),
@@ -286,7 +287,7 @@ def _near_drives(
     distance: float,
     faults: ImportFaults,
 ) -> City:
-    """Returns a city without what stands far from drives [m].
+    """Returns a city without structures farther than `distance` from drives.
 
     The ground is kept.
 
@@ -322,9 +323,10 @@ def _count_raised_kerbs(
 def _count_spans(
     roads: RoadMap, raised: Set[str], faults: ImportFaults
 ) -> None:
-    """Counts bridges and tunnels in a file that are not built.
+    """Counts the bridges and tunnels of a file that the town lacks.
 
-    `raised` are roads that pass over others, on decks that are built.
+    `raised` contains the roads that pass over others. The town has the decks of
+    these roads.
     """
     for road in roads.roads:
         for span in road.spans:

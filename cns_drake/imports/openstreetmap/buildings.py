@@ -258,7 +258,10 @@ def _taken_once(
 
 
 def _lies_in(one: _Block, other: _Block) -> bool:
-    """Returns whether an outline lies in another one of the same time."""
+    """Returns whether an outline lies in another one.
+
+    The result is False for buildings that stood at different times.
+    """
     if is_gone(one.tags) or is_gone(other.tags):
         return False
     dates, others = _dates(one.tags), _dates(other.tags)

@@ -233,7 +233,7 @@ def _count_unused(
     found: Iterable[ImportedStructure],
     also: AbstractSet[str],
 ) -> None:
-    """Counts, by kind, what in the file has no place in the city.
+    """Counts, by kind, the objects of the file that the city does not use.
 
     Buildings that are left out, and the ids in `also`, are counted elsewhere.
     """

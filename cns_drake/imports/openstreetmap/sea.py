@@ -61,7 +61,7 @@ def sea(
 
 
 def _extended_within(line: LineString, whole: BaseGeometry) -> LineString:
-    """Returns a line whose ends within an area are extended straight on."""
+    """Extends a line straight on at each end that lies within an area."""
     points = np.array(line.coords)
     if line.is_closed:
         return line

@@ -212,7 +212,7 @@ def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
 
 
 def _has_any_word(path: Path, *words: bytes) -> bool:
-    """Returns whether a file contains any of some words of at most 8 bytes."""
+    """Returns whether a file contains any of `words`, each at most 8 bytes."""
     rest = b""
     with path.open("rb") as stream:
         while chunk := stream.read(_CHUNK_SIZE):

@@ -33,7 +33,8 @@ def speed_limit(
 
     Args:
         tags: tags of the street.
-        is_forward: direction of travel: along the street's line, or against it.
+        is_forward: whether the limit is for travel along the street's line;
+            otherwise it is for travel against the line.
         where: id of the street, and the counts to which tags that cannot be
             read are added. By default such tags are not counted.
     """

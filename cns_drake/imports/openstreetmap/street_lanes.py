@@ -353,7 +353,7 @@ def _line_beside(
 def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
     """Returns evenly spaced points (N, 2) along a line with smooth corners.
 
-    `window_length` is the length of the running mean that rounds them [m].
+    `window_length` is the length of the running mean that rounds corners [m].
     """
     count = max(3, round(line.length / SPACING) + 1)
     places = np.linspace(0.0, 1.0, count)

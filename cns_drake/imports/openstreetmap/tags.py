@@ -46,7 +46,7 @@ def count(text: str | None) -> float | None:
 def _greatest_value(
     text: str | None, read: Callable[[str], float | None]
 ) -> float | None:
-    """Returns the greatest value in a text; None unless all can be read."""
+    """Returns the greatest value in a text; None if a value is unreadable."""
     if text is None or len(text) > 255:  # OpenStreetMap allows no more.
         return None
     plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
