@@ -17,6 +17,7 @@ from cns_drake.base.number_text import whole_number
 from cns_drake.base.terminal import note, show
 from cns_drake.imports.options import DriveOn, ImportOptions, Undated
 from cns_drake.imports.report import REPORT_NAME, ImportReport
+from cns_drake.scene.map_folder import MapFolder
 
 # Default share of the buildings that change between an added first stage and
 # today.
@@ -185,7 +186,7 @@ def _report_rows(
         words = ["reproduce", str(output), "--output", "study"]
     else:
         drive = str(
-            output / f"sequence_{min(report.stages, key=natural_key)}.yaml"
+            MapFolder(output).drive(min(report.stages, key=natural_key))
         )
         words = ["simulate", drive, "--output", "recordings"]
     yield "next", shlex.join(["cns-drake", *words])

@@ -16,7 +16,12 @@ from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.report import REPORT_NAME, ImportReport
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.scene.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
+from cns_drake.scene.map_folder import (
+    MESH_FOLDER,
+    STRUCTURES_NAME,
+    MapFolder,
+    stage_name,
+)
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
@@ -190,13 +195,15 @@ def write_drives(
         text = "\n".join(["x,y,z", *rows, ""])
         (folder / f"route_{letter}.csv").write_text(text, "utf-8")
     speeds = dict(zip("ab", cruise, strict=False))
+    map_folder = MapFolder(folder)
     for number, (stage, when) in enumerate(stages.items()):
         # The query drive is in the last stage. Its route is not that of the
         # database drives.
         letters = "ab"[: len(routes)]
         if number < len(stages) - 1:
             letters = letters[::-1]
-        for kind, letter in zip(("sequence", "other"), letters, strict=False):
+        paths = map_folder.drive(stage), map_folder.other_drive(stage)
+        for path, letter in zip(paths, letters, strict=False):
             scenario = {
                 "map": ".",
                 "stage": stage,
@@ -205,4 +212,4 @@ def write_drives(
                 "speeds": {"cruise": speeds[letter], **_ACCELERATION},
             }
             text = yaml.safe_dump(scenario, sort_keys=False)
-            (folder / f"{kind}_{stage}.yaml").write_text(text, "utf-8")
+            path.write_text(text, "utf-8")

@@ -123,8 +123,8 @@ class BagWriter:
         self._latched = {topic.name for topic in topics if topic.latched}
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
-        # Topic -> stamp of its last message; stamps of the first and the last
-        # message of all [ns].
+        # Topic -> stamp of its last message; least and greatest stamp of all
+        # messages [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
         # Whether the writer's index describes the file: False while a record is
@@ -170,7 +170,7 @@ class BagWriter:
             with self._writing():
                 self._write_ending()
                 self._stream.finish()
-            self._rename_files()
+            self._complete_files()
         finally:
             self._close_stream()
 
@@ -231,8 +231,8 @@ class BagWriter:
             )
         self._counts[topic] += 1
         self._latest_ns[topic] = stamp_ns
-        first_ns = self._span_ns[0] if self._span_ns else stamp_ns
-        self._span_ns = (first_ns, stamp_ns)
+        first_ns, last_ns = self._span_ns or (stamp_ns, stamp_ns)
+        self._span_ns = (min(first_ns, stamp_ns), max(last_ns, stamp_ns))
 
     def _check_order(self, topic: str, stamp_ns: int) -> None:
         """Refuses a message that is not later than the last on its topic."""
@@ -340,12 +340,12 @@ class BagWriter:
         self._chunks.finish({v: k for k, v in self._channel_ids.items()})
         self._stream.flush()
 
-    def _rename_files(self) -> None:
-        """Gives the finished files their final names, `metadata.yaml` last.
+    def _complete_files(self) -> None:
+        """Writes the remaining files, and gives all files their final names.
 
         All files are whole under their `.part` names before the first is
-        renamed. Old files that describe the MCAP are removed first: they must
-        never describe the new MCAP.
+        renamed; `metadata.yaml` is renamed last. Old files that describe the
+        MCAP are removed first: they must never describe the new MCAP.
         """
         own = self._files
         metadata = {"rosbag2_bagfile_information": self._bag_information()}

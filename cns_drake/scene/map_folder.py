@@ -54,7 +54,8 @@ class MapFolder:
     def files(self) -> list[Path]:
         """Returns the files directly in the map's folder, sorted.
 
-        Hidden files, such as locks of editors, and dead links are left out.
+        All files of a map have a suffix. Files without a suffix, hidden files
+        such as locks of editors, and dead links are left out.
 
         Raises:
             InputError: the folder contains a pipe or a device.
@@ -87,6 +88,18 @@ class MapFolder:
     def drives(self) -> list[Path]:
         """Returns the scenario files of the drives, in order."""
         return listed(self.path, self.drive("*").name)
+
+    def other_drive(self, stage: str) -> Path:
+        """Returns the path of the scenario file for the other route.
+
+        An imported city has two routes. Each stage has a drive on one route,
+        and this drive on the other route.
+        """
+        return self.path / f"other_{stage}.yaml"
+
+    def other_drives(self) -> list[Path]:
+        """Returns the scenario files for the other routes, in order."""
+        return listed(self.path, self.other_drive("*").name)
 
     def recordable_drives(self) -> list[Path]:
         """Returns the scenario files of drives whose stage exists.

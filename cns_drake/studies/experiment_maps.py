@@ -7,7 +7,7 @@ from typing import Any
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.listing import listed, natural_key
+from cns_drake.base.listing import natural_key
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (
@@ -156,13 +156,14 @@ class ExperimentMaps:
 
     def _drive_pairs(self, folder: Path) -> list[tuple[Scenario, Scenario]]:
         """Returns the pairs of drives of a map: database and query."""
-        files = MapFolder(folder).recordable_drives()
+        map_folder = MapFolder(folder)
+        files = map_folder.recordable_drives()
         kind = self._experiment.drives
         if kind == "first-and-last":
-            stages = list(MapFolder(folder).stages())
-            # In an imported city, the drives of the stages have different
-            # routes.
-            last = (listed(folder, "other_*.yaml") or files)[-1]
+            stages = list(map_folder.stages())
+            # In an imported city with several stages, the other drive of the
+            # last stage follows the same route as the first drive.
+            last = (map_folder.other_drives() or files)[-1]
             return [
                 (
                     load_scenario(files[0]).replaced(stage=stages[0]),

@@ -15,21 +15,21 @@ _TURN_ROUND_SHARE = 0.02
 _TURN_COSINE = 0.7
 
 
-def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
-    """Returns how drivers divide among the paths that follow a lane.
+def way_shares(graph: LaneGraph, piece: int) -> np.ndarray:
+    """Returns how drivers divide among the pieces that follow a piece.
 
     Args:
         graph: the lane graph.
-        lane: number of the lane, which leads to a junction.
+        piece: number of the piece.
 
     Returns:
-        Share of the drivers on each path in `graph.pieces[lane].after`; the sum
-        is 1.
+        Share of the drivers on each piece in `graph.pieces[piece].after`; the
+        sum is 1.
     """
-    after = graph.pieces[lane].after
+    after = graph.pieces[piece].after
     likes = []
-    for way in after:
-        steps = np.diff(graph.pieces[way].points[:, :2], axis=0)[[0, -1]]
+    for k in after:
+        steps = np.diff(graph.pieces[k].points[:, :2], axis=0)[[0, -1]]
         a, b = steps / np.linalg.norm(steps, axis=1)[:, None]
         turn = a @ b
         likes.append(
@@ -43,9 +43,11 @@ def way_shares(graph: LaneGraph, lane: int) -> np.ndarray:
 
 
 def flows(graph: LaneGraph) -> np.ndarray:
-    """Returns the share (P,) of vehicles on each piece, over a long time.
+    """Returns each piece's share (P,) of all passes of vehicles over pieces.
 
-    At each junction, vehicles choose any way, with the shares of `way_shares`.
+    Vehicles start on all pieces in equal numbers, and choose each next piece
+    with the shares of `way_shares`. A long piece is not passed more often than
+    a short piece, although vehicles stay longer on the long piece.
     """
     pieces = graph.pieces
     step = np.zeros((len(pieces), len(pieces)))

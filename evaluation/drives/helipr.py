@@ -102,10 +102,9 @@ class HeliprDrive(FileDrive):
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
         trajectory = read_quaternions(drive / _POSES / poses_name, None)
-        X_WS, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        X_US, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
-        if in_utm:
-            X_WS = to_world(X_WS, trajectory.path)
+        X_WS = to_world(X_US, trajectory.path) if in_utm else X_US
         drive = drive.resolve()
         super().__init__(
             name=f"{drive.name}_{lidar}",

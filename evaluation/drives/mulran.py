@@ -77,8 +77,7 @@ class MulranDrive(BinDrive):
                 f"{trajectory.path}: no UTM coordinates; taken for those of a"
                 f" frame of {name} alone",
             )
-        else:
-            X_UB = to_world(X_UB, trajectory.path)
+        X_WB = X_UB if local else to_world(X_UB, trajectory.path)
         scenario = read_scenario(path)  # cns-drake exports one.
         super().__init__(
             columns,
@@ -86,7 +85,7 @@ class MulranDrive(BinDrive):
             world_frame=f"mulran{path.resolve() if local else f'/{DATUM}'}",
             files=kept,
             stamps_ns=stamps_ns[spanned],
-            X_WS=X_UB @ X_BS,
+            X_WS=X_WB @ X_BS,
             tables=[trajectory.path, path / SCENARIO],
             notes=notes,
             datum=None if local else DATUM,

@@ -162,6 +162,17 @@ def test_metadata_is_version_8_and_has_no_aliases(tmp_path):
     assert profile["depth"] == 1
 
 
+def test_span_covers_topics_that_are_written_one_after_the_other(tmp_path):
+    with open_bag(tmp_path / "town_01") as bag:
+        bag.write("/tf", START_NS + 10, EMPTY_TF, 0)
+        bag.write("/odometry", START_NS + 5, EMPTY_TF, 0)
+    text = (tmp_path / "town_01" / "metadata.yaml").read_text()
+    information = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    start = {"nanoseconds_since_epoch": START_NS + 5}
+    assert information["starting_time"] == start
+    assert information["duration"] == {"nanoseconds": 5}
+
+
 def test_mcap_follows_the_ros2_profile(tmp_path):
     record(tmp_path / "town_01")
     with open(tmp_path / "town_01" / "town_01_0.mcap", "rb") as stream:

@@ -18,13 +18,14 @@ def test_existing_files(tmp_path):
     for number in ("10", "9", "03"):
         folder.drive(number).touch()
     (folder.path / "stage_01.yaml").touch()
-    (folder.path / "other_02.yaml").touch()
+    folder.other_drive("02").touch()
     stages = folder.stages()
     assert list(stages) == ["02", "9", "10", "new"]
     assert stages["10"] == folder.path / "stage_10.sdf"
     drives = [folder.drive(number) for number in ("03", "9", "10")]
     assert folder.drives() == drives
     assert folder.recordable_drives() == drives[1:]
+    assert folder.other_drives() == [folder.path / "other_02.yaml"]
 
 
 def test_what_editors_leave_is_no_file_of_a_map(tmp_path):
@@ -33,7 +34,7 @@ def test_what_editors_leave_is_no_file_of_a_map(tmp_path):
         (tmp_path / name).mkdir()
     (tmp_path / ".#stage_01.sdf").symlink_to("me@host.1:2")
     (tmp_path / "dead.sdf").symlink_to("nowhere")
-    for name in ("stage_01.sdf", "roads.yaml"):
+    for name in ("stage_01.sdf", "roads.yaml", "README"):
         (tmp_path / name).touch()
     assert [p.name for p in folder.files()] == ["roads.yaml", "stage_01.sdf"]
     os.mkfifo(tmp_path / "x.y")
