@@ -124,7 +124,7 @@ def _window(p: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
 def _storey_walls(
     p: BalconyFlats, storey: float, walls: list[_Front], *, ground: bool = False
 ) -> Facade:
-    """Returns a storey's walls; the ground floor has doors and a plinth."""
+    """Returns the walls of a storey, with doors and a plinth if `ground`."""
     window, french = _window(p, storey), _window(p, storey, 0.12)
     slit = bays.window(1.3, 0.3, storey, p.recess)
     door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)
@@ -184,8 +184,8 @@ def _stair(
 ) -> list[Mesh]:
     """Returns a canopy over the door, and the visible part of the stair.
 
-    If `p.stair` is `tower`, a stair tower in front of the wall is visible;
-    otherwise only a house on the roof of the highest section.
+    If `p.stair` is `tower`, this part is a stair tower in front of the wall.
+    Otherwise it is a small house on the roof of the highest section.
     """
     x, wall = front.stair, front.wall
     pieces = [
@@ -206,7 +206,7 @@ def _stair(
 
 
 def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
-    """Returns the outline of all sections, and which edges are in front."""
+    """Returns the outline of all sections, and its front edges' numbers."""
     points: list[np.ndarray] = []
     fronts = []
     for section in sections:

@@ -81,7 +81,7 @@ class Barn(Building):
 
 
 def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
-    """Adds the main box of the barn with its doors, or the lean-to."""
+    """Adds one box of the barn: the main box with doors, or the lean-to."""
     openings = Openings(p, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
     window = bays.window(0.9, 1.1, head, _RECESS_M)

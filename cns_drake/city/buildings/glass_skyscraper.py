@@ -58,7 +58,11 @@ class GlassSkyscraper(Building):
         self.crown_height = self.uniform(5.0, 9.0, 1)
 
     def _setback_share(self, edges: int) -> float | np.ndarray:
-        """Returns how far a tier steps back: its edges, or all alike."""
+        """Returns a random share for how far a tier steps back.
+
+        With four edges, each edge has a share of its own, which is 0 for an
+        edge that does not step back. Otherwise, one share holds for all edges.
+        """
         if edges == 4:
             return self.rng.uniform(0.06, 0.13, 4) * (self.rng.random(4) < 0.6)
         return self.uniform(0.5, 1.0)

@@ -162,7 +162,7 @@ def wing_and_storeys(
 def _add_entrance(
     p: HouseInRow, wing: Wing, openings: Openings, material: str
 ) -> float:
-    """Adds the door on its landing; returns its place along the wall [m]."""
+    """Adds the door and its landing; returns the door's x on the wall [m]."""
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
@@ -279,9 +279,10 @@ def add_roof_chimney(p: HouseInRow, wing: Wing, name: str) -> None:
 
 
 def front_of_site(p: HouseInRow) -> tuple[float, float, frozenset[int]]:
-    """Returns the x of a house's left and right wall, and its blind edges.
+    """Returns x of a house's left and right wall [m], and the blind edges.
 
-    Eaves and cornices stay on the lot, except towards the neighbours.
+    A side wall without a neighbour stands back far enough for the cornice of a
+    flat roof, so that the cornice stays on the lot.
     """
     x0, _, x1, _ = p.site.bounds
     side = 0.3 * (p.roof == "flat")

@@ -65,7 +65,7 @@ class SportsHall(Building):
 
 
 def _halls(p: SportsHall, area: outlines.Area, along_y: bool) -> list[Wing]:
-    """Returns the one hall, or the two halves under a butterfly roof."""
+    """Returns the hall: two halves under a butterfly roof, or one wing."""
     x0, y0, x1, y1 = area
     top = p.height - 0.15
     span = (x1 - x0) if along_y else (y1 - y0)

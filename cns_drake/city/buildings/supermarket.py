@@ -134,7 +134,7 @@ def _add_entrance(p: Supermarket, hall: Wing) -> None:
 
 
 def _add_dock(p: Supermarket, hall: Wing) -> None:
-    """Adds a loading dock with its roof and a wall beside the hall."""
+    """Adds a loading dock beside the hall, with a roof and a screen wall."""
     wall = hall.wall(3 if p.dock_left else 1)
     reach = p.dock_depth - 0.4
     # At the back end of the side wall, whose direction depends on the side.

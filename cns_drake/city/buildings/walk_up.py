@@ -195,7 +195,10 @@ def _add_roof(
 
 
 def _combined_layout(first: Layout, second: Layout) -> Layout:
-    """Returns a layout with the reliefs of two layouts that do not overlap."""
+    """Returns a layout with the reliefs of two layouts.
+
+    No relief of one layout may overlap a relief of the other.
+    """
 
     def layout(edge: int, length: float) -> list[Relief]:
         return [*first(edge, length), *second(edge, length)]

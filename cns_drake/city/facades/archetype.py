@@ -25,9 +25,10 @@ class Archetype(BaseModel, frozen=True, extra="forbid"):
         party_walls: whether a building can stand wall to wall with a neighbour;
             otherwise the walls that face a neighbour stand back from the edges
             of the footprint by `overhang`.
-        colours: name of a part -> colours, one of which each building gets at
-            random; or the name of an earlier part with the same colour. Parts
-            without an entry have the colour of the first part.
+        colours: name of a part -> list of colours, from which each building
+            gets one at random. The name of an earlier part instead of a list
+            means the colour of that part. Parts without an entry have the
+            colour of the first part.
         choices: further lists of colours, by name, for single elements of a
             building.
         materials: names of the parts that are made of many pieces, such as

@@ -53,11 +53,11 @@ class Assembly(Dice):
     _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
 
     def draw_roof_items(self, kinds: str, low: int, high: int) -> list[str]:
-        """Returns the kinds of a random number of objects on the roof.
+        """Returns the kinds of the objects on the roof, in a random number.
 
-        The text `kinds` lists kinds, separated by spaces; the result contains
-        the first of them. The number of objects is at least `low` and less than
-        `high`.
+        The text `kinds` lists kinds, separated by spaces, with the most
+        important first. The result contains the first kinds of this list: at
+        least `low`, and fewer than `high`.
         """
         return kinds.split()[: self.whole(low, high)]
 

@@ -15,10 +15,10 @@ from cns_drake.city.geometry import Finish
 class Building(Assembly, abc.ABC):
     """The base class of buildings; each archetype has a subclass.
 
-    The constructor calls `draw`, which samples the sizes and the style of the
-    building, and then samples its colours. From these attributes, `build` makes
-    the parts of the building. Only roof equipment and chimneys may rise above
-    the building's `height` [m].
+    The constructor first calls `draw`, which samples the sizes and the style of
+    the building. Then the constructor samples the colours. From these
+    attributes, `build` makes the parts of the building. Only roof equipment and
+    chimneys may rise above the building's `height` [m].
 
     Attributes:
         kind: the archetype.

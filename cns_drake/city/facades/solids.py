@@ -39,7 +39,10 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
 
 
 def _corners_at(points: np.ndarray, z: float | np.ndarray) -> np.ndarray:
-    """Returns the corners (N, 3) of an outline, at one height or one each."""
+    """Returns the corners (N, 3) of an outline at heights `z` [m].
+
+    `z` is one height for all corners, or (N,) one height for each corner.
+    """
     return np.column_stack([points, np.broadcast_to(z, len(points))])
 
 

@@ -22,7 +22,7 @@ _PANE_OVERLAP = 0.004
 
 
 class StoreyGroups(NamedTuple):
-    """Equal storeys, in groups of which each becomes one part.
+    """Equal storeys in groups; each group becomes one part.
 
     Attributes:
         groups: number of groups.

@@ -237,7 +237,11 @@ def _reveal_quads(grid: WallCells) -> Quads:
 def _step_runs(
     steps: list[tuple[float, float]],
 ) -> Iterator[tuple[int, int, tuple[float, float]]]:
-    """Yields (start, end, step) of runs of equal steps that are not zero."""
+    """Yields start, end and step of each run of equal steps.
+
+    A step is the pair of depths on its two sides. Runs in which the two depths
+    are equal are left out.
+    """
     start = 0
     for k in range(1, len(steps) + 1):
         if k == len(steps) or steps[k] != steps[start]:

@@ -208,8 +208,8 @@ def _neighbour_depths(
     """Returns the depths of the two neighbouring walls, row by row [m].
 
     The result (2, R + 2) contains the depths in the R rows between the heights
-    `zs`. The first and the last number of each wall are 0, because all cells
-    are closed back to depth 0 below and above a wall.
+    `zs`. The first and the last depth of each wall are 0, because all cells are
+    closed back to depth 0 below and above a wall.
     """
     depths = np.zeros((2, len(zs) + 1))
     for row, z in enumerate((np.array(zs[1:]) + zs[:-1]) / 2, start=1):

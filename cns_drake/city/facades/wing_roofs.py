@@ -72,7 +72,7 @@ def _add_hipped_roof(out: Assembly, wing: Wing) -> None:
 
 
 def _add_covering(out: Assembly, wing: Wing) -> None:
-    """Adds the slopes of a roof with gables, with eaves and verges."""
+    """Adds the slopes of a gabled roof, including eaves and verges."""
     roof = wing.roof
     start_edge, end_edge = wing.gables
     start, end = wing.ridge

@@ -59,8 +59,8 @@ class Streets(NamedTuple):
         kerb_height: height of sidewalks above the carriageway [m], at places
             where `kerbs` gives no height.
         junctions: area of all junctions.
-        margins: strips beside the streets that stay free. Buildings stand along
-            these strips.
+        margins: strips beside the streets on which nothing is built. Buildings
+            stand along these strips.
         reserved: further area in which nothing is built or planted.
         structures: structures of the streets themselves.
         furnish: function that places the objects of the streets. It is called

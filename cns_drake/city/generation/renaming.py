@@ -1,4 +1,4 @@
-"""Names in `stages.yaml` after a change of the city: which have changed."""
+"""Finds renamed structures, and changes their names in `stages.yaml`."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -160,7 +160,7 @@ def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
 
 
 def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
-    """Returns the pairs of a mapping, with those merged into it (`<<`)."""
+    """Returns the pairs of a mapping, and pairs that `<<` merges into it."""
     if not isinstance(node, yaml.MappingNode):
         return []
     pairs = []
@@ -209,7 +209,7 @@ def _read_rows(table: Path) -> list[_Row]:
 def _successors(
     before: Sequence[_Row], today: Sequence[_Row]
 ) -> dict[str, str]:
-    """Returns old name -> new name of structures that have kept their place."""
+    """Maps old names to new names of structures that have not moved."""
     if not before or not today:
         return {}
     tree = cKDTree([row.xy for row in today])

@@ -184,7 +184,7 @@ def render_stages(
 
 
 def _mesh_texts(structures: Sequence[Structure]) -> dict[str, str]:
-    """Returns name -> OBJ text of the meshes of all parts, sorted by name."""
+    """Returns the OBJ text of each mesh of all parts, by mesh name, sorted."""
     meshes = meshes_of(structures)
     shapes = [part.shape for one in structures for part in one.model.parts]
     names = {shape.mesh for shape in shapes if isinstance(shape, MeshShape)}

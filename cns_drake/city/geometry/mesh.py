@@ -45,7 +45,10 @@ class Mesh:
 
     @cached_property
     def _corners(self) -> np.ndarray:
-        """The faces as (F, 4) vertex indices; triangles repeat the last one."""
+        """The faces as (F, 4) vertex indices.
+
+        The fourth index of a triangle repeats the third index.
+        """
         # NumPy makes arrays from iterators several times faster than from
         # tuples.
         numbers = np.fromiter(map(len, self.faces), np.int64, len(self.faces))
@@ -57,7 +60,7 @@ class Mesh:
         return corners[begin + np.minimum(np.arange(4), last)]
 
     def with_vertices(self, vertices: np.ndarray) -> Mesh:
-        """Returns the mesh with the same faces, but vertices (N, 3) [m]."""
+        """Returns a mesh with the same faces and new vertices (N, 3) [m]."""
         return Mesh(vertices, self.faces)
 
     def moved(

@@ -135,7 +135,7 @@ def _heights(xy: np.ndarray, height: HeightMap | float) -> np.ndarray:
 def _rectangle_corners(polygon: Polygon) -> np.ndarray | None:
     """Returns the corners (4, 2) of a polygon that is an axis-aligned box.
 
-    It is None for any other polygon. The corners are counter-clockwise.
+    The corners are counter-clockwise. The result is None for any other polygon.
     """
     x0, y0, x1, y1 = polygon.bounds
     if (

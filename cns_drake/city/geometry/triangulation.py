@@ -55,7 +55,7 @@ def _corners(ring: LinearRing) -> list[_Point]:
 def _with_corners_on_edges(
     ring: list[_Point], corners: list[_Point]
 ) -> list[_Point]:
-    """Returns a ring with more corners, where other rings touch its edges."""
+    """Returns a ring with all `corners` added that lie on its edges."""
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts

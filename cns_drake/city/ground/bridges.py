@@ -30,7 +30,7 @@ _BRIDGE_RGB = (0.62, 0.57, 0.50)
 
 
 def _water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
-    """Returns the area of a district of water in W [m], also below bridges."""
+    """Returns a water district's area in W, with water below bridges [m]."""
     if district.plan.area is None:
         return district.area
     below = Polygon(district.plan.area).intersection(streets)

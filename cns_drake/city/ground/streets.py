@@ -215,7 +215,7 @@ def _street_tiles(
 
 
 def _sag(area: BaseGeometry, height: HeightMap) -> float:
-    """Returns by how much a widely spaced mesh misses the slope [m]."""
+    """Returns the greatest height error of a widely spaced mesh [m]."""
     x0, y0, x1, y1 = area.buffer(1.0).bounds
     y, x = np.mgrid[y0:y1:_SPACING, x0:x1:_SPACING]
     near = shapely.dwithin(area, shapely.points(x, y), _WIDE_SPACING)

@@ -75,9 +75,9 @@ class GroundShape:
 def _make_swell(
     district: District, buildings: BaseGeometry, rng: np.random.Generator
 ) -> tuple[BaseGeometry, HeightMap]:
-    """Returns the area of a district's lawn, and its height above level ground.
+    """Returns the area of a district's lawn, and the height of its swells.
 
-    The height is a function of x and y in W [m].
+    The height above level ground is a function of x and y in W [m].
     """
     plan = district.plan
     rows = []
@@ -167,7 +167,7 @@ def _slope(ground: Covering, shape: GroundShape) -> Structure:
 
 
 def _height_difference(area: BaseGeometry, base: Ground) -> float:
-    """Returns the difference of height along the outline of an area [m]."""
+    """Returns greatest minus least height along an area's outline [m]."""
     outline = shapely.segmentize(area, _SPACING)
     return float(np.ptp(base(*shapely.get_coordinates(outline).T)))
 

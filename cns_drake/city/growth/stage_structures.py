@@ -85,7 +85,13 @@ class GrowingCity:
 
 
 def _at_height(structure: Structure, height: float) -> Structure:
-    """Returns a structure that has only grown to a height so far [m]."""
+    """Returns an earlier version of a structure, with a lower height [m].
+
+    A plant is younger; a building lacks upper storeys.
+
+    Raises:
+        ValueError: the structure is neither a plant nor a building.
+    """
     name, model = structure.name, structure.model
     if structure.semantic_class == "vegetation":
         return replace(structure, model=younger_plant(model, height))

@@ -180,7 +180,7 @@ class Draft:
         return structure
 
     def _foot(self, structure: Structure, fall: float) -> float:
-        """Returns the z of an object on ground that falls by `fall` [m]."""
+        """Returns an object's z on ground that falls by `fall` below it [m]."""
         p_WFs = structure.p_WFs
         assert self.ground is not None, "the ground has no shape yet"
         z = self.ground.heights(np.vstack([structure.xyz, p_WFs])[:, :2])

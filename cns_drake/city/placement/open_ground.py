@@ -38,7 +38,7 @@ def furnish_district(draft: Draft, district: District) -> None:
 
     The plan describes them in the entries `objects`, `lines`, `parking` and
     `scatter` of the district. Objects for which there is no room are left out.
-    Only for an entry of `objects`, lack of room is an error.
+    Lack of room is an error only for an entry of `objects`.
 
     Raises:
         InputError: if there is no room for an entry of `objects`, or its

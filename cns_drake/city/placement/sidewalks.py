@@ -128,8 +128,8 @@ def _place_along(
 ) -> None:
     """Places an object on a line, with its heading along the line.
 
-    With `facing_street`, it turns to the street on the right of the line, and
-    stands back so that its front (+x) touches the line.
+    With `facing_street`, the object faces the street on the right of the line,
+    and stands back so that the object's front (+x) touches the line.
     """
     model = OBJECTS[name].build(rng)
     xy, yaw = (at.x, at.y), at.yaw

@@ -96,9 +96,9 @@ class Stages(_Model):
         }
 
     def heights(self, stage: str) -> dict[str, float]:
-        """Returns name -> height [m] of structures that still have to grow.
+        """Returns the height [m] of each structure that still has to grow.
 
-        The heights are the heights in the stage `stage`. The result can contain
+        The result maps names to heights in the stage `stage`. It can contain
         structures that do not exist yet in this stage; see `absent`.
 
         Raises:
@@ -113,7 +113,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns name -> height [m] of buildings under construction.
+        """Returns the height [m] of each building under construction, by name.
 
         Raises:
             KeyError: if there is no such stage.
