@@ -98,9 +98,10 @@ class AlignmentReport:
             [deg].
         bend: greatest distance of a moved scan from where it would be if the
             whole drive had moved rigidly with its middle scan [m].
-        straightened: for the fixed and the moved drive, the upper quartile of
-            the position errors at places that the drive passes again, before
-            its drift was corrected [m]; 0 for a drive that was not corrected.
+        straightened: for the fixed and for the moved drive, the upper quartile
+            of the position errors at places that the drive passes again [m].
+            The errors are from before the drift was corrected; 0 for a drive
+            that was not corrected.
         ground: ground height that was subtracted from the heights of both
             drives [m].
     """
@@ -259,11 +260,11 @@ def align(
 def _search_from_a_guess(
     source: Submaps, target: Submaps
 ) -> tuple[LoopSearch, str, int | None]:
-    """Finds a guess that holds, and the first loops.
+    """Finds a guess of the pose X_TS that holds, and the first loops.
 
-    Returns three values: the search, which contains these loops; the source of
-    the guess; and the number of candidate pairs, or None if no place had to be
-    recognised.
+    Returns three values: the search, which contains these loops; where the
+    guess comes from, in words; and the number of candidate pairs, or None if no
+    place had to be recognised.
 
     Raises:
         InputError: no guess fits.
@@ -298,7 +299,11 @@ def _search_from_a_guess(
 
 
 def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
-    """Returns X_TS (4, 4) for worlds that differ at most in height."""
+    """Returns the pose X_TS (4, 4) of the source's world in the target's world.
+
+    The two worlds must have the same axes and horizontal origin. Their heights
+    may differ.
+    """
     offsets = target.X_WK[:, None, :3, 3] - source.X_WK[None, :, :3, 3]
     away = np.linalg.norm(offsets[:, :, :2], axis=2)
     place = away.argmin(axis=0)
@@ -316,7 +321,10 @@ def _probe(
     X_TS: np.ndarray,
     keyframes: np.ndarray | None = None,
 ) -> tuple[LoopSearch, bool]:
-    """Tests a guess at some keyframes; returns loops, and whether it holds."""
+    """Registers some keyframes from a guess, to test the guess.
+
+    Returns the search with the loops, and whether the guess holds.
+    """
     search = LoopSearch(source, target)
     X_TK = X_TS @ source.X_WK
     if keyframes is None:

@@ -136,7 +136,10 @@ def _block_matrix(
 
 
 def _adjoint(X: np.ndarray) -> np.ndarray:
-    """Returns the adjoints (M, 6, 6) of poses X, for twists (turn, move)."""
+    """Returns the adjoints (M, 6, 6) of poses X.
+
+    The first three components of a twist are the rotation.
+    """
     R, p = X[:, :3, :3], X[:, :3, 3]
     result = np.zeros((len(X), 6, 6))
     result[:, :3, :3] = result[:, 3:, 3:] = R

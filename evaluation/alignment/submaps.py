@@ -42,8 +42,8 @@ class Submaps:
         travelled: (N,) length of the path from the start to each frame [m].
         frames: (K,) frame numbers of the keyframes.
         X_WK: (K, 4, 4) poses of the LiDAR at the keyframes.
-        surface: function that returns the submap of a keyframe by index, with
-            normals; None if the submap has too few points.
+        surface: function that takes the index of a keyframe, and returns its
+            submap with normals; None if the submap has too few points.
     """
 
     def __init__(self, drive: Drive):

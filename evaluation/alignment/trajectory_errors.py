@@ -1,7 +1,7 @@
 """Errors of an estimated trajectory, such as the result of a LiDAR odometry.
 
-Two figures are in common use. X_i are ground-truth poses, Y_i the estimated
-poses at the same times, p_i and q_i their positions:
+Two measures are in common use. Let X_i be ground-truth poses, Y_i the estimated
+poses at the same times, and p_i and q_i the positions of these poses:
 
 - ATE, the absolute trajectory error: the root mean square of |p_i - R q_i - t|
   over all i. R and t are the rigid motion that minimises this error; the scale

@@ -13,9 +13,9 @@ following choices open; this module makes them.
   counts.
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
-- The two sets of a union are points of different clouds, so that the union is a
-  concatenation. TCR_sym is therefore the mean of the directed ratios, weighted
-  by the sizes of H.
+- The two sets that the paper unites contain points of different clouds, so that
+  the union is a concatenation. TCR_sym is therefore the mean of the directed
+  ratios, weighted by the sizes of H.
 """
 
 from __future__ import annotations

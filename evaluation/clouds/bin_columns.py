@@ -194,7 +194,10 @@ def _find_period(values: np.ndarray, positions: np.ndarray) -> int | None:
 
 
 def _period_of_zeros(is_value: np.ndarray, positions: np.ndarray) -> int | None:
-    """Returns the number of columns if some hold only zeros and others none.
+    """Returns the number of columns, found from columns of zeros, or None.
+
+    The number is found if some columns contain only zeros or NaN, and all other
+    columns contain neither.
 
     Args:
         is_value: (N,) whether a value is neither zero nor NaN.

@@ -104,7 +104,10 @@ def read_blocks(
 
 
 def _coarse_step(points: np.ndarray) -> float:
-    """Returns the float32 step of the farthest point if coarse, else 0 [m]."""
+    """Returns the step between float32 numbers at the farthest point [m].
+
+    The result is 0 if this step is too fine to matter.
+    """
     farthest = [
         np.abs(points[axis]).max(where=np.isfinite(points[axis]), initial=0)
         for axis in "xyz"

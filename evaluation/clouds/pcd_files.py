@@ -54,7 +54,7 @@ def read_pcd(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
 
 
 def _read_pcd_header(path: Path) -> tuple[dict[str, list[str]], int]:
-    """Returns keyword -> values, and the offset of the points [bytes]."""
+    """Returns the values of each keyword, and the points' offset [bytes]."""
     header = {}
     with open(path, "rb") as stream:
         while stream.tell() < HEADER_LIMIT_BYTES:
@@ -174,7 +174,7 @@ def _read_compressed(
 def _interleaved(
     plain: np.ndarray, dtype: np.dtype, count: int, part: slice
 ) -> np.ndarray:
-    """Returns points of a file that stores its `count` points by fields."""
+    """Returns a part of `count` points that a file stores field by field."""
     points = np.empty(len(range(count)[part]), dtype=dtype)
     start = 0
     for name in dtype.names or ():

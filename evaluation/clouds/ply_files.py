@@ -36,7 +36,7 @@ def read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     """Reads the vertices of an ascii or binary PLY file.
 
     Faces and other elements are ignored. In a binary file, elements before the
-    vertices may have no lists, because lists would hide where the vertices
+    vertices must not contain lists, because lists would hide where the vertices
     begin.
     """
     encoding, elements, offset = _read_ply_header(path)

@@ -208,7 +208,7 @@ def _check_together(
     *,
     track: bool,
 ) -> None:
-    """Checks options that need another one or exclude it, and their ranges.
+    """Checks which options are given together, and the ranges of options.
 
     Raises:
         InputError: an option cannot be used.

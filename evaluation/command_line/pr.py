@@ -210,7 +210,7 @@ def _check_together(
     overlaps: Path | None,
     exact_overlaps: Path | None,
 ) -> None:
-    """Checks options that need others, and files, before the long work.
+    """Checks files, and options that need other options, before the long work.
 
     Raises:
         InputError: an option needs another one, or a file cannot be used.

@@ -11,8 +11,8 @@ from evaluation.results.table_comparison import compare_tables
 def suggest_comparison(folder: Path) -> None:
     """Prints the command that compares a folder's results with those shipped.
 
-    Nothing is printed if that command would refuse the results, such as those
-    of an experiment for which no results are shipped.
+    Nothing is printed if that command would refuse the results, for example
+    because no results of the same experiment are shipped.
     """
     with contextlib.suppress(InputError):
         compare_tables([folder])

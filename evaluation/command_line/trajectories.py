@@ -65,7 +65,10 @@ def measure_estimate(
 
 
 def _drive_rows(found: DriveComparison) -> Iterator[tuple[str, str]]:
-    """Yields the rows of `tcr --paths`: the pair, then Boreas, then KAIST."""
+    """Yields the rows of `tcr --paths`: name and three columns of values.
+
+    The values are of the pair, of drives of Boreas, and of drives of KAIST.
+    """
 
     def shown(value: float | str, boreas: str = "", kaist: str = "") -> str:
         if isinstance(value, float):

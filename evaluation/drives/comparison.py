@@ -81,7 +81,7 @@ class DriveComparison:
         other_lane: of the stations that B meets in A's direction, the share at
             which the offset exceeds `LANE_OFFSET`.
         episode_50, episode_90: quantiles of the length of the stretches in
-        another lane [m].
+            another lane [m].
         wander: standard deviation of the offset where both drives are in the
             same lane [m].
         wander_length: distance along A at which the autocorrelation of the
@@ -235,11 +235,12 @@ def _way(drive: Drive) -> _Way:
 
 
 def _nearest(p_A: np.ndarray, direction: np.ndarray, way: _Way) -> np.ndarray:
-    """Returns the path's sample that is nearest to each point of A, (N,).
+    """Returns the nearest sample of B's path to each point of A, (N,).
 
-    A sample counts only if it lies within `MEETING_RADIUS` and its direction
-    differs by less than 90 deg from A's direction (N, 2). The index is -1 if no
-    sample counts.
+    Points of A are (N, 3). A sample counts only if it lies within
+    `MEETING_RADIUS` of the point, and if its direction differs by less than 90
+    deg from A's direction (N, 2). The result is an index of a sample, or -1 if
+    no sample counts.
     """
     xy = way.p_WS[:, :2]
     found = np.full(len(p_A), -1)
@@ -322,7 +323,7 @@ def _run_lengths(flags: np.ndarray) -> np.ndarray:
 def _quantiles(
     name: str, values: np.ndarray, *percentages: int
 ) -> dict[str, float]:
-    """Returns name -> quantile; NaN if there are no values."""
+    """Returns quantiles by name; NaN if there are no values."""
     if len(values) == 0:
         return {name.format(one): math.nan for one in percentages}
     return {

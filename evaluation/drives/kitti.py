@@ -191,7 +191,7 @@ def holds_kitti(path: Path) -> bool:
 
 
 def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
-    """Returns the scans of a drive in order, and the number of each."""
+    """Returns the scan files of a drive in order, and the scans' numbers."""
     folder = path / _SCANS
     files = listed(folder, "*.bin")
     if not files:

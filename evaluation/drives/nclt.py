@@ -5,9 +5,9 @@
 
 The table is in the drive's folder, next to the drive's folder, or in a folder
 `ground_truth` next to the drive's folder. The axes of N point north, east and
-down. B is the
-vehicle's body, with x forward, y right and z down. Points are expressed in B
-and stored as multiples of 5 mm, counted from -100 m. All sessions share N.
+down. B is the vehicle's body, with x forward, y right and z down. Points are
+expressed in B and stored as multiples of 5 mm, counted from -100 m. All
+sessions share N.
 """
 
 from pathlib import Path

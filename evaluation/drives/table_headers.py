@@ -51,7 +51,7 @@ def split_header(line: str, separator: str | None) -> list[str]:
 def find_columns(
     words: Sequence[str], names: Sequence[str]
 ) -> list[int] | None:
-    """Returns the places of columns in a table that has a header.
+    """Returns the positions of columns in a table that has a header.
 
     The known columns are `time`; `x`, `y`, `z`; `qx` to `qz` and `qw` of a
     quaternion; `roll`, `pitch`, `yaw`; `wx` to `wz` of an angular velocity; and
@@ -64,13 +64,13 @@ def find_columns(
             that is not used.
 
     Returns:
-        For each used column, its place in the table. None if the header names
-        too few of the used columns; the columns are then in the order of
+        For each used column, its position in the table. None if the header
+        names too few of the used columns; the columns are then in the order of
         `names`.
 
     Raises:
         ValueError: the header names a column twice; or it names too few
-            columns, and one of these is not at its place in `names`.
+            columns, and one of these is not at its position in `names`.
     """
     found = [_column(word) for word in words]
     if found.count("w"):

@@ -108,7 +108,7 @@ def read_numbers(
 def _places(
     header: str, row: str, separator: str | None, names: Sequence[str]
 ) -> tuple[list[int], int]:
-    """Returns the places of the columns to read, and how many columns exist.
+    """Returns the positions of columns to read, and how many columns exist.
 
     Args:
         header: line above the first row; it may be no header, or empty.

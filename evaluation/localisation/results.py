@@ -179,7 +179,7 @@ def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
 
 
 def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
-    """Returns the columns of `queries.csv` from results: name -> (K,) values.
+    """Returns the columns of `queries.csv`: a mapping from name to values (K,).
 
     Args:
         rows: (K,) results, records of `QUERY`.

@@ -89,7 +89,10 @@ def _gauss_newton_step(
     width: float,
     covariances: np.ndarray | None,
 ) -> np.ndarray:
-    """Returns a Gauss-Newton step (6,) in W: turn about the LiDAR, move."""
+    """Returns a Gauss-Newton step (6,) in W.
+
+    The step is a rotation vector about the LiDAR [rad], then a translation [m].
+    """
     arms = scan @ X_WS[:3, :3].T
     found, squares = surface.tree.batch_nearest_neighbor_search(
         arms + X_WS[:3, 3]

@@ -189,7 +189,7 @@ def _scores_by_structure(both: _Labelled) -> dict[str, float]:
 
 
 def _predicted_shares(both: _Labelled) -> dict[str, float]:
-    """Returns shares of points and structures predicted gone or new.
+    """Returns the shares of points and of structures predicted gone or new.
 
     The function also returns the share of the observed structures whose verdict
     (kept, gone or new) is right.

@@ -252,7 +252,10 @@ def _write_ply(path: Path, points: np.ndarray) -> None:
 
 
 def _g2o(X_WS: np.ndarray) -> str:
-    """Returns poses (K, 4, 4) as a g2o pose graph of steps, for LT-mapper."""
+    """Returns poses (K, 4, 4) as the text of a g2o pose graph, for LT-mapper.
+
+    Each edge is the motion from one pose to the next.
+    """
     steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
     information = " ".join(
         "1" if i == j else "0" for i in range(6) for j in range(i, 6)

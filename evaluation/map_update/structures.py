@@ -153,9 +153,10 @@ def write_structures(path: Path, rows: Iterable[StructureChange]) -> None:
 
 
 def class_names(folder: Path) -> dict[int, str]:
-    """Returns class number -> name, from the table of structures in a folder.
+    """Returns a mapping from the number of a class to the name of the class.
 
-    The result is empty if the folder has no such table.
+    The names come from the table of structures in a folder. The result is empty
+    if the folder has no such table.
 
     Raises:
         InputError: the table cannot be read.

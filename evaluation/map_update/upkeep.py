@@ -84,8 +84,8 @@ class UpkeptMap:
                 are moved to the folder of the map.
             stands: (N,) bool, points that may be added to the map. All other
                 points are on moving objects.
-            detect: compares the map with the drive; not called for the first
-                drive, which has no map to compare with.
+            detect: function that compares the map with the drive. It is not
+                called for the first drive, which has no map to compare with.
         """
         self._gone.append(session.points[~stands])
         session = replace(

@@ -1,4 +1,4 @@
-"""Cells of regular grids: numbers that sort like cells, extremes in cells."""
+"""Cells of regular grids: a number for each cell, and extremes in cells."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _AXIS_STEPS = np.array([CELLS_PER_AXIS**2, CELLS_PER_AXIS, 1])
 def packed_cells(cells: np.ndarray) -> np.ndarray:
     """Returns a number for each cell of a grid, (N,) int64.
 
-    The numbers sort like the cells.
+    In the order of these numbers, cells are sorted by x, then by y, then by z.
 
     Args:
         cells: (N, 3) int64 indices along x, y and z, from -2^20 to below 2^20.
@@ -20,15 +20,15 @@ def packed_cells(cells: np.ndarray) -> np.ndarray:
 
 
 def cell_keys(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns a number for each cell of a grid that is near enough.
+    """Returns a number for each cell whose indices are small enough.
 
     Args:
         cells: (N, 3) float64 indices along x, y and z.
 
     Returns:
-        (M,) int64 numbers, which sort like the cells; and (N,) bool, which
-        cells have a number. Only cells with indices from 0 to below 2^21 have a
-        number.
+        (M,) int64 numbers, see `packed_cells` for their order; and (N,) bool,
+        which cells have a number. Only cells with indices from 0 to below 2^21
+        have a number.
     """
     with np.errstate(invalid="ignore"):
         is_near = (cells >= 0) & (cells < CELLS_PER_AXIS)

@@ -15,8 +15,8 @@ images of KITTI differ from the program's descriptors by less than 1e-4 of their
 length. Deliberate differences:
 
 - `evaluation.clouds.count_images.count_image` makes the image of a scan.
-- An image without pixels has no descriptor. A place with such an image is never
-  a candidate, and a query with such an image has no candidates.
+- An image whose pixels are all 0 has no descriptor. A place with such an image
+  is never a candidate, and a query with such an image has no candidates.
 """
 
 from collections.abc import Iterator
@@ -55,7 +55,7 @@ _EMBEDDING = "encoder.embedder.embedder.network"
 
 
 def _embedding_shapes(name: str, channels: int) -> dict[str, tuple[int, ...]]:
-    """Returns name -> shape of the weights of one network of `_embedded`."""
+    """Returns the shapes of one network's weights, by name, for `_embedded`."""
     kernels = {
         "embed1.0": (64, 32, 3, 3),
         "embed1.2": (64, 64, 3, 3),

@@ -2,8 +2,9 @@
 
 A scan becomes maps from above: one for each layer of height, one for poles and
 one for kerbs. Two scans are compared at the pose at which the greatest number
-of their filled cells coincide. Objects that are gone or new only lower this
-number, while unchanged objects all coincide at the same pose.
+of their filled cells coincide. Objects that are gone or new lower this number
+but do not change the pose, because unchanged objects all coincide at the same
+pose.
 
 Matched filters for place recognition come from Joseph, Fischer and Milford
 (arXiv 2409.03998), who use one map of occupied cells. Layered overlap adds the
@@ -252,7 +253,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray
     ) -> np.ndarray:
-        """Returns the best pose of two scans and common cells; see `climb`."""
+        """Returns the best pose of two scans and their overlap; see `climb`."""
         return climb(
             query.cells,
             query.starts,
@@ -358,7 +359,10 @@ def _overlaps_beyond_chance(
 def _maps_of_places(
     places: Sequence[LayeredScan], halvings: int, margin: int
 ) -> CoarseMaps:
-    """Returns coarse maps of places as recorded, with a margin of rows."""
+    """Returns coarse maps of places at one heading, with a margin of rows.
+
+    The heading is the heading of the recorded scan.
+    """
     maps = [_maps_of_scan(place, turns(1), halvings) for place in places]
     bits = np.concatenate([one.bits for one in maps])
     return CoarseMaps(

@@ -196,7 +196,7 @@ class Learned(Method[LearnedScan, LearnedDatabase]):
         return yaw_pose(yaw)
 
     def _warn_if_it_sees_little(self, image: np.ndarray) -> None:
-        """Warns once if the sensor sees less than any sensor in training."""
+        """Warns once if fewer sectors have points than in any training scan."""
         if self._warned:
             return
         seen = share_of_seen_sectors(image)

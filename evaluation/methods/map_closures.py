@@ -67,7 +67,7 @@ class MapClosuresDatabase:
         num_queries: number of queries so far.
         query: local map of the last query Q.
         found: place P -> number of inliers, and pose X_PQ (4, 4) of the last
-            query.
+            query at this place.
     """
 
     num_places: int

@@ -77,11 +77,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             of beams.
         rerank_best: number of top-ranked places that a second stage, `rerank`,
             compares by their points; 0 without a second stage.
-        divides: whether a database can be searched part by part, because it is
-            too large for the memory. If so, the score and the pose of a place
-            must not depend on other places, except through `shortlist`.
-        describe_time: typical CPU time to describe a cloud [s], by which a
-            study forecasts how long it takes.
+        divides: whether a database that is too large for the memory can be
+            searched part by part. If so, the score and the pose of a place must
+            not depend on other places, except through `shortlist`.
+        describe_time: typical CPU time to describe a cloud [s], from which a
+            study forecasts its own duration.
         config: the parameters in use.
 
     Example:

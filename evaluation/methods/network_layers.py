@@ -66,7 +66,7 @@ def interpolated(
 
 
 def batch_norm_shapes(names: str, channels: int) -> dict[str, tuple[int, ...]]:
-    """Returns name -> shape of the weights of batch normalisations.
+    """Returns the shapes of the weights of batch normalisations, by name.
 
     `names` are the names of the layers, separated by spaces.
     """

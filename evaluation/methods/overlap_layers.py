@@ -92,8 +92,9 @@ def _ground_below(
     """Returns the height of the ground below each point (N,) [m].
 
     In each sector, the lowest points of successive rings give the height of the
-    ground. The search begins with the ground `start` below the sensor, and
-    continues outwards to `half` in x and y [m].
+    ground. The search begins at the sensor, below which the ground has the
+    height `start`, and continues outwards up to a distance of `half` in x and y
+    [m].
     """
     # Sectors divide the sides of a square evenly. Angles would need an arc
     # tangent, whose last bits differ between processors.

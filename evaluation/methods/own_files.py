@@ -1,4 +1,4 @@
-"""Python files of users, whose faults are reported in one line.
+"""Loads Python files of users, and reports a fault in a file in one line.
 
 A user's file defines a method of place recognition, or an estimator of poses.
 """

@@ -4,7 +4,7 @@ SVT-Net and DPA-Net use these clouds. As in PointNetVLAD's program (Uy and Lee,
 CVPR 2018), points near the largest plane are removed. The other points are
 downsampled to 4096 points, centred, and scaled so that the mean distance from
 the centre is 1/2. Points outside of [-1, 1] are replaced by other points. As in
-that program, x points backwards. Deliberate differences:
+that program, the x axis is directed backwards. Deliberate differences:
 
 - A place is one scan of a spinning LiDAR, not 20 m of a planar scanner.
 - Random draws have a fixed seed.

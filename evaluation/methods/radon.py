@@ -10,10 +10,10 @@ def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
     Let u be the column and v the row of a pixel, counted from the centre of the
     image. The ray s of angle t is u cos t - v sin t = s, where s also counts
     pixels from the centre. Axes and values agree with torch-radon (Ronchetti
-    2020). A ray within 45 degrees of the vertical samples the image
-    once in each row, any other ray once in each column. Each sample
-    interpolates between the two nearest pixels; a sample outside the image is
-    zero. The sum of the samples is multiplied by the distance between samples.
+    2020). A ray within 45 degrees of the vertical samples the image once in
+    each row, any other ray once in each column. Each sample interpolates
+    between the two nearest pixels; a sample outside the image is zero. The sum
+    of the samples is multiplied by the distance between samples.
 
     A pixel at distance d from a ray contributes hat(d / w) / w with w =
     max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).

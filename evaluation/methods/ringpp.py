@@ -326,7 +326,7 @@ def _without_duplicates(points: np.ndarray) -> np.ndarray:
 
 
 def _frequency_weights(n: int) -> np.ndarray:
-    """Returns for how many of n frequencies each stored one stands.
+    """Returns how many of n frequencies each stored frequency represents.
 
     Of n frequencies, n // 2 + 1 are stored.
     """

@@ -2,9 +2,10 @@
 
 A scan becomes a small image of heights around the sensor: over range and
 azimuth (polar context) or along and across the road (cart context). Two keys
-are means of this image. The retrieval key, which does not change with heading
-(or lane offset), finds candidates in a KD-tree. The aligning key gives the
-shift of the columns at which two images are compared.
+are means of this image. The retrieval key finds candidates in a KD-tree; it
+does not change with the heading (in a polar context) or with the lane offset
+(in a cart context). The aligning key gives the shift of the columns at which
+two images are compared.
 
 The polar context of a place changes if the place is seen from the next lane.
 The augmented variant therefore stores each place of the database three times:
@@ -16,8 +17,8 @@ scores agree with this program to 1e-15 for all variants except
 `min_points: 1` and `far_points: dropped`, scores agree with the authors' C++
 program to 3e-4, the precision of its heights. Deliberate differences:
 
-- The voxels for downsampling start at the sensor. The T-RO program leaves this
-  to MATLAB, the C++ program to its caller.
+- The voxels for downsampling start at the sensor. The T-RO program leaves their
+  origin to MATLAB, and the C++ program leaves it to its caller.
 - The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
 - A function of the T-RO program wrongly adds up the shifts that it tries; the
   code here follows a corrected copy of this function.

@@ -1,9 +1,10 @@
 """Sparse convolutions, for inference: only occupied cells have features.
 
 The convolutions follow MinkowskiEngine 0.5 (Choy, Gwak, Savarese: CVPR 2019),
-so that weights made with it can be used. Only cells with a feature have a
-result. The offsets of a kernel vary along x first, then y, then z. A kernel of
-odd size is centred at its cell; a kernel of even size begins at its cell.
+so that weights trained with MinkowskiEngine can be used. Only cells with a
+feature have a result. The offsets of a kernel vary along x first, then y, then
+z. A kernel of odd size is centred at its cell; a kernel of even size begins at
+its cell.
 """
 
 import numpy as np

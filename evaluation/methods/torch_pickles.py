@@ -29,14 +29,14 @@ class _Name(NamedTuple):
 
 
 class _TensorStorage(NamedTuple):
-    """The numbers of tensors: their type, and their file in the archive."""
+    """Stored values of tensors: their type, and their file in the archive."""
 
     kind: str
     key: str
 
 
 class StoredTensor(NamedTuple):
-    """A tensor: a view of a storage; offset and steps count numbers."""
+    """A tensor: a view of stored values; offset and steps count values."""
 
     storage: _TensorStorage
     offset: int
@@ -49,7 +49,9 @@ _OPAQUE = object()
 
 
 def unpickle_tensors(pickle: bytes) -> Any:
-    """Returns the object of a pickle. Of all classes, only tensors are made.
+    """Returns the object that a pickle contains.
+
+    Each tensor is a `StoredTensor`; no object of another class is made.
 
     Raises:
         ValueError: the pickle is damaged, or has too many instructions.

@@ -37,7 +37,7 @@ _LEGACY = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."
 def read_weights(
     path: Path, shapes: Mapping[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Returns name -> tensor (float32) of a network's weights.
+    """Returns the tensors (float32) of a network's weights, by name.
 
     Numbers of other types are converted. The dictionary of tensors may lie
     inside other dictionaries, and all names in it may have the same prefix,
@@ -86,7 +86,7 @@ def read_weights(
 def _find_state(
     path: Path, found: Any, shapes: Mapping[str, tuple[int, ...]]
 ) -> dict[str, Any]:
-    """Returns wanted name -> object, of the best dictionary of tensors."""
+    """Returns the wanted objects of the best dictionary of tensors, by name."""
     best: list[tuple[str, dict[str, Any]]] = [("", {})]
     for place, inner in _dictionaries(found, "", _DEEPEST, set()):
         # All wanted names may have the same prefix.
@@ -115,7 +115,11 @@ def _find_state(
 def _dictionaries(
     value: Any, place: str, levels: int, seen: set[int]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yields a dictionary and each dictionary in it once, with its place."""
+    """Yields a dictionary and each dictionary inside it once, with its keys.
+
+    The keys that lead to a dictionary are appended to `place`, separated by
+    dots.
+    """
     if not isinstance(value, dict | list | tuple) or hasattr(value, "_fields"):
         return
     if levels and id(value) not in seen:

@@ -107,7 +107,10 @@ def aims(
 def _auc_differences(
     results: Sequence[PlaceOutcome],
 ) -> dict[tuple[str, str, str, str], float]:
-    """Returns (map, database, query, method) -> our AUC minus the paper's."""
+    """Returns our AUC minus the AUC in the paper.
+
+    The keys of the result are (map, database, query, method).
+    """
     found = {}
     for result in results:
         mode = paper().mode(result.method)

@@ -177,7 +177,7 @@ def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
 def _first_to_last(
     changes: Iterable[tuple[str, str, float]],
 ) -> dict[str, float]:
-    """Returns map -> TCR_sym between the map's first and last stage.
+    """Returns TCR_sym between the first and the last stage of each map.
 
     Args:
         changes: (map, earlier stage, TCR_sym) of pairs whose later stage is the

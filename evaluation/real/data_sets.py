@@ -40,7 +40,8 @@ class DataSet(NamedTuple):
     Attributes:
         folder: name of the data set's folder.
         scans: pattern of the files in this folder.
-        world: name of the place, which several data sets can share.
+        world: name of the region where the scans were recorded; several data
+            sets can share it.
         unit: name of the LiDAR's unit.
         height: height of the LiDAR above the ground [m].
         origin: repository of the data set, and path in this repository.
@@ -54,8 +55,8 @@ class DataSet(NamedTuple):
         read: function that reads a scan; None for files with an ending that
             `evaluation.clouds.cloud_files.read_cloud` knows.
         whole: whether the scans contain all points that the LiDAR measured.
-        columns: number of columns of its `.bin` files; in files with another
-            digest, the number is found from the values.
+        columns: number of columns of the data set's `.bin` files. If the files
+            have another digest, the number is found from the values.
     """
 
     folder: str
@@ -162,13 +163,13 @@ DATA_SETS = (
 
 @dataclass(frozen=True)
 class DataSetSource:
-    """A function that opens a data set, for any process.
+    """A function that opens a data set, and that any process can call.
 
     Attributes:
         folder: folder of the data set.
         data_set: its name and layout.
-        columns: number of columns of its `.bin` files; None to find it from the
-            values.
+        columns: number of columns of the data set's `.bin` files; None to find
+            the number from the values.
     """
 
     folder: Path
@@ -286,7 +287,7 @@ def _open_files(
 
 
 def _named_poses(table: Path, files: Sequence[Path]) -> np.ndarray:
-    """Returns the poses in a table that belong to files named by numbers."""
+    """Returns the poses of scan files whose names are numbers, from a table."""
     try:
         numbers = np.array([int(file.stem) for file in files])
     except ValueError as error:

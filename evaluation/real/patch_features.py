@@ -50,7 +50,7 @@ def patches(scan: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 
 
 def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Returns the features of a piece of a scan: name -> value.
+    """Returns the features of a piece of a scan, by name.
 
     A name begins with the group of the feature, such as `intensity`.
 

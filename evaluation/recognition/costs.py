@@ -24,7 +24,7 @@ class QueryCost:
 
     Attributes:
         places: number of places.
-        place_bytes: mean size of a place's pickled descriptor.
+        place_bytes: mean size of a place's pickled descriptor [bytes].
         memory: size of the pickled descriptors of all places [bytes].
         build_ms: CPU time to build the database from descriptors [ms].
         query_ms: median CPU time to compare a query with all places [ms], see
@@ -51,7 +51,7 @@ class Cost:
         describe_ms: time to describe a query's cloud [ms].
         query_ms: time to compare a query with all places [ms], see `query_ms`.
         places: number of places.
-        place_bytes: mean size of a place's pickled descriptor.
+        place_bytes: mean size of a place's pickled descriptor [bytes].
     """
 
     method: str

@@ -114,7 +114,8 @@ def fault_kinds(result: PlaceOutcome, evidence: PairEvidence) -> list[str]:
           place's sensor.
         - `no_overlap`: the right place's scan shows less than half of the
           query's scan, for another reason.
-        - `changed`: at least a quarter of the surroundings is new or gone.
+        - `changed`: at least a quarter of the upright points of the query and
+          of its right place show a change.
         - `twin` (perceptual aliasing): the top-ranked place resembles the query
           as much as the right place does.
         - `unexplained`: no other kind applies.

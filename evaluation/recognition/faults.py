@@ -32,8 +32,8 @@ def faults(
         outcomes: outcomes of Q queries.
         match_frames: (Q,) frame of the top-ranked place; -1 without a
             candidate.
-        distances: (Q,) distance to the top-ranked place [m]; NaN in another
-            city.
+        distances: (Q,) distance to the top-ranked place [m]; NaN if this place
+            is in another city.
         radius: radius of a match [m].
 
     Returns:

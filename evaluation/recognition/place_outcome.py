@@ -182,7 +182,7 @@ class PlaceOutcome:
 
     @cached_property
     def by_mode(self) -> Mapping[Mode, PlaceRecognitionMetrics]:
-        """Mode -> metrics, of all queries or of the queries with a match."""
+        """Metrics by mode: of all queries, or of the queries with a match."""
         return {mode: evaluate(self.outcomes, mode) for mode in MODES}
 
     @cached_property
@@ -191,10 +191,10 @@ class PlaceOutcome:
         return pose_metrics(self.pose_errors, self.outcomes)
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns the AUC for several radii of a match: radius [m] -> AUC.
+        """Returns a mapping from the radius of a match [m] to the AUC.
 
-        All queries count. The AUC is NaN if no query has a match within the
-        radius.
+        The mapping contains several radii. All queries count. The AUC is NaN if
+        no query has a match within the radius.
         """
         found = {}
         for radius in RADII:

@@ -51,15 +51,16 @@ class RetrievalProtocol:
             `middle`; or `first`, as in the paper. A method's own parameter
             `place` overrides this value. With one scan per place, the value
             becomes None.
-        exclude_recent: for a drive that is compared with itself: a query is
-            compared only with places that the drive passed at least this time
-            before the query [s]. None if two drives are compared.
+        exclude_recent: how long before a query the drive must have passed a
+            place, so that the query is compared with this place [s]. None if
+            two drives are compared.
         overlap: share of a query's scan, up to 1, that a place's scan must show
             so that the place is a match at any distance (see
             `evaluation.recognition.overlap_truth`). None if places within
             `radius` are matches.
-        gate: geometric verification, which rejects top-ranked places that lie
-            beyond the radius according to the method's own pose estimate.
+        gate: whether geometric verification is used, which rejects top-ranked
+            places that lie beyond the radius according to the method's own pose
+            estimate.
         turn_queries: whether each query is rotated by a random yaw. Places stay
             as recorded.
         tilt_queries: largest random roll and pitch of the tilt of each query,
@@ -218,7 +219,7 @@ class RetrievalProtocol:
 
     @property
     def _counted_fields(self) -> dict[str, object]:
-        """Name -> value of the fields that change a number."""
+        """The fields that change a result: a mapping from name to value."""
         values = asdict(self)
         del values["gate"]
         if not self._changes_queries:
@@ -263,7 +264,7 @@ class RetrievalProtocol:
         return replace(self, place=other.place, **other._query_changes)
 
     def descriptor_options(self, *, queries: bool = True) -> dict[str, object]:
-        """Returns name -> value of the options that affect descriptors.
+        """Returns the options that affect descriptors, as name -> value.
 
         Args:
             queries: whether the drive has queries, and not only places.
@@ -277,7 +278,7 @@ class RetrievalProtocol:
         return values
 
     def to_json(self) -> dict[str, object]:
-        """Returns name -> value of all options of the protocol."""
+        """Returns all options of the protocol, as name -> value."""
         return asdict(self)
 
     def to_text(self) -> str:

@@ -154,7 +154,8 @@ def compare_with_gates(
         query: drive with described queries, in the same world frame.
         protocol: protocol by which both drives were described; its field `gate`
             does not matter.
-        gate_radii: radii of geometric verification [m]; None stands for none.
+        gate_radii: radii of geometric verification [m]; None in place of a
+            radius stands for scores without geometric verification.
         overlaps: (Q, D) share of each query's scan that each place's scan
             shows; needed for matches by overlap.
         is_known: (Q, D) bool, which places are allowed for each query; by

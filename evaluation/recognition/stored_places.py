@@ -118,7 +118,7 @@ class StoredDescriptors(Sequence[Any]):
 
     @property
     def groups(self) -> list[slice]:
-        """The places of each group that is in memory at a time."""
+        """The places of each group of drives, as a slice of the sequence."""
         group = self._drives.group_of[self._drive_of]
         starts = np.flatnonzero(np.diff(group, prepend=-1)).tolist()
         ends = [*starts[1:], len(self)]

@@ -1,4 +1,4 @@
-"""The charts of a report: AUC over TCR_sym, and without and with the change."""
+"""The charts of a report: AUC over TCR_sym, and AUC with and without change."""
 
 from pathlib import Path
 

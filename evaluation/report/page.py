@@ -217,7 +217,7 @@ def write_page(path: Path, report: Report) -> None:
 
 
 def _shown_tables(report: Report) -> dict[str, list[Table]]:
-    """Returns name of a file -> its tables for print."""
+    """Returns the tables for print of each file, by the file's name."""
     results = report.recognitions
     # The last one is counted as the reference did.
     counted: list[tuple[Sequence[PlaceOutcome], Mode | None, Reference]] = [
@@ -270,7 +270,7 @@ def _captioned(table: Table) -> str:
 
 
 def _drives_of_maps(report: Report) -> dict[str, list[str]]:
-    """Returns map -> its drives, in the order of stages.
+    """Returns the drives of each map, in the order of stages.
 
     A drive that is in no pair stands under its own name.
     """

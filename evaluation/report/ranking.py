@@ -38,7 +38,7 @@ def ranked_methods(
 
 
 def further_columns(results: Results) -> dict[str, dict[str, Ranked]]:
-    """Returns further columns of the ranking: column -> method -> mean.
+    """Returns further columns of the ranking, each with a mean per method.
 
     The columns are shares of the queries with a match: R@1; near misses, which
     are wrong top-ranked places within twice the radius of a match; and the pose

@@ -89,7 +89,7 @@ def _by_one_protocol(rows: Sequence[Row], path: Path) -> tuple[Row, ...]:
 
 
 def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
-    """Returns (method with settings, condition) -> row or answers.
+    """Returns rows or answers by (method with settings, condition).
 
     An unknown digest of a protocol is taken for the shipped protocol's digest.
     """

@@ -1,4 +1,4 @@
-"""Writes the page of an experiment: findings, charts, numbers and its file."""
+"""Writes the page of an experiment: findings, charts, numbers, YAML file."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import math

@@ -1,4 +1,4 @@
-"""The frame of all pages: one style, sections to choose from, sorted tables.
+"""The frame of all pages: one style, sections that unfold, sortable tables.
 
 A page needs neither a network nor other files.
 """

@@ -344,7 +344,7 @@ def _answer_cell(value: Any, kind: type) -> str:
 def _answer_columns(
     lines: Sequence[TableLine], names: Iterable[str], task: str
 ) -> dict[str, np.ndarray]:
-    """Returns column -> checked values of all lines with the same key."""
+    """Returns the checked values of all lines with the same key, by column."""
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]

@@ -65,8 +65,9 @@ class Comparison:
         conditions: number of the conditions that all tables have; 0 for
             rankings.
         ranked: methods, the best first. If a method is in two tables, or is
-            also shipped, the name of the table is appended to its name. If only
-            rankings are compared, each table is ranked over its own conditions.
+            also shipped, the name of the table is appended to the name of the
+            method. If only rankings are compared, each table is ranked over its
+            own conditions.
         differences: differences between any two methods whose answers to all
             queries are known.
         agreements: how similarly any two tables rank their methods, if they
@@ -150,8 +151,8 @@ def compare_tables(
             common; one can contain simulated drives and another real drives.
 
     Raises:
-        InputError: a table cannot be read, has no such row, contradicts the
-            answers beside it, or the tables have no condition in common.
+        InputError: a table cannot be read, has no row to compare, contradicts
+            the answers beside it, or the tables have no condition in common.
     """
     if protocol not in (None, *PROTOCOL_NAMES):
         names = ", ".join(PROTOCOL_NAMES)
@@ -214,7 +215,7 @@ def _compared_values(
     metric: str,
     paths: Sequence[Path],
 ) -> Comparison:
-    """Compares the values of all tables in the conditions of all tables."""
+    """Compares the values of all tables in the conditions that all have."""
     common, notes = common_conditions(own, shipped, paths)
     common, left_out = without_controls(common)
     tables = [reduced_to(table, common) for table in (shipped, *own)]
@@ -306,7 +307,7 @@ def _mismatch_notes(
     entries: Mapping[str, tuple[MetricTable, str]],
     common: Sequence[Condition],
 ) -> Iterator[str]:
-    """Yields notes on results that are not of the same queries or version."""
+    """Yields notes on results of different queries or program versions."""
     rows = {
         name: [table.rows[method, one] for one in common]
         for name, (table, method) in entries.items()

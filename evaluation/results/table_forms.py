@@ -290,7 +290,7 @@ def protocol_columns(path: str) -> Columns[Any]:
     the name of the protocol.
 
     Args:
-        path: where an item holds its result: the name of an attribute and a
+        path: the attribute in which an item holds its result, followed by a
             dot, such as `result.`; "" if an item is a result.
     """
     columns = keyed(
@@ -359,7 +359,7 @@ def in_table_order(methods: Iterable[str]) -> list[str]:
 
 
 def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
-    """Returns items grouped by pair of drives: pair -> its items.
+    """Returns the items of each pair of drives, by pair.
 
     Each item has an attribute `pair`.
     """

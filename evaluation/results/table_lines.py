@@ -167,7 +167,7 @@ class TableLines:
         file: the file, for errors.
         columns: name of a column -> its position in a line.
         factors: names of the columns with factors.
-        rows: number of a line in the file, and the texts of its cells.
+        rows: for each line, its number in the file and the texts of its cells.
     """
 
     file: Path

@@ -54,7 +54,7 @@ class MethodChoice:
 
     @property
     def columns(self) -> dict[str, Setting]:
-        """Column of tables -> value of each setting."""
+        """Value of each setting, by its column in the tables."""
         return {
             f"{SETTINGS}{self.name}.{name}": value
             for name, value in self.settings
@@ -104,8 +104,8 @@ class MethodChoice:
 def _digests(value: object) -> Iterator[tuple[str, list[str]]]:
     """Yields the files and folders that settings name, with their digests.
 
-    Settings can be lists, or settings of their own. A text counts as a path
-    only if there is such a file.
+    A setting can be a list, or a mapping of further settings. A text counts as
+    a path only if there is such a file.
     """
     if isinstance(value, Mapping):
         value = list(value.values())
@@ -139,7 +139,7 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
 
 
 def with_standard(names: Iterable[str]) -> list[str]:
-    """Returns names of methods; all standard methods replace `standard`.
+    """Returns names, with `standard` replaced by all standard methods.
 
     Raises:
         InputError: a method is named twice.
@@ -155,7 +155,7 @@ def with_standard(names: Iterable[str]) -> list[str]:
 def method_settings(
     texts: Iterable[str], names: Sequence[str]
 ) -> dict[str, dict[str, Setting]]:
-    """Returns name of each method -> its settings, by name.
+    """Returns the settings of each method, by the method's name.
 
     Args:
         texts: `METHOD.NAME=VALUE` each. If there is only one method, its name

@@ -142,7 +142,7 @@ class CityReport:
     def _add_second_runs(
         self, published: Engine
     ) -> dict[tuple[str, str], list[Pair]]:
-        """Adds second runs; returns names of drives -> their second runs."""
+        """Adds second runs; returns them by the names of their drives."""
         repeated: dict[tuple[str, str], list[Pair]] = {}
         for pair in self._pairs:
             own = self._measured_or_control(pair)
@@ -188,7 +188,7 @@ class CityReport:
                 yield single, replace(pair, names=(names, pair.query.name))
 
     def _further_descriptors(self) -> dict[str, tuple[Further, ...]]:
-        """Returns drive -> its descriptors that second runs need."""
+        """Returns the descriptors that second runs need, by drive."""
         roles: dict[str, dict[Repeat, set[Role]]]
         roles = defaultdict(lambda: defaultdict(set))
         for (database, query), repeats in self._repeats.items():

@@ -180,7 +180,8 @@ class Engine:
     def _baselines(self) -> dict[tuple, dict[int, dict[str, Any]]]:
         """Returns the baseline's results by map, drives and protocol.
 
-        For each of these, the results are by seed and task.
+        The results for one map, pair of drives and protocol are a mapping by
+        seed, and for each seed a mapping by task.
         """
         baselines: dict[tuple, dict[int, dict[str, Any]]] = {}
         for one in self.measured:
@@ -232,7 +233,7 @@ def made_tasks(
     known: Mapping[str, type[Task]],
     source: str,
 ) -> dict[str, Task]:
-    """Returns name -> task, with its settings.
+    """Returns the tasks by name, each with its settings.
 
     Args:
         wanted: name of a task -> its settings.

@@ -72,7 +72,9 @@ class ExtractionJobs(Jobs):
         return self.features(drive, needs).drive
 
     def features(self, drive: NamedDrive, needs: list[str]) -> FeatureFiles:
-        """Returns the files of a drive's features, and adds their job.
+        """Returns the files of a drive's features.
+
+        The job that makes these files is added.
 
         Args:
             drive: the drive.

@@ -243,7 +243,9 @@ class _ComparedScan:
 def _changed_share(
     place: _ComparedScan, query: _ComparedScan, classes: Mapping[int, str]
 ) -> tuple[float, str]:
-    """Returns the share of two scans that is new or gone, and its main class.
+    """Returns the share of two scans that is new or gone, and a class.
+
+    The class is the class of structures with most of the new or gone points.
 
     A point is new or gone if it lies on a structure that has no point in the
     other scan, although nothing occludes the point from the other sensor.

@@ -242,7 +242,7 @@ class FeatureExtraction(Step):
 
     @property
     def _asked(self) -> dict[str, Further]:
-        """Name of each descriptor -> method, roles and protocol."""
+        """Method, roles and protocol of each descriptor, by its name."""
         asked = {
             one.key: (one, self.roles, self.protocol) for one in self.methods
         }

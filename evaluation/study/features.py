@@ -53,7 +53,7 @@ class DriveSummary:
 
     @property
     def drive_map(self) -> DriveMap:
-        """The map, with the names of the drive, its world and its map."""
+        """The voxel map of the drive, with the drive's name and positions."""
         return DriveMap(self.name, self.coarse, self.positions, self.placed)
 
 

@@ -60,7 +60,7 @@ def shown_overlaps(
         described: files with a method's descriptors of database and query, from
             which the poses are read.
         choice: the method.
-        protocol: protocol by which the queries are shown.
+        protocol: protocol that says how the scans of queries are changed.
         radii: radii of a match [m].
         beside: files with the scans of further drives in the same world, and
             with a method's descriptors of their places.
@@ -272,7 +272,7 @@ def _overlaps_of_matches(
 ) -> np.ndarray:
     """Returns how much of each query's scan its best match shows, (Q,).
 
-    Matches follow from the places of the scans, and not from a method. The
+    Matches follow from the positions of the scans, and not from a method. The
     overlaps of a radius are therefore computed once for all methods.
 
     Args:
@@ -318,8 +318,8 @@ def _method_outcomes(
         database: the places that are searched.
         query: the described queries.
         protocol, radii: see `measure_places`.
-        shown: function that returns overlaps (Q,) of the queries for a radius
-            and the matches (Q, D) within it.
+        shown: function that takes a radius, and the matches (Q, D) within this
+            radius, and returns the overlaps (Q,) of the queries.
         reporter: reports notes.
         truth, leaves_out_slow: see `measure_places`.
         leaves_out_itself: see `Pair`.

@@ -120,10 +120,10 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
 def _with_scenario(
     drives: Sequence[Path], on_note: Callable[[str], None]
 ) -> list[Path]:
-    """Returns drives without those in KITTI's layout that lack a scenario.
+    """Leaves out the drives in KITTI's layout without a scenario.
 
     Args:
-        drives: paths of the drives, at least one.
+        drives: paths of all drives, at least one.
         on_note: is called with a note if drives are left out.
 
     Raises:

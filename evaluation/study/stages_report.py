@@ -258,8 +258,8 @@ class StagesReport:
         """Returns the rows of a table that the report shows.
 
         These are rows whose database is a single recording, other than the
-        query. Rows of other tasks than `change` also need geometric
-        verification if the protocol has it, and no verification otherwise.
+        query. For all tasks except `change`, these are rows with geometric
+        verification if the protocol has it, and otherwise rows without.
         """
         names = {one.name for one in self.recordings}
         shown = (

@@ -202,7 +202,7 @@ def read_tree(stream: BinaryIO, most: int) -> Any:
 
     Args:
         stream: the encoded value, from its beginning.
-        most: number of bytes of the tree that are read at most.
+        most: greatest number of bytes of the tree that are read.
     """
     (length,) = _LENGTH.unpack(stream.read(_LENGTH.size))
     return json.loads(stream.read(min(length, most)))

@@ -56,7 +56,7 @@ class DriveTrack:
 
 
 class _QueryRows(NamedTuple):
-    """What the rows of a result's queries show.
+    """The data for the rows of the queries of one result.
 
     `query` and `match` contain the columns `_FRAME_COLUMNS` of the queries and
     of their top-ranked places.

@@ -61,7 +61,7 @@ class Survival(NamedTuple):
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Pairs the results with and without a change of the city.
+    """Puts the results without and with a change of the city together.
 
     Args:
         rows: rows of pairs of drives, and of their controls.

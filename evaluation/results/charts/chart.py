@@ -51,7 +51,7 @@ class Chart:
 
     @property
     def panel_rows(self) -> dict[str, list[Row]]:
-        """Title of each panel -> its rows.
+        """The rows of each panel, by the panel's title.
 
         There is one panel per map. If the chart itself compares maps (`over` is
         `map`), it has a single panel without a title.
@@ -103,7 +103,7 @@ def start_at_zero(axes: Axes, x: str = "", y: str = "") -> None:
 
     Args:
         axes: a panel in which everything is drawn.
-        x, y: name of what the axis shows; empty for an axis that stays.
+        x, y: name of what the axis shows; empty to leave the axis unchanged.
     """
     limits = [range_of(name) for name in (x, y)]
     is_least = [limit is not None and limit.least == 0.0 for limit in limits]

@@ -147,7 +147,7 @@ def _renamed(
 def _legend(
     figure: Figure, looks: Mapping[str, tuple[str, str, str]]
 ) -> dict[str, tuple[str, str, str]]:
-    """Returns the looks of methods, without a line style if none is drawn."""
+    """Returns methods' styles; the line style is empty if no line is drawn."""
     with_line = {
         line.get_color()
         for axes in figure.axes

@@ -1,4 +1,7 @@
-"""Lines: a metric over a numeric factor, with a band over the seeds."""
+"""Lines: a metric over a numeric factor, with a band.
+
+The band reaches from the lowest to the highest result among the seeds.
+"""
 
 from collections.abc import Sequence
 

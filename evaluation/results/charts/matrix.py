@@ -97,7 +97,7 @@ def _cells(
     metric: str,
     losses: Collection[tuple[object, ...]],
 ) -> dict[tuple[str, Any], _Cell]:
-    """Returns (method, value of the factor) -> cell of a panel."""
+    """Returns the cells of a panel, by method and value of the factor."""
     strips: dict[tuple[str, Any], list[tuple[Any, float, bool]]] = {}
     for mean in means(rows, *columns):
         label, value, strip = mean.key

@@ -145,7 +145,7 @@ class LocaliseTask(Task):
     def _named_results(
         self, found: Sequence[np.ndarray]
     ) -> Iterator[tuple[str, Any]]:
-        """Yields the name of each method and initial error, and its queries."""
+        """Yields name and localised queries per method and initial error."""
         starts = self.settings["starts"]
         rows = iter(found)
         if not found:

@@ -94,10 +94,10 @@ class Pair:
             database, from older to newer.
         keep: which places of these drives and of the database drive are kept,
             see `evaluation.recognition.kept_places.kept_places`.
-        ages: for an aged city, the years that it has aged by at each drive of
-            the database and at the query; empty if the city does not age.
-        leaves_out_itself: whether a drive is compared with itself, and each
-            scan with all other scans.
+        ages: number of years by which the city has aged at each drive of the
+            database, and at the query drive; empty if the city does not age.
+        leaves_out_itself: whether database and query are the same drive; each
+            scan is then compared with all other scans.
         may_repeat: whether the pair can repeat drives of another pair, because
             its condition changes the queries (random yaw, tilt or occluded
             sector) or adds distractors. A task whose results depend only on the

@@ -212,7 +212,7 @@ def measure_costs(
     keep: str | int = KEEP_ALL,
     cell: float = math.inf,
 ) -> dict[str, QueryCost]:
-    """Returns the cost of searching a database: key of a method -> cost.
+    """Returns the cost of searching a database, by the key of each method.
 
     Args:
         reporter: reports progress.

@@ -72,10 +72,10 @@ class Task(abc.ABC):
 
     @property
     def changed_settings(self) -> dict[str, Any]:
-        """Name -> value of the settings that change a number.
+        """The settings that change a result: a mapping from name to value.
 
         Settings that have their defaults are left out. The setting `methods`
-        does not count, because each number belongs to one method.
+        does not count, because each result belongs to one method.
         """
         return {
             f"{self.name}.{name}": value
