@@ -24,7 +24,6 @@ from cns_drake.command_line import cli
 from cns_drake.roads import roads_file
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.roads.speeds import Speeds
-from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.sections import (
     DriverConfig,
@@ -37,6 +36,7 @@ from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.studies.experiment import Experiment, MadeMap
+from cns_drake.studies.lost_structures import Losses
 from cns_drake.studies.sampled_drives import DrawnRoute, Fleet
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods

@@ -4,9 +4,9 @@
   `nested_fields`, `spread_values`, `factors`, `method_variants`,
   `protocol_fields`. `conditions` combines the factors.
 - Drives of a condition: `comparisons` changes two drives by means of
-  `changed_drives`; fields of a database of several drives (`session_fields`,
-  `sampled_drives`, `side_fields`), `named_stages`, `viewpoints`,
-  `control_drives`, `unique_names`.
+  `changed_drives` and `lost_structures`; fields of a database of several
+  drives (`session_fields`, `sampled_drives`, `side_fields`), `named_stages`,
+  `viewpoints`, `control_drives`, `unique_names`.
 - Maps: `experiment_maps` finds them, `made_maps` requests them, `map_step`
   makes them as jobs; `redrawing`, `frozen_redraws`, `turned_inputs`,
   `distractors`, `map_pictures`.

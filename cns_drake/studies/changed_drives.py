@@ -10,7 +10,6 @@ from cns_drake.base.errors import InputError, errors_at, validated
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.random_route import draw_route
 from cns_drake.roads.route import Route
-from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files
@@ -18,6 +17,7 @@ from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.config import WeatherConfig
 from cns_drake.simulation.scenario_traffic import load_ways
+from cns_drake.studies.lost_structures import Losses, lost_structures
 from cns_drake.studies.named_stages import find_stage
 from cns_drake.studies.nested_fields import Changes
 from cns_drake.studies.sampled_drives import DrawnRoute

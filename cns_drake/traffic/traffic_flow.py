@@ -46,8 +46,8 @@ def flows(graph: LaneGraph) -> np.ndarray:
     """Returns each piece's share (P,) of all passes of vehicles over pieces.
 
     Vehicles start on all pieces in equal numbers, and choose each next piece
-    with the shares of `way_shares`. A long piece is not passed more often than
-    a short piece, although vehicles stay longer on the long piece.
+    with the shares of `way_shares`. The share of a piece does not depend on the
+    piece's length.
     """
     pieces = graph.pieces
     step = np.zeros((len(pieces), len(pieces)))

@@ -8,7 +8,6 @@ from helpers import documents
 import pytest
 import yaml
 
-from cns_drake.scenarios.losses import Losses
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies import changed_drives, experiment, side_fields
 from cns_drake.studies.conditions import conditions
@@ -17,6 +16,7 @@ from cns_drake.studies.experiment_files import (
     load_experiment,
     shipped_experiments,
 )
+from cns_drake.studies.lost_structures import Losses
 from cns_drake.studies.study import TASKS
 from evaluation.localisation import results, tracking
 from evaluation.recognition import faults, place_numbers, place_outcome

@@ -68,8 +68,9 @@ def lost_structures(
         source: file and section of the losses, for error messages.
 
     Raises:
-        InputError: the drive has no map, a stage or class does not exist, or a
-            share is not from 0 to 1.
+        InputError: the drive has no map, a stage or class does not exist, a
+            share is not from 0 to 1, or the map's table of structures cannot be
+            used.
     """
     if drive.map is None:
         raise InputError(
@@ -91,11 +92,11 @@ def lost_structures(
         stage = str(drive.stage)
         removable = _lacking_in(drive, stage, losses.towards, source)
     table = drive.folder.structures
-    order = _removal_order(table, seed, removable)
-    missing = _scattered_losses(table, scattered, int(own_seed), source)
-    return tuple(
-        sorted(missing.union(order[: round(losses.missing * len(order))]))
-    )
+    lost = _scattered_losses(table, scattered, int(own_seed), source)
+    if losses.missing > 0.0:
+        order = _removal_order(table, seed, removable)
+        lost |= set(order[: round(losses.missing * len(order))])
+    return tuple(sorted(lost))
 
 
 def _lacking_in(

@@ -9,13 +9,13 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError, validated
-from cns_drake.scenarios.losses import Losses, lost_structures
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.studies.comparisons import PairMaker
 from cns_drake.studies.conditions import conditions
 from cns_drake.studies.experiment_files import load_experiment
+from cns_drake.studies.lost_structures import Losses, lost_structures
 
 SOURCE = "mine.yaml: database"
 
@@ -127,6 +127,17 @@ def test_structures_missing_here_and_there():
     # A seed of its own takes the place of the condition's.
     again = lost(scattered=parts | {"seed": 1}, seed=7)
     assert set(again) == other
+
+
+def test_a_map_without_buildings_and_plants_can_lack_scattered_poles(tmp_path):
+    town = write_small_map(tmp_path / "town")
+    table = town / "structures.csv"
+    table.write_text("name,class\npole_1,pole\npole_2,pole\n")
+    base = tmp_path / "base.yaml"
+    base.write_text(yaml.safe_dump(scenario_values(town)))
+    assert lost(base, scattered={"pole": 1.0}) == ("pole_1", "pole_2")
+    with pytest.raises(InputError, match="none of its structures can be"):
+        lost(base, missing=0.5)
 
 
 @pytest.mark.parametrize(
