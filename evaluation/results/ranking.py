@@ -53,45 +53,68 @@ def rank_methods(
         The M methods, the best first; and (B, M) the mean of each method in
         each bootstrap sample. Both are empty if no condition counts.
     """
-    table: dict[tuple, dict[str, Row]] = {}
-    for row in rows:
-        if not math.isnan(row.value):
-            table.setdefault(row.without("method"), {})[row.label] = row
-    methods = {name for some in table.values() for name in some}
-    common = [some for some in table.values() if len(some) == len(methods)]
+    common = _common_conditions(rows)
     if not common:
         return [], np.empty((0, 0))
-    names = sorted(methods)
+    names = sorted(common[0])
     values = np.array([[some[n].value for n in names] for some in common])
     of_map = [some[names[0]].map for some in common]
     units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
-    _, numbered = np.unique(units, return_inverse=True)
+    _, unit_of_row = np.unique(units, return_inverse=True)
     seed = zlib.crc32(" ".join(sorted(set(of_map))).encode())
-    weights = resampled_weights(len(common), seed, numbered)
+    weights = resampled_weights(len(common), seed, unit_of_row)
     with np.errstate(invalid="ignore"):
         samples = weights @ values / weights.sum(axis=1, keepdims=True)
-    means = values.mean(axis=0)
-    first = common[0]
-    intervals = [Interval(first[n].low, first[n].high) for n in names]
-    number = int(numbered.max()) + 1
-    if number > 1:
+    first = [common[0][name] for name in names]
+    number = len(set(units))
+    if number == 1:
+        intervals = [Interval(row.low, row.high) for row in first]
+    elif number < LEAST_UNITS:
         intervals = [UNKNOWN] * len(names)
-    if number >= LEAST_UNITS:
-        is_in = numbered == np.arange(number)[:, None]
-        squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
-        spreads = np.sqrt(number / (number - 1) * squares) / len(common)
-        margins = stdtrit(number - 1, 0.975) * spreads
-        ends = np.clip(
-            [means - margins, means + margins],
-            *(range_of(first[names[0]].metric) or Range())[:2],
-        )
-        intervals = [Interval(*pair) for pair in ends.T.tolist()]
-    found = [
-        Ranked(*one)
-        for one in zip(names, means.tolist(), intervals, strict=True)
-    ]
+    else:
+        limits = range_of(first[0].metric) or Range()
+        intervals = _t_intervals(values, unit_of_row, limits)
+    means = values.mean(axis=0).tolist()
+    found = [Ranked(*one) for one in zip(names, means, intervals, strict=True)]
     sign = 1.0 if least_first else -1.0
     order = sorted(
         range(len(names)), key=lambda k: (sign * found[k].value, names[k])
     )
     return [found[k] for k in order], samples[:, order]
+
+
+def _common_conditions(rows: Iterable[Row]) -> list[dict[str, Row]]:
+    """Returns method -> row of each condition measured with all methods."""
+    table: dict[tuple, dict[str, Row]] = {}
+    for row in rows:
+        if not math.isnan(row.value):
+            table.setdefault(row.without("method"), {})[row.label] = row
+    methods = {name for some in table.values() for name in some}
+    return [some for some in table.values() if len(some) == len(methods)]
+
+
+def _t_intervals(
+    values: np.ndarray, unit_of_row: np.ndarray, limits: Range
+) -> list[Interval]:
+    """Returns the 95 % t interval of the mean of each column.
+
+    The standard error of a column's mean m is clustered by units: with N rows
+    x_i in G units, it is sqrt(G / (G - 1) * sum_g (sum_{i in g} (x_i - m))^2)
+    / N, and the t distribution has G - 1 degrees of freedom (Cameron and
+    Miller, Journal of Human Resources 50, 2015).
+
+    Args:
+        values: (N, M) values.
+        unit_of_row: (N,) number of each row's unit, from 0 to G - 1.
+        limits: range of the values, to which the intervals are limited.
+    """
+    means = values.mean(axis=0)
+    number = int(unit_of_row.max()) + 1
+    is_in = unit_of_row == np.arange(number)[:, None]
+    squares = ((is_in @ (values - means)) ** 2).sum(axis=0)
+    errors = np.sqrt(number / (number - 1) * squares) / len(values)
+    margins = stdtrit(number - 1, 0.975) * errors
+    ends = np.clip(
+        [means - margins, means + margins], limits.least, limits.greatest
+    )
+    return [Interval(*pair) for pair in ends.T.tolist()]
