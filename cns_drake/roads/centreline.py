@@ -137,8 +137,8 @@ def blend(
 
     The curve includes both points. If the line straight ahead of the start
     meets the line behind the end, the curve consists of these two lines and the
-    widest allowed arc that touches both lines, as a driver turns. Otherwise
-    (parallel lanes that are offset, S-bends) the curve is a cubic Hermite
+    widest allowed arc that touches both lines: drivers turn in this way.
+    Otherwise, for example between parallel lanes, the curve is a cubic Hermite
     curve.
 
     Args:

@@ -241,7 +241,8 @@ def _draw_offsets(
     """Returns random offsets (N,) within the bounds from `_offset_bounds` [m].
 
     The mean of the process is at least two standard deviations away from both
-    bounds or, if these are too close together, in their middle.
+    bounds. If the bounds are too close together for this, the mean is in the
+    middle between them.
     """
     weights = _smoothing_weights()
     reach = len(weights) // 2

@@ -23,7 +23,7 @@ class LanePath:
     """The path of a drive along lanes or waypoints, evenly sampled.
 
     Attributes:
-        points: (N, 3) positions in the world, first and last included [m].
+        points: (N, 3) positions in W, from end to end of the path [m].
         spacing: distance between neighbouring points along the path [m].
         speed_limits: (N,) speed limits at the points; infinite where there is
             none [m/s].

@@ -34,10 +34,11 @@ def load_waypoint_path(
 ) -> LanePath:
     """Returns the path along the waypoints in a file.
 
-    The file is CSV with one waypoint per line: x, y, z or x, y of the vehicle
-    frame, on the ground in the world [m]. Without z, z is 0. If the first line
-    contains names, the columns can be in another order, and there can be
-    further columns.
+    Each line of the CSV file contains one waypoint: x, y and, if given, z of
+    the vehicle frame in W [m]. The origin of this frame is on the ground.
+    Without the third number, z is 0. If the first line contains the names of
+    the columns, the columns can be in another order, and there can be further
+    columns.
 
     The path is the line from waypoint to waypoint, with corners rounded by arcs
     of 8 m radius. Where the waypoints are too close together, the radius is

@@ -224,9 +224,9 @@ def make_ground(
 def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
     """Returns the level ground below and around buildings, in W [m].
 
-    Each building has a pad at the height of its floor: its footprint, and a
-    strip around it. The strip keeps a distance from `streets`, the area of the
-    streets in W [m].
+    Each building has a pad at the height of the building's floor. The pad
+    consists of the footprint and a strip around the footprint. The strip keeps
+    a distance from `streets`, the area of the streets in W [m].
     """
     kerbside = streets.buffer(_APRON)
     pads = []

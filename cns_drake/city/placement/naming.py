@@ -38,8 +38,9 @@ class NameCounter:
         """Makes the numbers in new names begin after the next multiple of 50.
 
         Call this function before each task, such as placing a row of trees. If
-        a task places a few structures more or fewer, the names of structures in
-        later tasks, to which `stages.yaml` refers, stay the same.
+        a task then places a few structures more or fewer, the names of
+        structures in later tasks stay the same. `stages.yaml` refers to such
+        names.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE

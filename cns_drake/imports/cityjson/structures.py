@@ -183,7 +183,7 @@ def _unique_names(ids: Iterable[str]) -> dict[str, str]:
 def _chosen_geometries(
     members: list[CityObject], lod: float | None, faults: ImportFaults
 ) -> list[CityGeometry]:
-    """Returns the geometries of an object and its parts that are used.
+    """Chooses which geometries of an object and its parts are used.
 
     A geometry of a part is left out if a more detailed geometry of the whole
     covers it. In the same way, a geometry of the whole is left out if more

@@ -292,9 +292,9 @@ def is_gone(tags: Tags) -> bool:
 def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
     """Returns the blocks of a building.
 
-    If the parts cover the outline, they are the building. Otherwise the
-    outline's own solid fills the rest, also below parts that begin above the
-    ground, and the parts are additions to it.
+    If the parts cover the outline, the building consists of the parts only.
+    Otherwise the outline's own solid is added. It fills the rest of the
+    outline, and the space below parts that begin above the ground.
     """
     if not parts:
         return [outline]

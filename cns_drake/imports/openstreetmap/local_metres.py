@@ -18,9 +18,10 @@ class LocalMetres:
     object is called with longitudes and latitudes (N, 2) [deg], and returns x
     and y (N, 2) [m]. The conversion uses the Earth's radii of curvature at the
     origin. A place d metres north and d metres east of the origin is off by
-    about 1.1 d^2 tan(latitude) / R, where R is the Earth's radius: at a
-    latitude of 52 deg by 0.5 m if d is 1.5 km, and by 22 m if d is 10 km. At
-    that latitude, lengths 10 km north of the origin are wrong by 20 in 10,000.
+    about 1.1 d^2 tan(latitude) / R, where R is the Earth's radius. At a
+    latitude of 52 deg, this error is 0.5 m for d = 1.5 km, and 22 m for d = 10
+    km. At the same latitude, lengths 10 km north of the origin are wrong by 20
+    in 10,000.
     """
 
     def __init__(self, longitude: float, latitude: float):

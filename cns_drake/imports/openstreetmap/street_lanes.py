@@ -286,9 +286,9 @@ class _MeetingStreets:
 
         A turn across the opposite direction leads from the innermost lane to
         the innermost lane, and a turn to the other side from the outermost lane
-        to the outermost lane. Straight on, lanes keep their number, counted
-        from the inside. Between one-way streets, lanes keep their number,
-        counted from the outside.
+        to the outermost lane. Where traffic goes straight on, lanes keep their
+        number, counted from the inside. Between one-way streets, lanes keep
+        their number, counted from the outside.
         """
         layouts = [self.stretches[one.stretch].layout for one in (first, last)]
         here, there = (
