@@ -30,7 +30,8 @@ class DriveRow:
         map: name of the map.
         stage: stage through which the drive goes.
         title: one line on what the drive shows.
-        checksum: checksum of the files that determine all other numbers.
+        checksum: checksum of the files from which the figures in this row are
+            computed.
         length: length of the path [m].
         duration: duration of the drive [s].
         frames: number of frames that are recorded.

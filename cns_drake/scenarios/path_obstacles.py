@@ -30,7 +30,7 @@ _STEEP = 0.7
 
 
 def obstacles_beside(scenario: Scenario, points: np.ndarray) -> STRtree:
-    """Returns obstacles beside a path in the world, seen from above.
+    """Returns the points of obstacles beside a path in the world.
 
     Rays in all directions, from near the ground to the height of the car, find
     kerbs and walls. An edge at which the ground only falls is not found.

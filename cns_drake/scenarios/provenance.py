@@ -25,7 +25,7 @@ INPUTS_KEY = "inputs_sha256"
 
 
 def dependency_versions() -> dict[str, str]:
-    """Returns package -> version for cns-drake and its numerical libraries.
+    """Returns versions of cns-drake and its numerical libraries, by package.
 
     Missing packages are left out: not all platforms have Embree's wheel.
     """
@@ -70,7 +70,7 @@ def digest_inputs(
 
 
 def _input_files(scenario: Scenario) -> dict[str, Path]:
-    """Returns kind of file -> file, without the file of the IMU's noise."""
+    """Returns the input files by kind, except the file of the IMU's noise."""
     inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
     folder = scenario.folder
     structures = folder.structures

@@ -344,7 +344,7 @@ class Scenario(Section):
 
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
-        """Name of a field -> its sensor, for sensors of user-defined kinds."""
+        """Sensors of user-defined kinds, by the name of their field."""
         return {n: one for n, one in self if isinstance(one, SensorConfig)}
 
     def with_returns(

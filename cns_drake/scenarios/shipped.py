@@ -95,9 +95,9 @@ def shipped_drives() -> dict[str, Path]:
 
 
 def recordable_drives() -> dict[str, Path]:
-    """Returns name -> scenario file of shipped drives that can be recorded.
+    """Returns the scenario files of recordable shipped drives, by drive name.
 
-    A drive can be recorded if its map has the stage through which it goes.
+    A drive is recordable if its map has the stage through which it goes.
     """
     return {
         drive_name(path): path

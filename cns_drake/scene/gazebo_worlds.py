@@ -207,7 +207,7 @@ class _Simplifier:
                 self.skip(f"saved {tag} (state)")
 
     def _note_references(self, root: Element) -> None:
-        """Notes to what a file refers, and counts joints that begin moved."""
+        """Records a file's references; counts joints that do not begin at 0."""
         begins = [*root.iterfind(".//joint/axis/initial_position")]
         begins += root.iterfind(".//joint/axis2/initial_position")
         moved = [one for one in begins if float((one.text or "").strip() or 0)]
@@ -289,7 +289,7 @@ class _Simplifier:
             self._add_model(model, target, folder, depth)
 
     def _read_included(self, file: Path) -> Element | None:
-        """Returns the first model in a file, if any; counts all else."""
+        """Returns a file's first model, if any; counts all other content."""
         root = read_model(file)
         self._note_references(root)
         models = root.findall("model")
@@ -504,7 +504,7 @@ def _thin_box(
 
 
 def _local_uri(uri: str) -> str:
-    """Returns the local URI of a model that is on a server."""
+    """Returns a local URI for the model that a server's URI names."""
     if not uri.startswith(("http://", "https://")):
         return uri
     _, _, name = uri.rpartition("/models/")

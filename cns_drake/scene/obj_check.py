@@ -1,4 +1,4 @@
-"""Checks OBJ files that Drake would misread, or that end its process."""
+"""Finds faults in OBJ files that Drake would misread or on which it crashes."""
 
 from pathlib import Path
 import re

@@ -19,7 +19,7 @@ from cns_drake.scene.model_check import check_model, read_model
 def parse_world(
     parser: Parser, path: Path, model_paths: Collection[Path]
 ) -> tuple[str, ...]:
-    """Parses a world, also one made for Gazebo.
+    """Parses a world, which may have been made for Gazebo.
 
     Args:
         parser: parser to which the models of the world are added.

@@ -122,7 +122,7 @@ def merge_triangles(
 
 
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
-    """Returns triangles of any surface, inscribed in curved surfaces.
+    """Returns any surface as triangles, with their corners on the surface.
 
     A plane becomes a square of 200 m centred on G. A circle around the z axis
     of G has `sides` sides; a half sphere has half as many circles of latitude.

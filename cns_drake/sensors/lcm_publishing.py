@@ -31,7 +31,8 @@ def check_publisher_names(builder: DiagramBuilder, name: str) -> None:
         name: name of the sensor.
 
     Raises:
-        ValueError: the diagram has a system of one of these names.
+        ValueError: the diagram already has a system with one of the names that
+            these systems have.
     """
     check_unused_names(builder, *(f"{name}_{part}" for part in _PARTS))
 

@@ -9,9 +9,9 @@ def noise_generator(
     """Returns the random generator for one part of a sensor's noise.
 
     A part is the noise of a frame or of a block of samples, for example;
-    `index` is its number. `purpose` (0 or greater) distinguishes different
-    kinds of noise. Equal arguments give equal numbers; sensors with different
-    names get different numbers.
+    `index` is the number of the part. `purpose` (0 or greater) distinguishes
+    different kinds of noise. Equal arguments give equal numbers; sensors with
+    different names get different numbers.
     """
     # Keys are never negative: pieces before time zero have other streams.
     stream = purpose if index >= 0 else 2**32 - 1 - purpose

@@ -166,8 +166,8 @@ def _shot_times(
 ) -> np.ndarray:
     """Returns the times (N,) of the images of a shot [s].
 
-    If `start` is None, the shot begins at the time from which the car gets
-    farthest in a straight line before the shot ends.
+    If `start` is None, the shot shows that part of the drive, of the shot's
+    length, whose two ends lie farthest apart.
 
     Raises:
         InputError: the start is not within the drive.

@@ -106,10 +106,10 @@ def plan_scenario_traffic(
 
 
 def _ego_path(trajectory: Trajectory) -> EgoPath:
-    """Returns the function of times (N,) that supplies the car's motion.
+    """Returns a function that computes the car's poses at times (N,) [s].
 
-    The function returns positions (N, 2) [m] and yaws (N,) [rad] in the world.
-    After the end of the trajectory, the car stays where it is.
+    The poses are positions (N, 2) [m] and yaws (N,) [rad] in the world. After
+    the end of the trajectory, the car stays where it is.
     """
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

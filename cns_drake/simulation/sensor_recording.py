@@ -171,7 +171,7 @@ def connect_by_name(
 
     Args:
         builder: builder of a diagram with the recorder.
-        ports: name -> port of what is measured.
+        ports: name of a measured quantity -> its output port.
         recorder: the recorder. An input stays unconnected if no port has its
             name.
     """

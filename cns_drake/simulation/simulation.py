@@ -198,7 +198,8 @@ def _make_bag(
 ) -> BagWriter:
     """Makes the recording of a drive, still without messages.
 
-    `inputs` are the digests of its files, see `provenance.digest_inputs`.
+    `inputs` are the digests of the drive's files, see
+    `provenance.digest_inputs`.
     """
     scenario = drive.scenario
     described = describe_scenario(scenario)

@@ -23,8 +23,8 @@ def load_stage(plan: DrivePlan, *, with_vehicle: bool = True) -> World:
     """Loads the world of a drive's stage, with its temporary changes.
 
     Args:
-        plan: the plan of the drive, near which the temporary changes (field
-            `transient`) are made.
+        plan: the plan of the drive. The temporary changes (field `transient`)
+            are made near its path.
         with_vehicle: whether the world contains the vehicle.
 
     Raises:

@@ -80,8 +80,8 @@ class DriveChanger:
             last_stage: the stage that ages, and that the word `last` means.
             same_route: whether the drives of the database follow the query's
                 route, with LiDARs beside the LiDARs of the query.
-            age: returns an aged map.
-            redraw: returns a redrawn map.
+            age: function that returns an aged map.
+            redraw: function that returns a redrawn map.
             on_note: is called with a note on everything that is left out.
         """
         self._source = source
@@ -109,8 +109,9 @@ class DriveChanger:
 
         Args:
             unchanged: the drive.
-            place: `query`, `database` or the place of a drive of the database
-                in the file.
+            place: path of the drive in the experiment's file: `query`,
+                `database` or, for one of several drives, such as
+                `database.sessions.2`.
             changes: fields of the drive.
             ageing: how the city of the drive ages.
             seed: seed of the random choices.

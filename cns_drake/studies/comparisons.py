@@ -121,8 +121,8 @@ class PairMaker:
         same_route: whether the database drive follows the query's route, with
             its LiDAR at another viewpoint.
         source: file of the experiment, for errors.
-        age: returns an aged map.
-        redraw: returns a redrawn map.
+        age: function that returns an aged map.
+        redraw: function that returns a redrawn map.
         on_note: is called with a note on everything that is left out.
     """
 
@@ -284,7 +284,7 @@ class PairMaker:
         return found
 
     def _find_stage(self, place: str, side: str, wanted: Any) -> str:
-        """Returns the stage that a drive has with the value of its `stage`."""
+        """Returns the stage that a drive's field `stage` = `wanted` means."""
         with errors_at(f"{self.source}: {place}.stage"):
             return find_stage(wanted, self._unchanged[side], self._last_stage)
 
@@ -310,7 +310,8 @@ class PairMaker:
 
         Args:
             fields: the fields of a condition, by section.
-            sessions: place in the file -> fields, for each database drive.
+            sessions: maps the path of each database drive in the experiment's
+                file to the fields of the drive.
             query: fields of the query drive.
         """
         drives = {
@@ -343,7 +344,8 @@ class PairMaker:
         the oldest drive.
 
         Args:
-            sessions: place in the file -> fields of each drive.
+            sessions: maps the path of each database drive in the experiment's
+                file to the fields of the drive.
             database: fields of the database.
             query: fields of the query drive.
             condition: the condition.

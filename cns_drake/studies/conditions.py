@@ -95,7 +95,7 @@ def conditions(experiment: Experiment) -> list[Condition]:
 def _fields_and_factors(
     experiment: Experiment,
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns the fixed fields, and the values of each factor by its path."""
+    """Returns the fixed fields, and each factor's values by factor path."""
     fixed: dict[str, Any] = {}
     factors: dict[str, list[Any]] = {}
     for side in _FACTORED:
@@ -110,7 +110,7 @@ def _fields_and_factors(
 def _baseline_values(
     fields: Changes, factors: Mapping[str, list[Any]]
 ) -> dict[str, Any]:
-    """Returns the value of each factor in the baseline that fields describe."""
+    """Returns the baseline's value of each factor; `fields` gives some."""
     given = dict(leaves(fields, ()))
     found: dict[str, Any] = {}
     for path, values in factors.items():
@@ -127,7 +127,7 @@ def _baseline_values(
 def _check_paths_differ(
     factors: Mapping[str, list[Any]], cases: Mapping[str, Any]
 ) -> None:
-    """Checks that no two factors, and no factor and case, change a field."""
+    """Checks that no field is changed by two factors, or by factor and case."""
     taken = _changed_paths("", factors.items(), set())
     for name, case in cases.items():
         if isinstance(case, dict):
@@ -226,7 +226,7 @@ def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
 
 
 def num_levels(experiment: Experiment) -> dict[str, int]:
-    """Returns the name of each case -> its number of levels.
+    """Returns the number of levels of each case, by the case's name.
 
     Raises:
         ValueError: a case has the name of the condition without a change, or

@@ -22,7 +22,7 @@ def control_drive(drive: Scenario, stage: str) -> Scenario:
 
 
 def with_fixed_driver(drive: Scenario) -> Scenario:
-    """Returns a drive whose driver stays the same if the name changes.
+    """Returns a drive whose driver stays the same if the drive is renamed.
 
     A driver without a seed is sampled by the name of the drive.
     """

@@ -82,7 +82,8 @@ def label_points(
     Args:
         session: the drive whose map of N points is labelled.
         other: the other drive.
-        frames: (K,) frame numbers of the scans of the other drive that count.
+        frames: (K,) numbers of the other drive's frames from whose poses points
+            can be observed.
     """
     unobserved, kept, changed = SIDES[session.side]
     labels = np.full(len(session.points), unobserved, np.uint8)

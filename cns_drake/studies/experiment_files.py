@@ -121,9 +121,9 @@ def parse_override(text: str) -> dict[str, Any]:
 
 
 def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
-    """Returns fields of an experiment with an override METHOD.SETTING=VALUE.
+    """Returns an experiment's fields, changed by METHOD.SETTING=VALUE.
 
-    If no method has this name, METHOD becomes an unknown field.
+    If METHOD is not the name of a method, it becomes an unknown field.
     """
     from evaluation.methods import known_methods, shipped_methods
 

@@ -20,13 +20,13 @@ _LISTS: Mapping[str, tuple[type, ...]] = {
 
 
 class FactorValues(list):
-    """The values of a factor, unlike a list that is a single value."""
+    """The values of a factor; a list of another type is a single value."""
 
 
 def split_values(
     fields: Changes, above: tuple[str, ...]
 ) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """Returns path -> value of fixed fields, and path -> values of factors.
+    """Returns fixed fields' values, and factors' lists of values, both by path.
 
     Args:
         fields: nested fields.
@@ -57,7 +57,7 @@ def split_values(
 def leaves(
     fields: Mapping[Any, Any], above: tuple[str, ...]
 ) -> Iterator[tuple[str, Any]]:
-    """Yields path and value of each nested field that contains no others.
+    """Yields path and value of each nested field that contains no other field.
 
     The value of a factor has the type `FactorValues`.
 
@@ -104,7 +104,7 @@ def _is_single(name: str, value: list[Any]) -> bool:
 
 
 def _is_list_of(kind: type, value: Any) -> bool:
-    """Returns whether a value is a list of at least one member of a type."""
+    """Returns whether a value is a list, not empty, of members of one type."""
     return (
         isinstance(value, list)
         and len(value) > 0

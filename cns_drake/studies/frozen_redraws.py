@@ -170,9 +170,9 @@ class RedrawFrozen(RedrawCity):
 def kept_names(stages: Any, names: Sequence[str]) -> Any:
     """Returns `stages.yaml` with only the structures that a new city has.
 
-    The file was written for the original city. Rows of a redrawn city can
-    consist of fewer houses than the original rows. Groups that lose all their
-    structures are left out.
+    The file was written for the original city. A row of houses can have fewer
+    houses in a redrawn city than in the original city. Groups that lose all
+    their structures are left out.
 
     Args:
         stages: the content of the file.

@@ -215,7 +215,7 @@ class MadeMaps:
 
 
 def _all_rates(rates: Any) -> Mapping[str, float]:
-    """Returns event -> rate per year, for a field `rates` of an experiment."""
+    """Returns rates per year by event, for an experiment's field `rates`."""
     factor: Any = rates
     found: dict[str, float] = {}
     if isinstance(rates, dict):

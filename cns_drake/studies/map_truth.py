@@ -48,8 +48,9 @@ def write_truth(
             aged map has.
 
     Returns:
-        Numbers of points: A or B -> label -> number of the map's points with
-        this label; and a list with the change of each structure.
+        The counts of points, and a list with the change of each structure. The
+        counts map A and B to a mapping from each label to the number of the
+        map's points with this label.
 
     Raises:
         InputError: the drives are of different worlds, or the folder cannot be

@@ -82,7 +82,7 @@ def write_page(
 
 
 def _picture_frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:
-    """Returns corner [m], side of a pixel [m], and pixels (rows, columns)."""
+    """Returns the corner [m], pixel side [m], rows and columns of a picture."""
     points = np.concatenate([one.points[:, :2] for one in pair])
     if len(points) == 0:
         points = np.zeros((1, 2))

@@ -100,7 +100,7 @@ def _exact_labels(
     Args:
         pair: the two maps.
         drive: the next drive.
-        frames: (K,) frames of the drive that are scans of its map.
+        frames: (K,) numbers of the frames whose scans make the drive's map.
     """
     gone = label_points(pair.A, drive, frames)
     far = nearest_distances(pair.B.points, pair.A.points, _KNOWN_WITHIN)

@@ -18,11 +18,11 @@ from evaluation.study.chosen_methods import (
 def choose_variants(
     wanted: Mapping[str, Mapping[str, Any]] | None,
 ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
-    """Returns key -> method, with columns of its settings.
+    """Returns the chosen methods by key, each with columns of its settings.
 
     Args:
-        wanted: name of a method, or its Python file -> its settings; None for
-            all standard methods.
+        wanted: maps a method's name or Python file to the method's settings;
+            None for all standard methods.
 
     Raises:
         InputError: a method is unknown, or a setting is wrong.

@@ -151,10 +151,11 @@ def _evaluation_fault(drives: Sequence[ExportedDrive]) -> str | None:
 
 
 def training_tuples(runs: Sequence[ExportedDrive]) -> dict[int, Any]:
-    """Returns the training data of PointNetVLAD: number of a cloud -> tuple.
+    """Returns the training data of PointNetVLAD: a tuple for each cloud number.
 
-    A `TrainingTuple` names the cloud's file, its position, and the numbers of
-    the clouds that are near enough to be positives or too near to be negatives.
+    A `TrainingTuple` contains the cloud's file and position, and two lists of
+    cloud numbers: the clouds that are near enough to be positives, and all
+    clouds that are too near to be negatives.
 
     Args:
         runs: drives whose clouds are numbered one after the other.

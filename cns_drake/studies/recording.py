@@ -119,7 +119,7 @@ def plan_recordings(
 
 
 def usual_frames(scenarios: Sequence[Scenario]) -> int:
-    """Returns the number of frames of drives; an estimate if not given."""
+    """Returns the total number of frames of drives, estimated if not set."""
     return sum(one.frames or _USUAL_FRAMES for one in scenarios)
 
 

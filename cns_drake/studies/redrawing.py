@@ -90,7 +90,7 @@ class RedrawCity(MakeMap):
             finish(draft)
 
     def inputs(self) -> dict[str, bytes]:
-        """Returns name -> content of the files from which the city is made."""
+        """Returns the content of the city's input files, by file name."""
         return redrawn_inputs(self.map_folder, self.stage, self.seed)
 
     def finish_inputs(self, draft: Path) -> None:
@@ -119,7 +119,7 @@ class RedrawCity(MakeMap):
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
-    """Returns name -> content of the input files of a map's new city.
+    """Returns the content of the new city's input files, by file name.
 
     The files are the map's own `roads.yaml`, a `city.yaml` with the new seed,
     and a `stages.yaml` with one stage that contains the whole city.
@@ -148,7 +148,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
 
 
 def marked_yaml(title: str, values: dict) -> bytes:
-    """Returns a YAML file with a title in its first comment.
+    """Returns the text of a YAML file with a title in its first comment.
 
     Args:
         title: the title.

@@ -148,7 +148,7 @@ def _recordings(
 def _expected_space(
     num_frames: int, num_pages: int, output: Path, *, with_recordings: bool
 ) -> Space:
-    """Returns how much space all files need, now and in the end."""
+    """Returns how much space all files need, during the jobs and afterwards."""
     of_frame = _KEPT_BYTES + (_RECORDED_BYTES if with_recordings else 0.0)
     kept = num_pages * _PAGE_BYTES + num_frames * of_frame
     return Space(output, kept + num_frames * _SPENT_BYTES, kept)

@@ -59,7 +59,7 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Noticed:
-    """Which appearances and disappearances of structures drives notice.
+    """Structures that changed; whether and when drives notice each change.
 
     Attributes:
         names: the S structures that changed, in order.
@@ -122,7 +122,7 @@ class SeenTask(Task):
     """Measures which changes of a city the drives of a database notice.
 
     The changes are the structures that came or went between the oldest drive of
-    the database and the query. Numbers whose names end in `_here` count only
+    the database and the query. Metrics whose names end in `_here` count only
     structures whose change the query drive notices, too.
     """
 
@@ -223,7 +223,7 @@ def sight_structures(
 
 
 def _seen_names(drive: SimulatedDrive, spacing: float) -> Set[str]:
-    """Returns the names of the structures of which a drive gets returns."""
+    """Returns the names of the structures from which a drive gets returns."""
     frames = sample_frames(drive.X_WS[:, :3, 3], spacing).tolist()
     numbers: set[int] = set()
     for frame in track(

@@ -31,7 +31,8 @@ def session_fields(
         source: file of the experiment, for errors.
 
     Returns:
-        Path of a drive in the file, such as `database.sessions.2` -> fields.
+        The fields of each drive, by the path of the drive in the file, such as
+        `database.sessions.2`.
 
     Raises:
         InputError: the drives are not a list of mappings, or a drive has a
@@ -100,7 +101,7 @@ def session_factors(place: str, factors: Changes) -> dict[str, Any]:
     other drives, and factors of the whole database, are left out.
 
     Args:
-        place: place of the drive in the file.
+        place: path of the drive in the file, such as `database.sessions.2`.
         factors: name -> value, for all factors of the condition.
     """
     several = tuple(f"database.{name}" for name in (SESSIONS, FLEET))
@@ -118,12 +119,12 @@ def session_factors(place: str, factors: Changes) -> dict[str, Any]:
 def years_aged(database: Changes, sessions: Mapping[str, Changes]) -> int:
     """Returns by how many years the city of the query is aged.
 
-    The result is the years of the oldest drive of the database. The years of
-    the database itself count, too, even if each drive has years of its own: so
-    databases of different drives have the same query.
+    The result is the greatest of the fields `years` of the drives and of the
+    database. The field of the database counts even if each drive has its own
+    field, so that databases with different drives can have the same query.
 
     Args:
         database: fields of the database.
-        sessions: place in the file -> fields, for each drive.
+        sessions: maps the path of each drive in the file to the drive's fields.
     """
     return max(one.get("years", 0) for one in (database, *sessions.values()))

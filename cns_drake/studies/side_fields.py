@@ -33,7 +33,8 @@ def check_side(place: str, changes: Changes, source: str) -> None:
     """Checks the fields of a drive that no scenario has.
 
     Args:
-        place: `database`, `query`, or the place of a drive of the database.
+        place: path of the drive in the file: `database`, `query` or, for one of
+            several drives, such as `database.sessions.2`.
         changes: fields of the drive.
         source: file of the experiment, for errors.
 

@@ -34,8 +34,9 @@ class ChangedPair(NamedTuple):
     """A pair of drives as a condition changes it.
 
     Attributes:
-        names: names of the database and of the query drive, unchanged.
-        query: the query drive, unchanged.
+        names: names of the database drive and the query drive before the
+            change.
+        query: the query drive before the change.
         compared: the changed drives.
         condition: the condition.
         seed: seed of the condition's random choices.
@@ -93,9 +94,9 @@ class SimulatedPairs:
             condition_protocol(one.condition, self._source)
 
     def pairs(self, some: MapPairs) -> Iterator[tuple[Pair, Compared]]:
-        """Yields the pairs of a map in all conditions that it allows.
+        """Yields the pairs of a map in all conditions possible on the map.
 
-        Each item is a pair and its changed drives.
+        Each item is a pair to measure, and the changed drives of the pair.
         """
         for one in self.changed(some, made=True):
             yield (
@@ -113,7 +114,7 @@ class SimulatedPairs:
             )
 
     def changed(self, some: MapPairs, *, made: bool) -> Iterator[ChangedPair]:
-        """Yields the pairs of a map in all conditions that it allows.
+        """Yields a map's pairs, changed by all conditions possible on the map.
 
         Args:
             some: the pairs of the map.
@@ -199,7 +200,7 @@ class SimulatedPairs:
     def _with_upkept_maps(
         self, drives: Sequence[NamedDrive], maintain: str
     ) -> Sequence[NamedDrive]:
-        """Returns drives whose maps are updated by later ones, with its job."""
+        """Returns drives in maps that later drives update; adds the job."""
         if maintain == NOT_MAINTAINED:
             return drives
         sources = tuple(one.source for one in drives)

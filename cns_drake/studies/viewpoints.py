@@ -45,10 +45,10 @@ def checked_viewpoint(value: Any, where: str) -> tuple[float, float]:
 def with_lidars_beside(
     drive: Scenario, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a drive of a database along the route of the queries.
+    """Returns a database drive along the query drive's route, given that drive.
 
-    The LiDARs of the returned drive are also moved 1.25 m ahead, so that the
-    two drives do not coincide.
+    The LiDARs of the returned drive are also moved 1.25 m ahead, so that it
+    does not coincide with `drive`.
 
     Args:
         drive: the drive.

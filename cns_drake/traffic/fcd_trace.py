@@ -164,7 +164,7 @@ def _remove_riders(steps: list[Element]) -> set[str]:
 
 
 def _other_elements(steps: list[Element]) -> dict[str, set[str]]:
-    """Returns tag -> ids of all elements but vehicles and persons, by tag.
+    """Returns the ids of all elements but vehicles and persons, by tag.
 
     The id of an element without an id is "".
     """

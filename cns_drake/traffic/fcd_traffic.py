@@ -96,10 +96,10 @@ def play_trace(
 
 
 def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
-    """Checks that vehicles are on lanes, or persons near lanes.
+    """Checks that vehicles are on lanes; without vehicles, checks persons.
 
     Raises:
-        InputError: they are not.
+        InputError: half of the trace is too far from the lanes.
     """
     traced = trace.vehicles or trace.persons
     places = np.concatenate([one.xy for one in traced])
@@ -174,7 +174,7 @@ def _person_rows(
 def _make_tracks(
     trace: FcdTrace, traced: Sequence[TracedObject], rows: Sequence[np.ndarray]
 ) -> Tracks:
-    """Returns tracks of objects, each of which is there at some times only."""
+    """Returns tracks of objects, each of which exists at some times only."""
     values = np.zeros((trace.num_steps, len(traced), 5))
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)

@@ -1,4 +1,4 @@
-"""Lane changes by MOBIL of Kesting, Treiber, Helbing (2007).
+"""Lane changes by the model MOBIL (Kesting, Treiber, Helbing, 2007).
 
 A driver changes lanes if the driver gains more acceleration than other drivers
 lose, and no other vehicle has to brake hard.

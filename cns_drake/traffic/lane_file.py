@@ -129,7 +129,7 @@ def lane_text(
 
 
 def _numbers_except_none(one: Piece | Walkway, *names: str) -> dict[str, int]:
-    """Returns the fields of an object with these names, except those of -1."""
+    """Returns those of an object's named fields that are not -1."""
     values = {name: getattr(one, name) for name in names}
     return {name: value for name, value in values.items() if value != -1}
 

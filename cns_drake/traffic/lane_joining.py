@@ -178,7 +178,7 @@ def _merged_lanes(
 def _ways(
     first: int, after: Sequence[Sequence[int]], long: set[int]
 ) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yields short lanes that follow a lane, and the long lane behind.
+    """Yields the short lanes after a lane, and the long lane after them.
 
     Each long lane is reached in one way: the first of the ways with the fewest
     short lanes.

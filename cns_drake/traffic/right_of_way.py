@@ -358,7 +358,8 @@ def _mark_excluded(
 ) -> None:
     """Marks the ways that a vehicle excludes, given the place of its rear [m].
 
-    `taken` (2, P) says which pieces small, and large, vehicles must not enter.
+    `taken` (2, P) says which pieces small vehicles (row 0) and large vehicles
+    (row 1) must not enter.
     """
     size = int(is_large)
     for other in range(taken.shape[1]):

@@ -92,7 +92,8 @@ def _crossing_walkways(
 
     Args:
         graph: the lane graph with the crossings.
-        crossed: walked ends of roads: road, end, and line of its crossing.
+        crossed: for each road end where people walk, the road, the end, and the
+            line of the crossing there.
         nodes: road, end and side -> number of the place at a sidewalk's end.
         places: road, end and side -> this place, see `_sidewalk_end`.
         count: number of walkways so far, from which numbers of new places

@@ -73,10 +73,12 @@ class Tracks:
         return self.present[k] & self.present[k + 1]
 
     def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, ...]:
-        """Returns each time's interval, its place there, and the steps beyond.
+        """Returns each time's interval, and the position of the time, in steps.
 
-        A step is beyond if it lies before the first time or after the last
-        time. Place and steps have two more axes than the times.
+        The results are the number of the interval; the position in the
+        interval, from 0 to 1; and how far the time lies before the first step
+        (negative) or after the last step (positive), otherwise 0. The second
+        and third result have two more axes than the times.
         """
         last = len(self.values) - 1
         steps = np.asarray(t, float) / self.dt

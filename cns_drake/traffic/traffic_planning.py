@@ -88,7 +88,7 @@ def plan_traffic(
 def _better_plan(
     task: Task, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
-    """Returns the plan of a new trial, or `best` if that is no worse."""
+    """Returns the plan of a new trial if better than `best`, or else `best`."""
     trial = begin_trial(task, rng)
     num_steps = len(task.streets.until)
     for first in range(0, num_steps, _PART):

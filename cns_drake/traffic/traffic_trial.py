@@ -58,8 +58,8 @@ class Task(NamedTuple):
             car's box at steps and half steps.
         ego_box: size of the ego car.
         vehicles, walkers: requested numbers of vehicles and pedestrians.
-        drive: the ego car's drive, if it follows other vehicles; it then stands
-            still in `streets` and `ego_track`.
+        drive: the ego car's drive, if the ego car follows other vehicles. In
+            this case, the ego car stands still in `streets` and `ego_track`.
     """
 
     graph: LaneGraph

@@ -112,7 +112,7 @@ def _halves(way: Walkway, row: int, place: int) -> list[Walkway]:
 
 
 class _Surroundings:
-    """Lanes, walkways beside them and objects, found by their places.
+    """Lanes, walkways and objects of a map, searchable by position.
 
     Args:
         graph: the lanes.
@@ -151,8 +151,8 @@ class _Surroundings:
 
         Returns:
             The path (4, 3) of pedestrians across the street [m]; and for each
-            end of it, the number of the walkway there and the index of the
-            walkway's point. None if no crossing is possible.
+            end of the path, the number of the walkway there and the index of
+            the walkway's point. None if no crossing is possible.
         """
         points = self._graph.pieces[lane].points
         margin = int(_FROM_LANE_ENDS / SPACING)

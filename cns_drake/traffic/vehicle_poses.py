@@ -72,7 +72,7 @@ def _blended_with_left_lane(
     back: np.ndarray,
     places: Sequence[np.ndarray],
 ) -> list[np.ndarray]:
-    """Returns x, y, z of places between the lane left and the new lane [m].
+    """Returns x, y, z of places between the former and the new lane [m].
 
     Args:
         streets: the lanes.

@@ -160,7 +160,7 @@ class Crowd:
         crossings["to_start"][begins] = np.inf
 
     def _follow_paths(self) -> np.ndarray:
-        """Updates the points reached; returns (N,) bool, who is near an end."""
+        """Updates the points reached; returns (N,) who is near a path's end."""
         walkers, (_, points, tangents, *_) = self.walkers, self._paths
         paths = self._paths.paths[walkers["path"]]
 

@@ -107,7 +107,7 @@ def _offsets(way: Walkway) -> np.ndarray:
 
 
 def _free_widths(barred: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Returns the widest gap at each point that the previous one leads to.
+    """Returns, at each point, the widest gap reachable from the gap before.
 
     Args:
         barred: (N, M) places across a walkway: 1 if barred, 0 if free.

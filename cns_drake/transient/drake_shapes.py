@@ -1,4 +1,4 @@
-"""Makes shapes for Drake: of triangles, of models, and of scaled shapes."""
+"""Makes shapes for Drake from triangles and models, and by scaling shapes."""
 
 from collections.abc import Mapping
 
@@ -43,7 +43,7 @@ def memory_mesh(
 def model_shape(shape: Shape, meshes: Mapping[str, Mesh]) -> geometry.Shape:
     """Returns a Drake shape that equals a shape of the city generator.
 
-    `meshes` maps names to the meshes of its model.
+    `meshes` maps names to the meshes of the model to which the shape belongs.
     """
     if isinstance(shape, BoxShape):
         return geometry.Box(*shape.size)

@@ -27,7 +27,7 @@ _TRIES = 24
 def move_furniture(around: Surroundings, share: float) -> None:
     """Moves a share of poles, lamps and signs by up to 2 m.
 
-    An object without room around it stays, and none crosses a kerb.
+    An object without room around it stays. No object is moved across a kerb.
     """
     wanted = around.of_classes(_FURNITURE)
     if not wanted:

@@ -39,8 +39,8 @@ class LoadedPart:
 
     Attributes:
         geometry: the geometry G.
-        X_WG: its pose in W.
-        material: its material.
+        X_WG: pose of G in W.
+        material: material of the part.
     """
 
     geometry: PerceptionGeometry
@@ -140,14 +140,14 @@ def _hull(p_WPs: np.ndarray) -> BaseGeometry:
 def read_structures(
     world: World, wanted: Callable[[str], bool] = lambda name: True
 ) -> dict[str, LoadedStructure]:
-    """Returns name -> structure, for the static structures of a world.
+    """Returns the static structures of a world, by name.
 
     The names are sorted.
 
     Args:
         world: the world, not yet part of a diagram.
-        wanted: returns whether the structure with a name is wanted; by default
-            all structures are wanted.
+        wanted: function that returns whether the structure with a name is
+            wanted; by default all structures are wanted.
 
     Raises:
         InputError: a mesh cannot be read.

@@ -102,7 +102,7 @@ def _cover_with_snow(
     depth: float,
     is_ground: bool,
 ) -> bool:
-    """Covers the faces of a part that are open to the sky with snow.
+    """Covers with snow the faces of a part that are open to the sky.
 
     Returns:
         Whether there are such faces.

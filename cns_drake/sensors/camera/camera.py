@@ -123,7 +123,7 @@ def _add_sensors(
     For the arguments, see `add_cameras`; X_BC is the camera's optical pose.
 
     Returns:
-        Kind of the copy, see `CameraScene` -> the sensor.
+        The sensors, by the kind of the copy (see `CameraScene`).
     """
     clipping = ClippingRange(_NEAR, _FAR)
     core = RenderCameraCore(RENDERER, info, clipping, RigidTransform())
@@ -149,7 +149,7 @@ def _add_sensors(
 def _add_sky(
     builder: DiagramBuilder, name: str, info: CameraInfo, sensor: RgbdSensor
 ) -> OutputPort:
-    """Adds the sky to a camera's colour images; returns the port of these."""
+    """Adds the sky to a camera's colour images; returns their new port."""
     painter = builder.AddNamedSystem(f"{name}-sky", SkyPainter(info))
     for port in (
         sensor.color_image_output_port(),
@@ -160,7 +160,7 @@ def _add_sky(
 
 
 def _is_worth_telling(record: logging.LogRecord) -> bool:
-    """Returns whether a message of Drake is no warning of 16-bit depths."""
+    """Returns whether Drake's message is not a warning about 16-bit depths."""
     return "depth_image_16u" not in record.getMessage()
 
 

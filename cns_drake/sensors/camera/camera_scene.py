@@ -52,7 +52,7 @@ _MeshKey = tuple[str, FrameId | None, str | int]
 
 
 class CameraScene(LeafSystem):
-    """A copy of a SceneGraph's geometry for rendering, whose frames can move.
+    """A copy, for rendering, of a SceneGraph's geometry; frames can move.
 
     .. pydrake_system::
 
@@ -194,7 +194,7 @@ def _group_geometries(
     calc_X_WF: Callable[[FrameId], RigidTransform],
     anchored: Collection[FrameId],
 ) -> dict[_MeshKey, list[_Member]]:
-    """Returns the geometries of each mesh of both copies.
+    """Returns the geometries that form each mesh, for both kinds of copy.
 
     For the arguments, see `CameraScene`.
     """

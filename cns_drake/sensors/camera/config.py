@@ -67,6 +67,6 @@ class CameraSection(Section):
 
 
 def _degrees(angle: Any) -> Any:
-    """Returns an angle in degrees; what is no number as it is."""
+    """Returns an angle [rad] in degrees; returns all but numbers unchanged."""
     is_number = isinstance(angle, int | float) and not isinstance(angle, bool)
     return math.degrees(angle) if is_number else angle

@@ -21,5 +21,5 @@ def last_sample(time: float, rate: float) -> int:
 
 
 def is_sample_time(time: float, rate: float) -> bool:
-    """Returns whether the last sample up to a time is taken at this time."""
+    """Returns whether a sample is taken at a time [s], up to rounding."""
     return abs(time * rate - last_sample(time, rate)) <= _TOLERANCE

@@ -106,8 +106,9 @@ def add_lidar(
         anchored_frames: frames that never move; by default the frames of the
             plant's bodies that are welded to the world.
         moving_bodies: frame -> index of its body in the LiDAR's port
-            `body_spatial_velocities`, if you connect this port yourself; with
-            `motion_distortion`, all bodies of the plant.
+            `body_spatial_velocities`. Give this argument only if you connect
+            this port yourself. With `motion_distortion`, the port is connected
+            by this function, for all bodies of the plant.
         num_threads: number of threads that share the LiDAR's rays.
         causal: whether a scan is the revolution that ends at the time of the
             output.
@@ -416,7 +417,7 @@ def _check_registered(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
 
 
 def _body_frames(plant: MultibodyPlant) -> dict[FrameId, int]:
-    """Returns frame -> index of its body, for all bodies with a frame."""
+    """Returns the index of each body with a SceneGraph frame, by this frame."""
     frames = map(
         plant.GetBodyFrameIdIfExists,
         map(BodyIndex, range(plant.num_bodies())),
@@ -427,7 +428,7 @@ def _body_frames(plant: MultibodyPlant) -> dict[FrameId, int]:
 def _unseen_id(
     place: RigidBody | Frame | FrameId | GeometryId,
 ) -> FrameId | GeometryId:
-    """Returns the id of a body or of a frame's body; other ids as they are."""
+    """Returns an id unchanged, or the frame id of a body or a frame's body."""
     if isinstance(place, Frame):
         place = place.body()
     if isinstance(place, RigidBody):

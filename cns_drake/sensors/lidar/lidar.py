@@ -348,7 +348,7 @@ class Lidar(LeafSystem):
     def EvalInstances(
         self, context: Context
     ) -> dict[int, tuple[GeometryId, ...]]:
-        """Returns instance id -> visible geometries of this structure.
+        """Returns the visible geometries of each structure, by instance id.
 
         Raises:
             RuntimeError: the Context does not belong to this LiDAR.
@@ -515,7 +515,7 @@ class Lidar(LeafSystem):
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
         """Returns S's positions (K, 3) and rotations (K, 3, 3) in a revolution.
 
-        K is the number of columns with motion distortion, otherwise 1.
+        With motion distortion, K is the number of columns; otherwise K is 1.
         """
         sweep = optional_value(self._sweep, context)
         if sweep is not None:

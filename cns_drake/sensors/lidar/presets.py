@@ -84,7 +84,7 @@ def check_preset(preset: str) -> None:
     """Checks that there is a preset of this name.
 
     Raises:
-        ValueError: there is none; the message lists all.
+        ValueError: there is no such preset; the message lists all presets.
     """
     if preset not in LIDAR_PRESETS:
         raise ValueError(

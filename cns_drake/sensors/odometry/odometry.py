@@ -72,7 +72,7 @@ class OdometrySensor(LeafSystem):
         """Makes the sensor.
 
         Args:
-            body: P: a body of a plant.
+            body: the body P of a plant.
             X_PB: pose of the observed frame B in P; by default B is P.
         """
         super().__init__()

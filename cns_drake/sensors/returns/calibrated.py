@@ -234,7 +234,7 @@ class CalibratedReturns:
 
 
 def _values_of_rays(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Returns row i's value, values[i mod K]; a single value stays single."""
+    """Returns values[i mod K] for i in `rows`; the only value if K is 1."""
     return values if len(values) == 1 else values[rows % len(values)]
 
 

@@ -295,7 +295,7 @@ def _drop_echoes(
 def _drops_until_next(
     key: np.uint64, beam: np.ndarray, draw: int
 ) -> np.ndarray:
-    """Returns the distances to the next drops, as mean numbers of drops."""
+    """Samples the distance to each beam's next drop, as a mean drop count."""
     return -np.log(1.0 - uniform(key, beam, draw))
 
 
@@ -389,9 +389,9 @@ def _choose_echoes(
 def _find_greatest(
     group: np.ndarray, number: np.ndarray, values: np.ndarray, num_groups: int
 ) -> np.ndarray:
-    """Returns the row of the greatest value of each group, -1 for none.
+    """Returns the row of each group's greatest value; -1 for an empty group.
 
-    Among equal values, the one with the lowest number wins.
+    Among equal values, the value with the lowest `number` counts.
     """
     best = np.full(num_groups, -1)
     for row in range(len(group)):

@@ -238,7 +238,7 @@ def _find_edges(
 ) -> np.ndarray:
     """Returns the (E, 2) rows of neighbours with an edge between them.
 
-    Neighbours follow each other in the order, at most an angle [rad] apart.
+    Neighbours are consecutive in `order`, and at most `farthest` [rad] apart.
     """
     edges = np.empty((len(order), 2), np.int64)
     count = 0
@@ -261,7 +261,7 @@ def _find_edges(
 
 @compiled
 def _planes_meet(a: BeamHits, i: int, b: BeamHits, j: int) -> bool:
-    """Returns whether the planes at two hits coincide, or meet in between."""
+    """Returns whether the planes at two hits coincide or meet between them."""
     if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False
     # -n . d for the plane of each and the direction of the other.

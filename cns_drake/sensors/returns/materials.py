@@ -130,7 +130,7 @@ def _field_values(
 def _reflector_kind(material: Material, surface: Surface) -> int:
     """Returns the kind of a material; leaves depend on the surface.
 
-    A closed surface of leaves is a volume of leaves. An open one is a sheet
+    A closed surface of leaves is a volume of leaves. An open surface is a sheet
     that stands for leaves on a twig.
     """
     if material.kind == "leaves":

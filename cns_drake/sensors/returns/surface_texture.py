@@ -130,7 +130,7 @@ def with_texture(
 
 @compiled
 def _swell(a: float, b: float) -> float:
-    """Returns a smooth function of a place on the ground [m], from -1 to 1."""
+    """Returns a smooth function's value, -1 to 1, at a place on the ground."""
     first, second, third = _WAVES
     crossed = _wave(a / first) * _wave(b / second)
     return 0.5 * crossed + 0.5 * _wave((a + b) / third)
