@@ -42,7 +42,7 @@ _CORRELATED = 50.0
 
 @dataclass(frozen=True)
 class Surface:
-    """Points on surfaces.
+    """A cloud of points on surfaces, prepared for registration.
 
     Attributes:
         points: (N, 3) points [m].
@@ -77,7 +77,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Registration:
-    """The pose of a cloud S on a cloud T, and its fit.
+    """The pose of a cloud S relative to a cloud T, and how well the clouds fit.
 
     Attributes:
         X_TS: (4, 4) pose of S in T.

@@ -175,7 +175,7 @@ def trajectory_errors(
 
 
 def aligned_offsets(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns distances (N,) of estimated from ground-truth positions [m].
+    """Returns the distances (N,) of estimates from the ground truth [m].
 
     The estimated positions are first moved and rotated so that they fit best.
 

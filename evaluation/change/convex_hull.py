@@ -16,7 +16,7 @@ _CHUNK = 1 << 8
 def in_convex_hull(
     points: np.ndarray, vertices: np.ndarray, margin: float = 0.0
 ) -> np.ndarray:
-    """Returns which points lie in the convex hull, boundary included.
+    """Returns which points lie in a convex hull or on its boundary.
 
     A cloud without volume has a hull as well: a polygon in a plane, a line
     segment or a point. Coordinates are centred first, so that large offsets

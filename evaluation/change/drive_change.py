@@ -119,7 +119,9 @@ class ChangeReport:
 
 
 def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
-    """Returns the change between two maps, without its context.
+    """Returns the change between two maps, without control and spread.
+
+    Both limits of `spread` are TCR_sym on the unshifted grid.
 
     Raises:
         InputError: the maps are not in one world.

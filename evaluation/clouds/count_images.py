@@ -84,7 +84,7 @@ def image_points(image: np.ndarray) -> np.ndarray:
 
 
 def _largest_count(image: np.ndarray) -> int:
-    """Returns the number of voxels for which a value of 255 stands."""
+    """Returns the number of voxels that a pixel with the value 255 counts."""
     values = np.unique(image)
     for most in range(1, _MOST):
         steps = values * (most / 255.0)
@@ -95,7 +95,7 @@ def _largest_count(image: np.ndarray) -> int:
 
 
 def check_image(path: Path) -> None:
-    """Checks that a file is an image that `read_image` reads.
+    """Checks that a file is an image that `read_image` can read.
 
     Only the beginning of the file is read.
 

@@ -188,7 +188,7 @@ def _interleaved(
 
 @compiled
 def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
-    """Expands LZF data; returns whether it was sound and filled `plain`.
+    """Expands LZF data; returns whether the data are sound and fill `plain`.
 
     Format: each sequence begins with a control byte c. If c < 32, then c + 1
     literal bytes follow. Otherwise the sequence copies earlier bytes. The upper

@@ -133,7 +133,7 @@ def _to_records(
 
 
 def record_type(fields: list[tuple], where: str) -> np.dtype:
-    """Returns a type of records; refuses a field that is there twice."""
+    """Returns a type of records; raises an error if a field is there twice."""
     names = [field[0] for field in fields]
     for name in repeated(names):
         raise ValueError(f"{where} {name} is there twice")

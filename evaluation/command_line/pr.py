@@ -242,7 +242,7 @@ def _overlaps(
     protocol: RetrievalProtocol,
     exact_overlaps: Path | None,
 ) -> np.ndarray | None:
-    """Returns the overlap of each query with each place, if matches need it."""
+    """Returns the overlaps (Q, D) if matches are by overlap, otherwise None."""
     from evaluation.recognition import overlap_truth
 
     if exact_overlaps is not None:

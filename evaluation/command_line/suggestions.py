@@ -9,7 +9,7 @@ from evaluation.results.table_comparison import compare_tables
 
 
 def suggest_comparison(folder: Path) -> None:
-    """Prints the command that compares a folder's results with those shipped.
+    """Prints the command that compares a folder's results with shipped results.
 
     Nothing is printed if that command would refuse the results, for example
     because no results of the same experiment are shipped.

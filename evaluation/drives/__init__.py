@@ -83,7 +83,7 @@ def open_drive(
 
 
 def find_readers(path: Path) -> list[Any]:
-    """Returns the classes of drives whose format a file or folder has."""
+    """Returns the drive classes whose format a file or folder has."""
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
     from cns_drake.base.drives import mcap_drive

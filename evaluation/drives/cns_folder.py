@@ -209,7 +209,7 @@ def _first_pose(node: Any, path: Path) -> np.ndarray | None:
 def _composed_pose(
     p: np.ndarray, rotation: np.ndarray, path: Path
 ) -> np.ndarray:
-    """Returns the pose of a position and a quat_xyzw or a 3 x 3 matrix."""
+    """Returns a pose made of a position and of a quat_xyzw or 3 x 3 matrix."""
     if len(rotation) == 4:
         R = poses.rotation_from_quaternion(rotation)
     elif len(rotation) == 9:
@@ -222,7 +222,7 @@ def _composed_pose(
 
 
 def _number_array(node: Any) -> np.ndarray | None:
-    """Returns the numbers of a list, flat or nested, or of keys x, y, z, w."""
+    """Returns numbers from a list (flat or nested) or from keys x, y, z, w."""
     if isinstance(node, dict):
         keys = [key for key in "xyzw" if key in node]
         node = [node[key] for key in keys] if len(keys) >= 3 else None

@@ -199,7 +199,7 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
 
 
 def numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
-    """Yields those results for `results.csv` that only a tracked drive has.
+    """Yields the results for `results.csv` that only a tracked drive has.
 
     Args:
         tracked: records of `TRACKED`.

@@ -1,4 +1,4 @@
-"""Maps of several drives that are updated after each drive.
+"""A map of several drives, which is updated after each drive.
 
 The map A begins as the map of the first drive. After each further drive B, a
 change detector labels the points of A and of the map of B (see

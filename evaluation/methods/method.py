@@ -209,7 +209,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         return None
 
     def shortlist(self, query: Descriptor, database: Database) -> np.ndarray:
-        """Returns how well a query fits the best entries of a database part.
+        """Returns how well a query fits the best entries of part of a database.
 
         A place may have one entry or several. The search compares the
         `num_shortlisted` best entries of all parts, see `score_best`. A method

@@ -81,7 +81,7 @@ class Probe:
     mu: np.ndarray
 
     def evidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the occupancy p of each cell and its log-odds.
+        """Returns the occupancy p of each cell, and the log-odds of p.
 
         p is the probability `mu`, moved towards 1/2 by the fraction
         sqrt(mu (1 - mu)) of its distance from 1/2. Both arrays are (rings,

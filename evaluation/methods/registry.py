@@ -88,7 +88,7 @@ def shipped_methods() -> tuple[str, ...]:
 
 
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
-    """Returns a method with the given parameters, and defaults for the others.
+    """Returns a method; parameters that are not given have their defaults.
 
     Raises:
         InputError: if the method or a parameter is unknown, or a value does not

@@ -352,7 +352,9 @@ def _normalise(magnitudes: np.ndarray, n: int) -> np.ndarray:
 
 
 def _rotated(image: np.ndarray, angle: float) -> np.ndarray:
-    """Returns an image (C, n, n) rotated from the row axis to the column axis.
+    """Returns an image (C, n, n) rotated by an angle.
+
+    A positive angle rotates the row axis towards the column axis.
 
     Each pixel takes the value of the nearest source pixel, or 0 outside the
     image.

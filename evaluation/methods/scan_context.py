@@ -407,7 +407,11 @@ def _highest(
 
 
 def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns images with columns of length 1 or 0, and filled columns."""
+    """Returns images with columns scaled to length 1, and filled columns.
+
+    The second result is 1 for a filled column. An empty column stays 0 in the
+    images, and its second result is 0.
+    """
     norms = np.linalg.norm(images, axis=1)
     filled = norms > 0.0
     return (

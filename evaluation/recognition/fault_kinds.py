@@ -31,7 +31,7 @@ MUCH_CHANGED = 0.25
 
 
 def fault_words(kind: str) -> str:
-    """Returns the name of a reason in words, such as `near miss`."""
+    """Returns a reason in words, such as `near miss`."""
     return _WORDS.get(kind, kind.replace("_", " "))
 
 

@@ -78,9 +78,10 @@ class Reference:
         protocols: method -> protocol by which the source ran the method,
             including the number of scans per place.
         judge: function that returns verdicts on all claims that a report's
-            numbers can test. The function takes two lists: the results on pairs
-            of drives, first by the report's own protocol and then by the
-            source's protocol; and the changes between stages.
+            numbers can test. It takes two lists. The first list contains the
+            results on pairs of drives by the report's own protocol, followed by
+            the results by the source's protocol. The second list contains the
+            changes between stages.
     """
 
     title: str = ""
@@ -101,7 +102,7 @@ class Reference:
         return {city for city, *_ in self.recognitions}
 
     def change(self, map_name: str, stages: Sequence[str]) -> float | None:
-        """Returns the published TCR_sym of a pair of stages, in any order."""
+        """Returns the published TCR_sym of two stages, given in any order."""
         first, second = sorted(stages)
         return self.changes.get((map_name, first, second))
 

@@ -28,7 +28,7 @@ def check_same_queries(one: Answers, other: Answers) -> None:
 
 
 def drive_number(queries: Answers) -> int:
-    """Returns a number of the drive of queries, equal in all tables."""
+    """Returns a number that identifies the query drive in all tables."""
     return zlib.crc32(f"{queries.map} {queries.query}".encode())
 
 

@@ -29,11 +29,11 @@ def listed(names: Iterable[str]) -> str:
 def from_least_to_greatest(
     found: Mapping[str, float], form: str = "{:.2f}"
 ) -> str:
-    """Returns the least and the greatest number of some methods as text.
+    """Returns the least and the greatest of some methods' values, as text.
 
     Args:
-        found: method -> its number; NaN if it is unknown.
-        form: format of a number.
+        found: method -> its value; NaN if it is unknown.
+        form: format of a value.
     """
     known = {n: value for n, value in found.items() if not math.isnan(value)}
     if not known:
@@ -125,7 +125,7 @@ def _percent(value: float) -> str:
 
 
 def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
-    """Returns from which methods the best differs significantly, by AUC.
+    """Says from which methods the best method differs significantly, by AUC.
 
     Args:
         rows: rows of the metric `auc`.

@@ -87,7 +87,7 @@ class Key:
     version: str = field(default="", kw_only=True)
 
     def __getitem__(self, column: str) -> object:
-        """Returns the value of a column, or `label`; None if it is unknown."""
+        """Returns the value of a column or of `label`; None if unknown."""
         if column in RESERVED:
             return getattr(self, column, None)
         return self.factors.get(column)
@@ -109,7 +109,7 @@ class Key:
         return self.without()
 
     def without(self, *names: str) -> tuple[object, ...]:
-        """Returns the key without some of its columns, to group rows by.
+        """Returns the key without some columns, so that rows can be grouped.
 
         If two rows have the same reduced key, they were measured under
         conditions that differ only in the columns left out.

@@ -1,4 +1,4 @@
-"""Tables of one metric by method and condition: shipped, and the user's."""
+"""Tables of one metric by method and condition, shipped or by the user."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

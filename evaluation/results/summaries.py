@@ -313,8 +313,9 @@ def paired_values(results: Results, x: str, y: str) -> list[tuple[Row, float]]:
 
     `x` is a factor or another metric. The value of a metric comes from a row
     with the same condition and, in this order of preference: the same method
-    and `gate`; the same method without geometric verification; no method, such
-    as a row of `tcr_sym`. Rows for which there is no value of `x` are left out.
+    and `gate`; the same method without geometric verification; no method at
+    all, as in a row of `tcr_sym`. Rows for which there is no value of `x` are
+    left out.
     """
     wider: tuple[tuple[str, ...], ...] = (
         ("task", "protocol"),

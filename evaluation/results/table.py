@@ -377,7 +377,7 @@ def _answer_columns(
 
 
 def _measured_values(one: TableLine) -> dict[str, Any]:
-    """Returns a row's values in the columns after those of its key."""
+    """Returns a row's values in the columns that follow its key."""
     metric = one.text("metric")
     value, low, high = (
         one.value(name, float) for name in ("value", "low", "high")

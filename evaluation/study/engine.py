@@ -45,7 +45,7 @@ class Engine:
     """Measures pairs of drives by tasks and methods.
 
     Add all pairs of each map with `add`, then call `run`. If you run `jobs`
-    together with other jobs, call `write_tables` when they are done.
+    together with other jobs, call `write_tables` when all jobs are done.
 
     Attributes:
         experiment: name of the experiment, a column of the tables.
@@ -77,7 +77,7 @@ class Engine:
         make_jobs: Callable[..., Jobs] = Jobs,
         tasks: Collection[str] | None = None,
     ) -> Jobs:
-        """Adds the jobs of all comparisons on one map, and returns them.
+        """Adds the jobs of all comparisons on one map, and returns the jobs.
 
         Args:
             comparisons: the comparisons.
@@ -112,7 +112,7 @@ class Engine:
         return planned
 
     def run(self, cluster: Cluster) -> tuple[Results, QueryRows]:
-        """Runs all jobs, writes both tables, and returns them.
+        """Runs all jobs, writes both tables, and returns the tables.
 
         Raises:
             InputError: a step failed, or a file cannot be written.
@@ -140,7 +140,7 @@ class Engine:
         return tables
 
     def write_tables(self) -> tuple[Results, QueryRows]:
-        """Writes both tables of finished jobs, and returns them.
+        """Writes both tables of finished jobs, and returns the tables.
 
         Raises:
             InputError: a job has not been done, or a file cannot be written.

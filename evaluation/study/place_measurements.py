@@ -310,7 +310,7 @@ def _method_outcomes(
     leaves_out_itself: bool = False,
     leaves_out_slow: bool = True,
 ) -> list[PlaceOutcome]:
-    """Returns the outcomes of a method; none if it would take too long.
+    """Returns a method's outcomes; none if the method would take too long.
 
     Args:
         choice: the method, as it was chosen.

@@ -1,4 +1,4 @@
-"""Removes descriptors that no result needs any more, and makes them again.
+"""Removes descriptors that no result needs, and has them computed again.
 
 Descriptors take three quarters of the space of a study, and are needed only
 until results have been made from them.

@@ -62,7 +62,7 @@ class Repeat:
 
 @dataclass
 class _RepeatJobs(Jobs):
-    """Jobs that read descriptors, which jobs of the first runs make.
+    """Jobs that read the descriptors that jobs of the first runs make.
 
     The overlaps of queries with their matches stay unknown.
     """
