@@ -122,7 +122,14 @@ class StandingStructures:
         return self._added.get(name, self._footprints.get(name, Polygon()))
 
     def structure(self, name: str) -> Structure:
-        """Returns a structure as it is now; as by `OldWorld.structure`."""
+        """Returns a structure as it is now; the structure must stand.
+
+        A structure that is unchanged since today comes from
+        `OldWorld.structure`.
+
+        Raises:
+            InputError: `OldWorld.structure` does not support the structure.
+        """
         return self.by_name.get(name) or self._world.structure(name)
 
     def triangles(self, name: str) -> np.ndarray:

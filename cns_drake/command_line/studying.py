@@ -203,13 +203,13 @@ def _chosen_experiment(
     """
     with uninterrupted():
         from cns_drake.studies.experiment_files import load_experiment
-        from evaluation.study.chosen_methods import with_standard
+        from evaluation.study.chosen_methods import expanded_names
 
     experiment = load_experiment(name, overrides, quick=quick, on_note=note)
     chosen: list[str | tuple[str, Any]] = list(overrides)
     for field, names in (
         ("tasks", tasks),
-        ("methods", with_standard(methods or ())),
+        ("methods", expanded_names(methods or ())),
     ):
         if names:
             # Methods of the experiment keep their settings.

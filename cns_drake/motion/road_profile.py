@@ -53,14 +53,18 @@ class RoadProfile:
     # street along the layer's lattice.
 
     def __init__(self, roughness: RoughnessClass, seed: int):
-        """Draws the coefficients of all layers."""
+        """Sets the roughness class, and the seed of all random numbers."""
         self._level = (
             ROUGHNESS[roughness] * _N0**2 * math.log(2) / _X_SINC8_INTEGRAL
         )
         self._seed = seed
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
-        """Returns the heights (N,) of the surface at places (N, 2) in W [m]."""
+        """Returns the heights (N,) of the surface at places (N, 2) in W [m].
+
+        Each call samples the coefficients of all layers again, with the same
+        seed. Equal places therefore have equal heights.
+        """
         # This import is slow, and not needed to describe a scenario.
         from scipy.ndimage import map_coordinates
 

@@ -129,12 +129,13 @@ class EmbreeHierarchy:
             handle = self._instances.get(row)
             if handle is None:
                 continue
-            has_changed = True
             if not in_sight[k]:
                 if row not in self._disabled:
                     lib.rtcDisableGeometry(handle)
                     self._disabled.add(row)
+                    has_changed = True
                 continue
+            has_changed = True
             if row in self._disabled:
                 lib.rtcEnableGeometry(handle)
                 self._disabled.remove(row)

@@ -101,8 +101,8 @@ def combined_digest(inputs: dict[str, str]) -> str:
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     """Returns a hash of everything that determines a scenario's recording.
 
-    The hash does not depend on the folder of the files or on settings that
-    affect only the drive's web page.
+    The hash depends neither on the folders of the files nor on the code that
+    makes pictures and web pages.
 
     Args:
         scenario: the scenario.
@@ -114,11 +114,10 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
         if (place := getattr(scenario, field)) is not None
     }
     if scenario.imu.kalibr is not None:
-        update = {"kalibr": KALIBR_FILE}
-        places["imu"] = scenario.imu.replaced(**update)
+        places["imu"] = scenario.imu.replaced(kalibr=KALIBR_FILE)
     if scenario.traffic.fcd is not None:
-        update = {"fcd": Path(scenario.traffic.fcd).name}
-        places["traffic"] = scenario.traffic.replaced(**update)
+        name = Path(scenario.traffic.fcd).name
+        places["traffic"] = scenario.traffic.replaced(fcd=name)
     return fingerprint(
         {
             # LiDARs become one text, because their order matters.

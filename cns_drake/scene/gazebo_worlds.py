@@ -345,9 +345,9 @@ class _Simplifier:
 
     def _add_link(self, link: Element, target: Element, folder: Path) -> None:
         self._count_unknown(link)
+        # A link without visuals stays, because poses can refer to the link.
         made = SubElement(target, "link", name=_free_name(link, target))
         self._copy_pose(link, made)
-        # An invisible element is kept if others are placed relative to it.
         for visual in link.iterfind("visual"):
             self._add_visual(visual, made, target, folder)
 

@@ -52,13 +52,13 @@ def real(
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.real.real_study import measure_real
     from evaluation.results.table import RESULTS
-    from evaluation.study.chosen_methods import with_standard
+    from evaluation.study.chosen_methods import expanded_names
 
     measure_real(
         folder,
         output,
         choose_cluster(jobs, scheduler),
-        with_standard(method or ()),
+        expanded_names(method or ()),
         parameter or (),
         simulated,
         terminal.note,

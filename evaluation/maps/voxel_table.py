@@ -29,11 +29,15 @@ def _find_slot(
 ) -> np.uint64:
     """Returns the slot of a voxel, or the free slot for it.
 
+    The number of slots must be a power of two. If the table does not contain
+    the voxel, a slot must be free; otherwise the search does not end.
+
     The index of the slot is unsigned: at each use of a signed index, numba
     tests whether the index counts from the end.
     """
     mask = len(table) - 1
-    # Large odd factors spread neighbouring voxels; products wrap around.
+    # Large odd factors spread neighbouring voxels, as in the hash function of
+    # Teschner et al. (VMV 2003); products wrap around.
     mixed = (
         np.int64(ix) * np.int64(73856093)
         ^ np.int64(iy) * np.int64(19349669)
@@ -61,7 +65,8 @@ def copy_voxels(
         table: (S,) slots of type `SLOT`.
         sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
             has a sample, see `add_points`.
-        larger: (L,) empty slots, to which the voxels are copied.
+        larger: (L,) empty slots, to which the voxels are copied. L is a power
+            of two.
         larger_sampled: (L, B) uint8, to which `sampled` is copied.
     """
     for i in range(len(table)):
@@ -107,8 +112,8 @@ def add_points(
         X: (4, 4) pose of the sensor in the moved world.
         voxel_size: length of a voxel's side [m].
         divisions: number of cells along a voxel's side; 0 to keep no samples.
-        table: (S,) slots of type `SLOT`; changed here. The table needs room for
-            all voxels.
+        table: (S,) slots of type `SLOT`; changed here. S is a power of two. The
+            table needs room for all voxels.
         size: number of voxels that the table already contains.
         sampled: (S, B) uint8, for each slot one bit per cell: whether the cell
             has a sample; changed here.

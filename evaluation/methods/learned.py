@@ -30,7 +30,6 @@ from cns_drake.base.terminal import note
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.polar_images import (
     CHANNELS,
-    SECTORS,
     polar_image,
     share_of_seen_sectors,
 )
@@ -285,7 +284,7 @@ def _feature_map(
         if number < last:
             np.maximum(flat, 0.0, out=flat)
         cells = flat.reshape(rings, sectors, after)
-    return cells.transpose(1, 0, 2).reshape(SECTORS // 4, FEATURES)
+    return cells.transpose(1, 0, 2).reshape(TURNS, FEATURES)
 
 
 def _spectrum(scan: LearnedScan) -> np.ndarray:

@@ -138,8 +138,10 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
     return name, tuple(value.split(",")) if "," in value else value
 
 
-def with_standard(names: Iterable[str]) -> list[str]:
-    """Returns names, with `standard` replaced by all standard methods.
+def expanded_names(names: Iterable[str]) -> list[str]:
+    """Returns names with `standard` expanded; refuses a method named twice.
+
+    The names of all standard methods replace `standard`.
 
     Raises:
         InputError: a method is named twice.
@@ -203,7 +205,7 @@ def choose_methods(
     """
     chosen: list[MethodChoice] = []
     stems = set()
-    for name in with_standard(map(str, names)) or shipped_methods():
+    for name in expanded_names(map(str, names)) or shipped_methods():
         if name in (*shipped_methods(), *optional_methods()):
             chosen.append(MethodChoice(name))
             continue

@@ -19,7 +19,9 @@ _COMPASS = (
     "N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE",
     "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW",
 )  # fmt: skip
-# Objects that carry a lamp which is an object of its own.
+# Values of the tags `lamp_mount` and `support` for an object that stands on a
+# post of its own. With other values, such as `wall_mounted`, another structure
+# carries the object.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
 _TREE_DISTANCE = 8.0  # [m]
 
@@ -54,13 +56,13 @@ def make_small_objects(
 
     `local` converts places of the file to metres in W.
     """
-    kinds = features.kinds
+    elements = features.kinds
     for name, tags, place in features.nodes:
         kind = object_kind(tags)
         if kind is not None and not is_inside(tags):
             x, y = local(np.array([place]))[0].tolist()
             direction = _direction(tags)
-            yield SmallObject(name, kinds[name], kind, (x, y), direction)
+            yield SmallObject(name, elements[name], kind, (x, y), direction)
     for name, tags, line, _ in features.ways:
         if tags.get("natural") == "tree_row":
             needles = tags.get("leaf_type") == "needleleaved"
@@ -72,7 +74,7 @@ def make_small_objects(
             )
             kind = "spruce" if needles else "lime_tree"
             for x, y in shapely.get_coordinates(points).tolist():
-                yield SmallObject(name, kinds[name], kind, (x, y), None)
+                yield SmallObject(name, elements[name], kind, (x, y), None)
 
 
 def _direction(tags: Tags) -> float | None:

@@ -113,8 +113,8 @@ class ImuSection(Mount):
         if kalibr is None:
             return None
         rate = float(self.sample_rate(scan_rate))
-        update = {"rostopic": "/imu/data", "update_rate": rate}
-        return kalibr.replaced(**update).model_dump()
+        changed = kalibr.replaced(rostopic="/imu/data", update_rate=rate)
+        return changed.model_dump()
 
     def _read_kalibr(self) -> KalibrImu | None:
         return None if self.kalibr is None else read_kalibr(Path(self.kalibr))
