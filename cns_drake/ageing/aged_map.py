@@ -218,7 +218,7 @@ def _write_drives(
     """Writes a drive through each stage.
 
     The drive through today's stage has the route of the map's first drive. All
-    others have the route of the map's last drive, which is the query.
+    other drives have the route of the map's last drive, which is the query.
     """
     for stage, year in stages.items():
         path = drives[0] if stage == TODAY else drives[-1]

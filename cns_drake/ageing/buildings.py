@@ -62,9 +62,9 @@ class Buildings:
         Args:
             world: the city of today.
             standing: the ageing city.
-            draws: its random numbers.
-            trees: its trees, which are felled for buildings.
-            lots: its lots.
+            draws: random numbers of the ageing city.
+            trees: trees of the ageing city, which are felled for buildings.
+            lots: lots of the ageing city.
             kept_free: area in W [m] on which nothing is built.
         """
         self.lots = lots

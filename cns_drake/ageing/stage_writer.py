@@ -94,7 +94,7 @@ class StageWriter:
     def _finish(
         self, stage: str, standing: Mapping[str, Structure | None]
     ) -> None:
-        """Writes the meshes of a stage, and counts its contents.
+        """Writes a stage's meshes, and counts its structures and triangles.
 
         Meshes that an earlier stage also uses are not written again. The
         arguments are the same as for `stage`.

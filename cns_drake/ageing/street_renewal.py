@@ -51,7 +51,7 @@ class StreetRenewal:
         Args:
             world: the city of today.
             standing: the ageing city.
-            draws: its random numbers.
+            draws: random numbers of the ageing city.
             kept_free: area in W [m] that stays free.
         """
         self._world = world

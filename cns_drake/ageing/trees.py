@@ -82,7 +82,7 @@ class Trees:
         Args:
             world: the city of today.
             standing: the ageing city.
-            draws: its random numbers.
+            draws: random numbers of the ageing city.
             seed: seed of the greatest heights of trees.
         """
         self._standing = standing

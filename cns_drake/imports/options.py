@@ -21,7 +21,7 @@ class ImportOptions:
             usual attributes.
         undated: which stages contain the buildings whose year is unknown: all
             stages (`first`), only the last stage (`last`), or none (`never`).
-        lod: level of detail to read; None for the highest of each object.
+        lod: level of detail to read; None for each object's highest level.
         seed: seed of everything that is sampled at random: the changes of
             `grow`, the details of `dressed`, and the buildings of a town that
             is built along a file's roads.

@@ -41,7 +41,7 @@ class Areas:
         lane_area: the carriageway without parking bays.
         sidewalks: areas beside the roads and around all corners, at kerb
             height.
-        medians: strips with kerbs between the two directions.
+        medians: strips with kerbs between the two directions of a road.
         parking_bays: maps (name of the road, side) to the area of the bays. The
             side is "left" or "right", as seen in the road's direction
             `forward`.
@@ -220,7 +220,7 @@ def _parking_bays(
 
 
 def _median(road: Road) -> BaseGeometry:
-    """Returns a road's median with round ends, between the ends of the road."""
+    """Returns a road's median, which is rounded at both ends of the road."""
     half = road.median / 2
     shift = (
         road.lane_width * (road.lanes["forward"] - road.lanes["backward"]) / 2

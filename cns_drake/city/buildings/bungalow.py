@@ -74,8 +74,8 @@ class Bungalow(FamilyHouse):
     def _lay_out(self) -> None:
         """Chooses the main wing, the wings in front of it and the carport.
 
-        `free` is the stretch in x of the main wing's front that no other wing
-        hides [m].
+        `free` is the stretch in x on which no other wing hides the main wing's
+        front [m].
         """
         x0, y0, x1, y1 = self.site.bounds
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M

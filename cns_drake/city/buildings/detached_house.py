@@ -89,7 +89,7 @@ class DetachedHouse(FamilyHouse):
         """Chooses the wings of the house.
 
         The first wing is `main`, with `storeys` storeys. `free` is the stretch
-        in x of the main wing's front that no other wing hides, and `ahead` is
+        in x on which no other wing hides the main wing's front, and `ahead` is
         the depth of free ground in front of the main wing [m].
         """
         x0, y0, x1, y1 = self.site.bounds

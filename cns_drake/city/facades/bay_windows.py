@@ -65,7 +65,7 @@ def add_bay_window(
 def _plan(
     x: float, width: float, reach: float, *, canted: bool
 ) -> tuple[list[outlines.Point], frozenset[int]]:
-    """Returns the corners of a bay window, and the edges inside the wall.
+    """Returns a bay window's corners, and the numbers of edges in the wall.
 
     The corners are distances along the wall and out of the wall [m].
     """

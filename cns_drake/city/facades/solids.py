@@ -1,4 +1,4 @@
-"""Solids from which buildings are put together, over outlines.
+"""Solids over outlines, from which buildings are put together.
 
 The faces of a solid face outwards, and all sides that can be seen are closed.
 """

@@ -105,7 +105,10 @@ def garage(rng: np.random.Generator) -> Model:
 
 
 def bus_shelter(rng: np.random.Generator) -> Model:
-    """Returns a shelter, 4 m by 1.5 m, open towards +x, with a stop."""
+    """Returns a bus shelter and the post of the bus stop beside it.
+
+    The shelter is 4 m by 1.5 m, and open towards +x.
+    """
     # Which end has the advertisement: 1 for +y. The mirror image has meshes of
     # its own: a mirrored mesh would be inside out.
     advert = Dice(rng).pick((1, -1))

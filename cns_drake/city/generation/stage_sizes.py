@@ -19,7 +19,7 @@ def triangles_in(obj: str) -> int:
 def count_triangles(
     shapes: Iterable[Shape], triangles: Mapping[str, int]
 ) -> int:
-    """Returns the number of triangles of shapes as LiDARs see them.
+    """Returns how many triangles LiDARs see in shapes.
 
     Cylinders and spheres have no triangles.
 

@@ -1,4 +1,4 @@
-"""Divides the ground between the streets into the districts of a plan."""
+"""Divides the ground outside the streets into the districts of a plan."""
 
 from typing import NamedTuple
 

@@ -126,7 +126,7 @@ def _place_along(
     *,
     facing_street: bool = False,
 ) -> None:
-    """Places an object on a line, with its heading along the line.
+    """Places an object on a line; its heading is the line's direction.
 
     With `facing_street`, the object faces the street on the right of the line,
     and stands back so that the object's front (+x) touches the line.

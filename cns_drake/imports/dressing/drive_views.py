@@ -1,4 +1,4 @@
-"""What drives see of a city: whether walls are near them and visible."""
+"""What drives see of a city: which walls are near, and which visible."""
 
 from collections.abc import Sequence
 

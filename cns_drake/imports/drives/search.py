@@ -122,7 +122,11 @@ def _longest_way_from(
 
 
 def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
-    """Yields ways that share the middle of the first way, the best first."""
+    """Yields ways that share the middle of the first way.
+
+    In each trial of `_JOINING_SHARES`, ways that join the first way early and
+    leave it late come first.
+    """
     along = np.concatenate([[0.0], graph.along(first)])
     part = along / along[-1]
     every = np.arange(len(first))

@@ -186,7 +186,7 @@ def with_ground_heights(
 ) -> list[WaypointRoute]:
     """Returns drives whose waypoints have the heights of the ground.
 
-    A drive that a car cannot steer on its slopes is left out and counted.
+    A drive is left out and counted if a bend on a slope is too tight for a car.
 
     Args:
         drives: the drives.

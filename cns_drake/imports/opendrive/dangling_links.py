@@ -1,4 +1,4 @@
-"""Counts links in an OpenDRIVE file to things that are not in the file."""
+"""Counts links in an OpenDRIVE file whose targets are not in the file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 

@@ -93,8 +93,8 @@ def import_openstreetmap(
             parapets.
 
     Raises:
-        InputError: if the file cannot be read, has no building, or is larger
-            than 20 km.
+        InputError: if the file cannot be read, has no building, or extends over
+            more than 20 km.
     """
     features = reading.read_openstreetmap(path)
     faults = features.faults
@@ -186,7 +186,7 @@ def _count_walled_up(
 def _without_outers(
     buildings: Iterable[OsmArea], features: OsmFeatures
 ) -> Iterator[OsmArea]:
-    """Yields buildings without ways that are the outlines of multipolygons.
+    """Yields the buildings, except ways that are outlines of multipolygons.
 
     If such a way has the same tags as its multipolygon, a building made from
     the way would fill the courtyards of the multipolygon.

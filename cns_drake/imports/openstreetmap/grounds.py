@@ -42,8 +42,8 @@ def ground_areas(
     """Yields areas on the ground, such as lawns and water.
 
     If `dressed`, there are additional kinds of areas, such as sports grounds,
-    and areas have the colours of their materials. A path that is a closed way
-    is a line, such as the path around a square, unless it has `area=yes`.
+    and areas have the colours of their materials. A closed way for people, such
+    as the path around a square, is a line unless it has the tag `area=yes`.
     """
     for name, tags, polygons in features.areas:
         is_path = name.startswith("w") and path_width(tags) is not None

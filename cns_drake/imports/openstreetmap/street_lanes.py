@@ -127,8 +127,8 @@ def make_traffic_lanes(
     Args:
         streets: the streets.
         crossed: nodes at which people cross.
-        surface: surface of all streets in W [m]. Ways through junctions that
-            leave this surface are left out.
+        surface: surface of all streets in W [m]. A way through a junction is
+            left out if it leaves this surface.
         side: 1 if traffic keeps right, and -1 if it keeps left.
     """
     stretches = list(_stretches(streets, crossed))
@@ -332,8 +332,8 @@ def _line_beside(
 
     Args:
         middle: (N, 2) points of the other line [m].
-        tangent: (N, 2) unit vectors along this line.
-        offset: distance to the right of this line [m].
+        tangent: (N, 2) unit vectors along the other line.
+        offset: distance to the right of the other line [m].
 
     Returns:
         The points; None if the other line bends too sharply.

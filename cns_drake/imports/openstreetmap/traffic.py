@@ -139,7 +139,7 @@ def _are_free(
 
 
 def _driven_area(points: np.ndarray) -> BaseGeometry:
-    """Returns the area that vehicles on the middle line of a lane cover."""
+    """Returns the area that vehicles cover along the middle of a lane."""
     return shapely.LineString(points[:, :2]).buffer(
         _HALF_WIDTH, cap_style="flat", quad_segs=2
     )
