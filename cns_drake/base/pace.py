@@ -52,10 +52,10 @@ class _JobState:
 
     Attributes:
         cost: expected time [s].
-        since: when it was started [s]; None if it does not run.
+        since: when the job was started [s]; None if the job does not run.
         first: share that an earlier run had done; None until the job says how
             far it is.
-        is_ended: whether it has ended.
+        is_ended: whether the job has ended.
     """
 
     cost: float

@@ -1,7 +1,7 @@
 """The command `cns-drake`: its commands, each with an example.
 
-Each command imports the slow modules that it needs only when it runs, so that
-`--help` and `list` answer at once. Interrupts wait during imports.
+A command's slow modules are imported when the command runs, and not before, so
+that `--help` and `list` answer at once. Interrupts wait during imports.
 """
 
 from collections.abc import Callable

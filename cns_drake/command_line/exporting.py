@@ -378,7 +378,7 @@ def _export_film(
 def _learned_drives(
     names: list[str], vary: str | None, output: Path, cluster: Cluster
 ) -> list[Scenario]:
-    """Returns the drives of training data, except those held out.
+    """Returns the drives of training data, except the drives held out.
 
     These are the named drives and the drives of the experiment `vary`, or all
     shipped drives if neither is given.

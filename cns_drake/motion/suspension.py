@@ -104,8 +104,8 @@ class Suspension:
 
         Args:
             inputs: (W + 3,) constant loads: height of the road below each of
-                the W wheels [m], then the specific force along x, y and z of B,
-                minus the specific force on a car at rest on a level road
+                the W wheels [m], then, along x, y and z of B, the specific
+                force minus the specific force of a car at rest on a level road
                 [m/s^2].
         """
         return rotated(inv(self._stiffness), rotated(self._loads, inputs))

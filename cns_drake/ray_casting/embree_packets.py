@@ -28,8 +28,9 @@ class PacketScenes(NamedTuple):
             in each instance.
         owner_of_primitive: (P,) int32 number of the member of the group to
             which each primitive belongs.
-        groups: (1 + I,) int32 row of the group of the fixed scene, -1 if there
-            is none, and of each instance.
+        groups: (1 + I,) int32 row of a group: first of the group of the fixed
+            scene (-1 if there is no fixed scene), then of the group of each
+            instance.
         first_member: (1 + I,) int64 index in `geometries` of each group's first
             member.
         geometries: (M,) int32 index of the geometry of each member.

@@ -136,8 +136,8 @@ class BagWriter:
 
         Raises:
             InputError: if the folder or the file cannot be written, another
-                process is writing it, or the part file of an interrupted run is
-                not of this recording.
+                process is writing it, or the part file of an interrupted run
+                belongs to another recording.
         """
         with user_errors(self._files.path):
             self._files.path.mkdir(parents=True, exist_ok=True)

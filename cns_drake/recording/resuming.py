@@ -48,7 +48,7 @@ def _complete_frames(
 ) -> Iterator[list[RecordedMessage]]:
     """Yields the messages of each frame, up to the first incomplete frame.
 
-    A frame is yielded before the first message behind it is read.
+    A frame is yielded before the first message after the frame is read.
 
     Args:
         messages: messages of a recording from its start on, by time.

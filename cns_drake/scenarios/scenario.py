@@ -434,7 +434,7 @@ class Scenario(Section):
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with every LiDAR replaced by another model.
 
-        The LiDARs keep their poses and all settings of how they measure.
+        The LiDARs keep their poses and all settings of the measurement.
 
         Args:
             preset: name of the model's preset, such as `vlp-16`.

@@ -92,8 +92,8 @@ class MapFolder:
     def other_drive(self, stage: str) -> Path:
         """Returns the path of the scenario file for the other route.
 
-        An imported city has two routes. Each stage has a drive on one route,
-        and this drive on the other route.
+        An imported city has two routes, and each stage has a drive on each
+        route. `MapFolder.drive` returns the path for the first route.
         """
         return self.path / f"other_{stage}.yaml"
 

@@ -67,7 +67,7 @@ class SimulationSource:
 class SimulatedDrive(Drive):
     """A drive whose scans are simulated, and are the same as in a recording.
 
-    Each access to a scan simulates it.
+    Each access to a scan simulates the scan.
 
     Attributes:
         X_BS: pose of the first LiDAR in base_link.

@@ -110,7 +110,7 @@ class DriveChanger:
         Args:
             unchanged: the drive.
             place: path of the drive in the experiment's file: `query`,
-                `database` or, for one of several drives, such as
+                `database` or, for one of several drives, a path such as
                 `database.sessions.2`.
             changes: fields of the drive.
             ageing: how the city of the drive ages.

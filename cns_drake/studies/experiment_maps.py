@@ -54,7 +54,7 @@ class MapPairs:
 
 
 class ExperimentMaps:
-    """Finds the maps of an experiment, and makes those that do not exist."""
+    """Finds the maps of an experiment, and makes maps that do not exist."""
 
     def __init__(
         self,

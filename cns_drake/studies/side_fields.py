@@ -34,7 +34,7 @@ def check_side(place: str, changes: Changes, source: str) -> None:
 
     Args:
         place: path of the drive in the file: `database`, `query` or, for one of
-            several drives, such as `database.sessions.2`.
+            several drives, a path such as `database.sessions.2`.
         changes: fields of the drive.
         source: file of the experiment, for errors.
 

@@ -90,9 +90,9 @@ class Trial:
             task: what all trials have in common.
             kinds: kinds of the vehicles in `traffic`, without the ego car.
             crowd: the pedestrians.
-            traffic: the vehicles. If the ego car follows others, it is the last
-                of them.
-            follower: the ego car, if it follows others.
+            traffic: the vehicles. If the ego car follows other vehicles, the
+                ego car is the last entry.
+            follower: the ego car, if it follows other vehicles.
             seed: seed of the random routes.
         """
         self._task = task

@@ -25,7 +25,7 @@ def memory_mesh(
     """Returns a mesh in memory; equal meshes give the same text.
 
     Readers thus recognise equal meshes as the same mesh. The mesh has vertices
-    (N, 3), before they are scaled [m], and triangles (M, 3).
+    (N, 3), given before scaling [m], and triangles (M, 3).
     """
     used, corners = np.unique(triangles, return_inverse=True)
     # Python's numbers are formatted several times faster than NumPy's.

@@ -229,7 +229,7 @@ def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
 
 
 def _data_files(module: Path) -> Iterator[Path]:
-    """Yields a module's data files, beside it or in folders beside it."""
+    """Yields the data files that a module names, in its folder or below."""
     text = module.read_bytes()
     for path in sorted(module.parent.iterdir()):
         if path.suffix == ".py" or path.name.encode() not in text:

@@ -17,13 +17,13 @@ from cns_drake.sensors.lidar.beams import BeamPattern, Beams, make_beams
 class SpinningPattern(BeamPattern):
     """The beam pattern of a spinning LiDAR with one or more rings.
 
-    In the sensor frame S (x forward, y left, z up) the revolution starts at the
-    rear and goes clockwise seen from above, as Ouster's and Velodyne's units
-    turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits,
-    the unit fires only in the part of the revolution from the first limit to
-    the last, including both limits. Ring 0 is the highest beam. Beams are
-    ordered as they fire: column by column, and in each column from ring 0
-    downwards.
+    The revolution starts at the rear and goes clockwise as seen from above,
+    like the revolutions of Ouster's and Velodyne's units. In the sensor frame S
+    (x forward, y left, z up), column k of n points at azimuth pi - 2 pi k / n.
+    With azimuth limits, the unit fires only in the part of the revolution from
+    the first limit to the last, including both limits. Ring 0 is the highest
+    beam. Beams are ordered as they fire: column by column, and in each column
+    from ring 0 downwards.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].

@@ -176,9 +176,9 @@ def correct_side_hits(
     """Corrects the hits of additional rays; returns the axes' shares of light.
 
     At an edge, the axis of a beam hits one surface, and the axis of a
-    neighbouring beam hits another. The beam then has an additional ray (see
-    `find_sides`), which is cast only to just beyond the nearer of these two
-    surfaces. The hit of the additional ray is corrected in two cases:
+    neighbouring beam hits another surface. The beam then has an additional ray
+    (see `find_sides`), which is cast only to just beyond the nearer of these
+    two surfaces. The hit of the additional ray is corrected in two cases:
 
     - If the ray hits the same surface as the axis of its own beam, the hit is
       removed.

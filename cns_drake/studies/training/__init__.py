@@ -6,5 +6,5 @@ method. The loss is the cross entropy between a softmax over all places of the
 batch and the target weights of the places. If exact overlaps are known, the
 target weight of a place grows with the overlap of its scan with the query's
 scan; otherwise it falls with the distance of the place from the query. Places
-that are more similar to the query thus rank higher than others.
+that are more similar to the query thus rank higher than less similar places.
 """
