@@ -1,5 +1,6 @@
 """Aligns two drives of one place, so that both are in one world frame.
 
+One drive, the source, is moved into the world of the other drive, the target.
 The method follows LT-SLAM (Kim and Kim, "LT-mapper", ICRA 2022), but is more
 robust:
 

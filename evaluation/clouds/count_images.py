@@ -10,9 +10,9 @@ scaled so that the largest value in the image is 255.
 The program that the authors of BEVPlace (Luo et al.: ICCV 2023) published with
 their images of KITTI makes different images. The rules of this module were
 found from the published images themselves. On five scans of KITTI 00, the
-pixels of both programs' images have a correlation of 0.86. One rule is that
-indices are rounded towards zero, so that the middle row and the middle column
-are twice as wide as the others.
+pixels of this module's images have a correlation of 0.86 with the pixels of the
+published images. One rule is that indices are rounded towards zero, so that the
+middle row and the middle column are twice as wide as the others.
 """
 
 from collections.abc import Iterator

@@ -46,8 +46,9 @@ class Driving:
         standing: share of the time with a speed below `STANDING_SPEED`.
         speed_10, speed_50, speed_90: 10 %, 50 % and 90 % quantiles of the speed
             while the car moves [m/s]; NaN if it never moves.
-        roll_spread_deg, pitch_spread_deg: standard deviations of the sensor's
-            roll and pitch, at points of the path every `STATION_SPACING` [deg].
+        roll_spread_deg, pitch_spread_deg: standard deviations [deg] of the
+            sensor's roll and pitch, at points of the path that are
+            `STATION_SPACING` apart.
     """
 
     name: str
@@ -133,7 +134,7 @@ class _Way:
     Attributes:
         length: length of the path [m].
         frame: (N,) number of the frame at each step or shortly before it.
-        p_WS: (N, 3) [m].
+        p_WS: (N, 3) position of the sensor at each step [m].
         tangent: (N, 2) horizontal direction, of length 1.
     """
 

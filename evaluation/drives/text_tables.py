@@ -111,7 +111,8 @@ def _places(
     """Returns the positions of columns to read, and how many columns exist.
 
     Args:
-        header: line above the first row; it may be no header, or empty.
+        header: line above the first row, which need not be a header; "" if
+            there is no such line.
         row: the first row.
         separator: text between columns; None for white space.
         names: see `read_numbers`.

@@ -146,8 +146,8 @@ def _scans_of_map(
 def map_frames(drive: Drive) -> np.ndarray:
     """Returns the frames (K,) of a drive that are used for its map.
 
-    If the drive consists of several drives, frames that these drives do not
-    keep in the map are left out.
+    If the drive is a `JoinedDrive`, frames that its attribute `keep` excludes
+    are left out.
     """
     if not isinstance(drive, JoinedDrive):
         return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)

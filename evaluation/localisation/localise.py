@@ -224,7 +224,7 @@ def _localise_from_all_starts(
     X_WS: np.ndarray,
     R_WT: np.ndarray,
 ) -> list[np.ndarray]:
-    """Returns a record for each localiser and each of its initial poses."""
+    """Returns a record for each localiser and each initial pose of a scan."""
     found = []
     for localiser in _localisers:
         for some in starts:

@@ -44,8 +44,8 @@ UNKNOWN = Interval()
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Returns the block (Q,) of the route in which each query lies.
 
-    A block is a stretch of the route. The bootstrap samples whole blocks,
-    because neighbouring queries tend to be right or wrong together.
+    A block is a stretch of the route. Bootstrap samples consist of whole
+    blocks, because neighbouring queries tend to be right or wrong together.
 
     Args:
         positions: (N, 3) positions of the sensor along the drive [m].

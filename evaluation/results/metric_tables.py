@@ -113,7 +113,7 @@ def _by_method_and_condition(keys: Iterable[Any]) -> dict[_Measured, Any]:
 def _check_answers(
     queries: Path, answers: Iterable[Answers], path: Path, results: Results
 ) -> None:
-    """Checks that answers to queries give the results beside them.
+    """Checks that a table's results follow from the answers to queries.
 
     Raises:
         InputError: a result or the number of queries differs.

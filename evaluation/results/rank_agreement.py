@@ -44,11 +44,10 @@ def rank_agreement(
 ) -> Agreement:
     """Compares the rankings of two tables, each over its own conditions.
 
-    The interval is by bootstrap. For a table with four or more maps, the
-    bootstrap samples maps, because a ranking should hold on other maps, too.
-    For a table with fewer maps, the bootstrap samples blocks of the routes if
-    the answers to all queries are known, and otherwise the units of
-    `rank_methods`.
+    The interval is by bootstrap. For a table with four or more maps, maps are
+    sampled, because a ranking should hold on other maps, too. For a table with
+    fewer maps, blocks of the routes are sampled if the answers to all queries
+    are known, and otherwise the units of `rank_methods`.
 
     Raises:
         InputError: fewer than two methods have results in all conditions of
@@ -86,7 +85,7 @@ def _means_and_samples(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns means (M,) of methods, and their bootstrap samples (B, M).
 
-    See `rank_agreement` on what the bootstrap samples.
+    `rank_agreement` says what is sampled.
     """
     ranked, samples = rank_methods(
         row for (method, _), row in table.rows.items() if method in methods

@@ -39,7 +39,7 @@ def rank_methods(
     the means are t intervals. The independent units of the intervals are maps
     if there are several maps, and conditions otherwise. Intervals are limited
     to the metric's range. With two or three units, intervals are unknown,
-    because they would be too wide to be useful. The bootstrap samples contain
+    because they would be too wide to be useful. Each bootstrap sample contains
     the same units for all methods and for all tables of the same maps; tables
     of other maps are sampled independently. For a single condition, the
     intervals come from the rows.

@@ -2,8 +2,8 @@
 
 Intervals of shares, of interaction effects of two causes (`excesses`), and of
 AUC differences come from a bootstrap over blocks of the route. For two results
-that are compared, the bootstrap samples the same blocks. Intervals of means are
-t intervals over maps or conditions. Intervals of rank correlations come from a
+that are compared, the same blocks are sampled. Intervals of means are t
+intervals over maps or conditions. Intervals of rank correlations come from a
 bootstrap over conditions.
 """
 

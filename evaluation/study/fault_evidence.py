@@ -278,8 +278,8 @@ def _coinciding_shares(
     """Returns, for each place, the share of non-ground points that coincide.
 
     Query and place are aligned at the pose that the method layered overlap
-    finds, not at their true poses. The result is the lesser of two shares: of
-    the query's points and of the place's points.
+    finds, not at their ground-truth poses. The result is the lesser of two
+    shares: of the query's points and of the place's points.
     """
     shared = [0.0] * len(places)
     with_points = [k for k, one in enumerate(places) if len(one.non_ground)]

@@ -133,8 +133,8 @@ def city_job(
     Args:
         city: the city.
         files: files of the study.
-        planned: gets a job for each drive of the figure; the job extracts the
-            features of the drive.
+        planned: jobs to which a job for each drive of the figure is added; this
+            job extracts the drive's features.
     """
     needs: list[str] = []
     features = [
@@ -168,7 +168,8 @@ def change_job(
         changes: files with the change of the pair and, if there is a control,
             with the change of the control; see `ChangeTask`.
         files: files of the study.
-        planned: adds the features that are drawn.
+        planned: jobs to which the jobs are added that extract the features of
+            both drives.
     """
     needs = [job_name(one) for one in changes]
     features = [planned.features(one.named, needs) for one in pair]

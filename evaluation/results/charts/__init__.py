@@ -5,8 +5,9 @@
 - `lines` (`over`, `metric`): a metric over a numeric factor, with a band from
   the lowest to the highest result among the seeds.
 - `matrix` (`over`, `metric`, `strips`): a metric for each method and each value
-  of a factor. With `strips`, each cell is divided by the values of a second
-  factor. A retained share is bold if its 95 % interval lies below 1.
+  of a factor. With `strips`, each cell is divided into strips, one for each
+  value of a second factor. A retained share is bold if its 95 % interval lies
+  below 1.
 - `scatter` (`x`, `y`): a metric over a metric or a numeric factor, with a
   smooth curve and its 95 % band where there are enough points.
 

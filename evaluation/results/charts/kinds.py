@@ -163,7 +163,7 @@ def _legend(
 def _add_legend(
     figure: Figure, legend: Mapping[str, tuple[str, str, str]], width: int
 ) -> None:
-    """Adds a legend below a figure, and makes the figure higher by its rows."""
+    """Adds a legend below a figure, and makes room for the legend's rows."""
     if not legend:
         return
     handles = []

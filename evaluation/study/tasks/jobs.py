@@ -40,8 +40,8 @@ class Jobs:
         jobs: name -> job.
         notes: note -> None, for each note on what is left out. A dictionary
             keeps the order and omits repetitions.
-        radii: key of a pair -> the greatest distances between a query and its
-            match that are used for this pair [m].
+        radii: key of a pair -> radii of a match that are used for this pair
+            [m].
         processes: number of processes that a task may use by itself.
         shows_overlaps: whether results contain the share of each query's scan
             that its best match shows. Computing this share takes time.
