@@ -30,10 +30,11 @@ def find_bus(
     name = f"LcmInterfaceSystem(bus_name={bus})"
     if builder.HasSubsystemNamed(name):
         return builder.GetSubsystemByName(name)
+    # A caller of `LcmBuses.Add` may own the interface, outside the diagram.
     return found
 
 
-def takes_screen_colours() -> bool:
+def reads_vertex_colours_as_srgb() -> bool:
     """Returns whether Drake's renderer reads vertex colours as sRGB.
 
     Up to Drake 1.53, the renderer reads vertex colours as linear. If the

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 
@@ -10,7 +12,7 @@ from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
-from cns_drake.traffic.vehicle_kinds import KINDS, draw_kinds
+from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
 
 # Least and greatest gap between vehicles in a queue [m].
 _GAPS = (1.5, 3.5)
@@ -67,7 +69,23 @@ def plan_queues(
             end = begin - float(rng.uniform(*_GAPS))
     places = np.array(rows).reshape(-1, 5)
     times = np.arange(0.0, duration + 2 * STEP, STEP)
-    present = np.ones((len(times), len(kinds)), bool)
+    ego_areas = shapely.polygons(ego_box.corners(*ego(times)))
+    present = ~_passed(kinds, places, ego_areas)
+    tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
+    walkers = Tracks(STEP, np.zeros((len(times), 0, 5)))
+    return TrafficPlan(tuple(kinds), tracks, walkers)
+
+
+def _passed(
+    kinds: Sequence[VehicleKind], places: np.ndarray, ego_areas: np.ndarray
+) -> np.ndarray:
+    """Returns which vehicles the ego car passes at each step, (K, N) bool.
+
+    Args:
+        kinds: kinds of the N vehicles.
+        places: (N, 5) places of the vehicles, as in `TrafficPlan.vehicles`.
+        ego_areas: (K,) polygon that the ego car covers at each step.
+    """
     boxes = [
         EgoBox(-kind.size[0] / 2, kind.size[0] / 2, kind.size[1] / 2).corners(
             row[None, :2], row[3:4]
@@ -75,10 +93,11 @@ def plan_queues(
         for kind, row in zip(kinds, places, strict=True)
     ]
     tree = shapely.STRtree(shapely.polygons(boxes) if boxes else [])
-    passing = shapely.polygons(ego_box.corners(*ego(times)))
-    step, near = tree.query(passing, "dwithin", _LETS_PASS)
+    step, near = tree.query(ego_areas, "dwithin", _LETS_PASS)
+    passed = np.zeros((len(ego_areas), len(kinds)), bool)
+    # A vehicle does not disappear during a revolution of a LiDAR. The margin of
+    # one step keeps the vehicle absent in revolutions that begin before the
+    # pass, or end after it.
     for shift in (-1, 0, 1):
-        present[np.clip(step + shift, 0, len(times) - 1), near] = False
-    tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
-    walkers = Tracks(STEP, np.zeros((len(times), 0, 5)))
-    return TrafficPlan(tuple(kinds), tracks, walkers)
+        passed[np.clip(step + shift, 0, len(ego_areas) - 1), near] = True
+    return passed

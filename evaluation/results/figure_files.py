@@ -32,7 +32,8 @@ def save_figure(
 
     Equal figures give equal bytes. SVG and WebP files are for web pages, and do
     not contain the legend at the bottom of the figure: the page itself writes
-    this legend, in letters that can be read on a phone.
+    this legend, in letters that can be read on a phone. The figure is changed:
+    its layout is fixed, and its legends may be hidden.
 
     Args:
         figure: the figure.

@@ -36,7 +36,7 @@ class Bungalow(FamilyHouse):
         self.mirrored = self.chance(0.5)
         self.roof = self.pick(("gable", "hip", "hip"))
         # Width of a front wing, as a share of the width of the house.
-        self.wing_width = self.uniform(0.3, 0.4)
+        self.wing_share = self.uniform(0.3, 0.4)
         # How far the front wings stand out from the house.
         self.reach = self.uniform(2.0, 4.0, 2)
         self.floor = self.uniform(0.1, 0.35, 2)
@@ -100,7 +100,7 @@ class Bungalow(FamilyHouse):
         shape = Roof(self.roof, eaves=0.6, verge=0.4, thickness=ROOF_M)
         main = Wing.at((left, front, right, front + deep), wall_top, top, shape)
         slope = 2 * (top - main.wall_top - ROOF_M) / deep
-        wide = max(3.4, self.wing_width * (right - left))
+        wide = max(3.4, self.wing_share * (right - left))
         end = min(top - 0.2, main.wall_top + ROOF_M + slope * wide / 2)
         cross = Roof(self.roof, True, 0.5, 0.4, ROOF_M)
         boxes = [main]

@@ -56,7 +56,8 @@ class DetachedHouse(FamilyHouse):
         self.mirrored = self.chance(0.5)
         self.roof = self.pick(("gable", "gable", "hip", "gambrel"))
         self.pitch_deg = self.uniform(28.0, 45.0)
-        self.wing_width = self.uniform(0.36, 0.46)
+        # Width of a wing, as a share of the width of the main wing.
+        self.wing_share = self.uniform(0.36, 0.46)
         self.low_wing = self.chance(0.35)
         self.floor = self.uniform(0.2, 0.6, 2)
         self.window_pitch = self.uniform(2.6, 3.4)
@@ -109,7 +110,7 @@ class DetachedHouse(FamilyHouse):
         roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
         area = (left, front, split, main_back)
         boxes = [Wing.at(area, wall_top, self.height, roof)]
-        wide = max(3.2, self.wing_width * (split - left))
+        wide = max(3.2, self.wing_share * (split - left))
         drop = STOREY_M * (n > 1 and self.low_wing)
         top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
         kind = "hip" if self.roof == "hip" else "gable"

@@ -23,9 +23,10 @@ class RowHouse(HouseInRow):
         self.draw_house(width, _NARROW_ROOFS if width < 9.5 else _ROOFS)
         self.stoop = 1.3
         self.floor = self.plinth
-        # Size and side of the lower wing behind the house.
+        # Height and side of the lower wing behind the house, and its width as a
+        # share of the width of the house.
         self.annex_height = self.uniform(2.8, 3.6, 2)
-        self.annex_width = self.uniform(0.45, 0.65)
+        self.annex_share = self.uniform(0.45, 0.65)
         self.annex_left = self.chance(0.5)
 
     def build(self) -> None:
@@ -46,7 +47,7 @@ class RowHouse(HouseInRow):
 
 def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
     """Adds a low wing behind the house, on one side."""
-    width = p.annex_width * main.width
+    width = p.annex_share * main.width
     x0 = main.x0 if p.annex_left else main.x1 - width
     blind = main.blind & {3 if p.annex_left else 1}
     top = min(p.annex_height + 0.9, main.wall_top)

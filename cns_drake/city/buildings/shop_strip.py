@@ -17,6 +17,8 @@ from cns_drake.city.facades import (
 _FRONT_M = 0.4
 # Kept free behind for gutters [m].
 _BACK_M = 0.1
+# Least height above the shops for an upper floor [m].
+_UPPER_M = 3.4
 
 
 class ShopStrip(Building):
@@ -51,7 +53,7 @@ class ShopStrip(Building):
         highest = self.whole(0, count)
         for k in range(count):
             blind = self.site.blind_edges_of_unit(k, count)
-            tall = self.height > self.ground + 3.4 and (
+            tall = self.height > self.ground + _UPPER_M and (
                 k == highest or self.chance(self.upper)
             )
             top = self.height if k == highest else _parapet_top(self, tall)
@@ -60,6 +62,7 @@ class ShopStrip(Building):
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
             wing = Wing.at(area, top - 0.1, top, roof, blind)
             _add_unit(self, wing, tall)
+            # Only every third unit has equipment on its roof.
             if k % 3 == 0:
                 part = f"unit_{k}_"
                 equip_roof(
@@ -70,7 +73,7 @@ class ShopStrip(Building):
 def _parapet_top(p: ShopStrip, tall: bool) -> float:
     """Returns the parapet's height for a unit that is not the highest [m]."""
     drop = p.steps * p.whole(0, 3)
-    if tall or p.height < p.ground + 3.4:
+    if tall or p.height < p.ground + _UPPER_M:
         return round(max(p.height - drop, p.ground + 0.4), 2)
     return round(p.ground + 0.5 + 0.5 * drop, 2)
 

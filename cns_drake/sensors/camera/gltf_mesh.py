@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
-from cns_drake.scene.drake_releases import takes_screen_colours
+from cns_drake.scene.drake_releases import reads_vertex_colours_as_srgb
 from cns_drake.sensors.camera.looks import GAMMA, LOOKS, texture
 from cns_drake.sensors.camera.texture_coordinates import (
     face_coordinates,
@@ -126,7 +126,7 @@ def _vertex_colours(rgb: np.ndarray, white: float) -> np.ndarray:
     `white` is the factor for the brightness of the texture, from `texture`.
     """
     light = np.minimum(rgb**GAMMA * white, 1.0)
-    return light ** (1.0 / GAMMA) if takes_screen_colours() else light
+    return light ** (1.0 / GAMMA) if reads_vertex_colours_as_srgb() else light
 
 
 def _textured_material(look: str) -> dict[str, Any]:
