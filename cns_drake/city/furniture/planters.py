@@ -22,7 +22,7 @@ def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
 
     Args:
         rng: random generator.
-        height: height of the shrub [m].
+        height: height of the shrub [m]; by default sampled from `rng`.
     """
     dice = Dice(rng)
     drawn = dice.uniform(0.8, 1.6)
@@ -83,7 +83,7 @@ def box_planter(
 
     Args:
         rng: random generator.
-        length: length of the box [m].
+        length: length of the box [m]; by default sampled from `rng`.
     """
     dice = Dice(rng)
     drawn = dice.uniform(1.6, 3.0)

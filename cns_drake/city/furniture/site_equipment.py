@@ -154,8 +154,9 @@ def tower_crane(
 
     Args:
         rng: random generator for sizes and heading.
-        height: height of the mast [m].
-        reach: length of the jib in front of the mast [m].
+        height: height of the mast [m]; by default sampled from `rng`.
+        reach: length of the jib in front of the mast [m]; by default sampled
+            from `rng`.
     """
     dice = Dice(rng)
     drawn_height = dice.uniform(36.0, 56.0)

@@ -35,7 +35,7 @@ def obelisk(rng: np.random.Generator, *, height: float | None = None) -> Model:
 
     Args:
         rng: random generator for the height.
-        height: height of the tip [m].
+        height: height of the tip [m]; by default sampled from `rng`.
     """
     drawn = Dice(rng).uniform(9.0, 14.0)
     tall = round((drawn if height is None else height) / 10, 3)
@@ -50,7 +50,7 @@ def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
 
     Args:
         rng: random generator for the radius.
-        radius: radius of the basin [m].
+        radius: radius of the basin [m]; by default sampled from `rng`.
     """
     drawn = Dice(rng).uniform(2.5, 3.6)
     wide = round((drawn if radius is None else radius) / 3, 3)

@@ -25,7 +25,7 @@ def lamp_post(
 
     Args:
         rng: random generator for the height.
-        height: height of the mast [m].
+        height: height of the mast [m]; by default sampled from `rng`.
         arms: number of arms, 1 or 2.
     """
     drawn = Dice(rng).uniform(8.0, 9.5)
@@ -50,7 +50,7 @@ def lamp_post_curved(
 
     Args:
         rng: random generator for the height.
-        height: height of the lamps [m].
+        height: height of the lamps [m]; by default sampled from `rng`.
         arms: number of arms, 1 or 2.
     """
     drawn = Dice(rng).uniform(7.0, 8.5)
@@ -72,7 +72,7 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
 
     Args:
         rng: random generator for the height.
-        height: height of the lantern's top [m].
+        height: height of the lantern's top [m]; by default sampled from `rng`.
     """
     drawn = Dice(rng).uniform(3.8, 4.4)
     height = drawn if height is None else height

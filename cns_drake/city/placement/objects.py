@@ -13,6 +13,7 @@ from cns_drake.city.furniture.squares import SQUARES
 from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
 from cns_drake.city.furniture.street_lights import STREET_LIGHTS
 from cns_drake.city.furniture.traffic_signals import TRAFFIC_SIGNALS
+from cns_drake.city.furniture.traffic_signs import TRAFFIC_SIGNS
 from cns_drake.city.geometry.object_models import Builder
 from cns_drake.city.plants.trees import TREES
 
@@ -32,6 +33,7 @@ OBJECTS: dict[str, Builder] = {
     **STREET_FURNITURE,
     **STREET_LIGHTS,
     **TRAFFIC_SIGNALS,
+    **TRAFFIC_SIGNS,
     **SQUARES,
     **SITE_EQUIPMENT,
     **PLANTERS,
