@@ -341,7 +341,7 @@ def _export_film(
     traffic: int | None,
     json: bool,
 ) -> None:
-    """Makes a film of a drive in each stage of its city."""
+    """Makes one film that shows a drive in every stage of its city."""
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.simulation.film import make_film, with_some_traffic

@@ -1,4 +1,4 @@
-"""Views of a camera, and the file `views.yaml` of a map, which names them."""
+"""Views of a camera, and the file `views.yaml` with a map's named views."""
 
 from __future__ import annotations
 

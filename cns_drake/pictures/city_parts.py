@@ -96,7 +96,7 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 def compare_parts(
     own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
 ) -> StageDifference:
-    """Returns the parts of structures that two stages share or do not share.
+    """Returns the differences between the structures of two stages, by part.
 
     A structure that was moved, or has another shape of the same height, counts
     as common to both stages.

@@ -95,7 +95,7 @@ def make_drive_page(
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:
-    """Returns the geometry frames of a world that may move.
+    """Returns those geometry frames of a world that can move.
 
     Frames without geometry that a LiDAR can see are left out.
     """

@@ -158,7 +158,7 @@ class MovingGroups:
     def _find_poses(
         self, calc_X_WF: Callable[[FrameId], RigidTransform], known: KnownPoses
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (M, 4, 4) poses, and the (G,) row of each group's frame."""
+        """Returns poses (M, 4, 4), and each group's row (G,) in the poses."""
         if known.rows is not self._known:
             self._known = known.rows
             self._known_rows = np.array(

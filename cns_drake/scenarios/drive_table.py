@@ -135,7 +135,7 @@ def _checksum(files: Sequence[Path], last: bytes) -> str:
 def _measured_row(
     scenario: Scenario, checksum: str, size: tuple[int, int] | None
 ) -> DriveRow:
-    """Returns a row, for which the drive is planned.
+    """Plans a drive, and returns the table row of the drive.
 
     `size` gives the numbers of structures and triangles in the stage, if known.
     """

@@ -31,7 +31,7 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Checks that the faces of an OBJ file only use vertices that exist.
+    """Checks that the faces of an OBJ file use only vertices that exist.
 
     Raises:
         ValueError: a face has a vertex that does not exist, a vertex is not

@@ -400,7 +400,7 @@ def _checked_section(
 
 
 def _check_timing(config: LidarConfig, period: float) -> None:
-    """Checks when scans are published, as Drake does for its cameras.
+    """Checks the offset and the delay of scans, as Drake does for cameras.
 
     Raises:
         ValueError: the offset or the delay is out of range.

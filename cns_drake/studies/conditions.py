@@ -193,7 +193,7 @@ def _cells(
 
 
 def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
-    """Yields all cases at all levels to measure; `none` is the first."""
+    """Yields all cases at all levels to measure; the case `none` is first."""
     yield _CaseLevel(NO_CAUSE, 0, ())
     if experiment.levels and not experiment.cases:
         raise ValueError("levels: there are no cases")

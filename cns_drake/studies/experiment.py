@@ -263,7 +263,7 @@ class Experiment(Section):
 
 
 def named_programs(fields: Any) -> list[str]:
-    """Returns the Python files that fields of an experiment name.
+    """Returns the Python files that are named in fields of an experiment.
 
     A study with these fields runs the files.
 

@@ -23,7 +23,7 @@ _COST = 60.0
 
 
 class DrivenMapTask(MapTask):
-    """The task `map` on drives, from which it makes maps with exact labels."""
+    """The task `map` on drives; makes their maps, with exact labels."""
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         methods = self.settings["methods"]

@@ -259,10 +259,11 @@ def _write_overlaps(
     runs: Mapping[str, np.ndarray],
     found: Mapping[tuple[str, str], np.ndarray],
 ) -> Path:
-    """Writes all overlaps that are not zero, as OverlapNet's trainers do.
+    """Writes all overlaps that are not zero, as in OverlapNet's training data.
 
-    `overlaps` (N, 4) is the query's number, the place's number, their overlap
-    and the query's yaw in the place's frame [rad]; `seq` (N, 2) are the drives.
+    A row of the array `overlaps` (N, 4) contains the query's number, the
+    place's number, their overlap and the query's yaw in the place's frame
+    [rad]. A row of `seq` (N, 2) contains the names of the two drives.
     """
     rows, drives = [], []
     for (query, database), overlaps in found.items():

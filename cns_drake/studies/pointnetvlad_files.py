@@ -134,7 +134,7 @@ def _locations(
 
 
 def _evaluation_fault(drives: Sequence[ExportedDrive]) -> str | None:
-    """Returns why MinkLoc3Dv2 cannot evaluate the drives of a city, if so."""
+    """Returns why MinkLoc3Dv2 cannot evaluate a city; None if it can."""
     names = [run.folder.removeprefix("runs/") for run in drives]
     if len(drives) < 2:
         return f"{names[0]} is the only drive of its city (two are needed)"

@@ -114,7 +114,7 @@ class SimulatedPairs:
             )
 
     def changed(self, some: MapPairs, *, made: bool) -> Iterator[ChangedPair]:
-        """Yields a map's pairs, changed by all conditions possible on the map.
+        """Yields a map's pairs, changed as each possible condition says.
 
         Args:
             some: the pairs of the map.

@@ -260,7 +260,7 @@ class Study:
         return wanted
 
     def _plan(self, maps: Iterable[MapPairs]) -> Engine:
-        """Returns the engine with all pairs in all conditions.
+        """Returns the engine that measures all pairs in all conditions.
 
         Raises:
             InputError: there is nothing to measure, or a drive differs from the

@@ -45,7 +45,7 @@ def checked_viewpoint(value: Any, where: str) -> tuple[float, float]:
 def with_lidars_beside(
     drive: Scenario, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a database drive along the query drive's route, given that drive.
+    """Returns a database drive along the query's route, given the query drive.
 
     The LiDARs of the returned drive are also moved 1.25 m ahead, so that it
     does not coincide with `drive`.

@@ -393,7 +393,7 @@ def _is_ready(streets: Streets, car: Any, k: int) -> bool:
 
 @compiled
 def _has_room(traffic: Traffic, i: int, k: int) -> bool:
-    """Returns whether there is room behind the i-th vehicle's way.
+    """Returns whether the lane after the i-th vehicle's way has room for it.
 
     If there has been no room for some time, the vehicle samples another way;
     see `grant_ways`.

@@ -1,4 +1,4 @@
-"""Makes all changes between drives in a loaded world, in their order."""
+"""Makes all changes between drives in a loaded world, in a fixed order."""
 
 from shapely.geometry.base import BaseGeometry
 

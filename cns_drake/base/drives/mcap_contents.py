@@ -185,7 +185,7 @@ class Contents:
 
 
 def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
-    """Returns the offset of a chunk, and of each channel's index in it."""
+    """Returns the offsets of a chunk, and of its message index by channel."""
     start, size = _CHUNK_INDEX.unpack_from(body)
     table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
     if len(table) != size:

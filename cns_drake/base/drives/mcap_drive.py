@@ -1,4 +1,4 @@
-"""Drives recorded as MCAP by cns-drake, or by other programs on its topics."""
+"""Drives recorded as MCAP by cns-drake, or by programs with the same topics."""
 
 from collections.abc import Mapping
 from functools import cached_property

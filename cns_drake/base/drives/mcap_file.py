@@ -283,7 +283,7 @@ class McapFile:
 
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> bytes:
-        """Returns the entries of an index, which has at most `left` bytes."""
+        """Returns the entries of an index of at most `left` bytes."""
         stream.seek(offset + RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
         if length > left:

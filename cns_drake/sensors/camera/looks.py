@@ -69,7 +69,7 @@ def _stones(
     lag: float = 0.0,
     spread: float = 0.1,
 ) -> np.ndarray:
-    """Returns rows of stones of random brightness, (N, N, 1).
+    """Returns a texture (N, N, 1) of rows of stones, each of random brightness.
 
     `across` and `rows` count the stones, and `joint` contains the width and the
     brightness of the joints between the stones. Every other row is shifted by

@@ -396,7 +396,7 @@ _Model = TypeVar("_Model", MeasurementModel, "CalibratedReturns")
 
 
 def _with_name(model: _Model, name: str) -> _Model:
-    """Returns a model with the name of the LiDAR, unless it has a name."""
+    """Returns a model with the LiDAR's name, unless the model has a name."""
     return model if model.sensor_name else replace(model, sensor_name=name)
 
 

@@ -148,7 +148,7 @@ class LidarSection(Mount):
         return self
 
     def with_preset(self, preset: str) -> LidarSection:
-        """Returns this LiDAR with another model in its place.
+        """Returns this description of a LiDAR, with another model.
 
         The name of the preset, the number of columns and the range limits come
         from the new preset; all other fields stay the same.

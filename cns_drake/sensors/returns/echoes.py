@@ -218,7 +218,7 @@ def _merge_light(
 def _sort_by_beam(
     light: Light, num_beams: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the rows of the light beam by beam, the nearest first.
+    """Returns the rows of `light`, sorted by beam and then by distance.
 
     Also returns where the rows of each beam begin, and where the rows of the
     last beam end, (num_beams + 1,).
