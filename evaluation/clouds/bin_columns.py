@@ -1,11 +1,11 @@
 """The number of columns of `.bin` files, which have no header.
 
-A `.bin` is a sequence of float32. KITTI has four for each point: x y z
-intensity; other programs leave out the intensity, or add a ring, a time or a
-colour. Reading a file with a wrong number of columns gives a cloud that was
-never measured. The right number can be found from the values: the columns of a
-cloud have different distributions, while with a wrong number the columns are
-mixed and have similar distributions.
+A `.bin` is a sequence of float32 values. KITTI has four values for each point:
+x y z intensity; other programs leave out the intensity, or add a ring, a time
+or a colour. Reading a file with a wrong number of columns gives a cloud that
+was never measured. The right number can be found from the values: the columns
+of a cloud have different distributions, while with a wrong number the columns
+are mixed and have similar distributions.
 """
 
 from collections.abc import Sequence

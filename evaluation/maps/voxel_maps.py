@@ -168,7 +168,7 @@ class VoxelAccumulator:
                 default the points are in the world.
 
         Returns:
-            Number of points left out because they are not finite, or 2^31
+            Number of points left out because they are not finite, or lie 2^31
             voxels or more from the origin along an axis.
         """
         X = np.array(np.eye(4) if X_WS is None else X_WS, dtype=np.float64)

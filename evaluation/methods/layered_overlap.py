@@ -2,9 +2,8 @@
 
 A scan becomes maps from above: one for each layer of height, one for poles and
 one for kerbs. Two scans are compared at the pose at which the greatest number
-of their filled cells coincide. Objects that are gone or new lower this number
-but do not change the pose, because unchanged objects all coincide at the same
-pose.
+of their filled cells coincide. Objects that are gone or new merely lower this
+number; all unchanged objects still coincide at one pose.
 
 Matched filters for place recognition come from Joseph, Fischer and Milford
 (arXiv 2409.03998), who use one map of occupied cells. Layered overlap adds the

@@ -40,8 +40,8 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
     Args:
         points: (N, 3) float64 points.
-        neighbours: (N, K) indices, K >= 2, of points that are not all in
-            one place.
+        neighbours: (N, K) indices, K >= 2, of points that are not all at the
+            same position.
 
     Returns:
         (N, 6) float64, in the order above; all are at least 0. Eigenvalues

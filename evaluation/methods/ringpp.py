@@ -309,9 +309,9 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """Returns the (n,) correlation of a query with a place, by shift.
 
         The query is a result of `_weighted_spectrum`. The place's rows are
-        shifted by 0, ..., n - 1. As in the program, the circular correlation
-        over the angles is computed for each channel and frequency, and the
-        magnitudes are summed.
+        shifted by 0, ..., n - 1. As in the authors' program, the circular
+        correlation over the angles is computed for each channel and frequency,
+        and the magnitudes are summed.
         """
         correlations = scipy.fft.irfft(
             weighted * spectrum.conj(), n=self.config.cells, axis=1
@@ -355,7 +355,6 @@ def _rotated(image: np.ndarray, angle: float) -> np.ndarray:
     """Returns an image (C, n, n) rotated by an angle.
 
     A positive angle rotates the row axis towards the column axis.
-
     Each pixel takes the value of the nearest source pixel, or 0 outside the
     image.
     """

@@ -1,9 +1,10 @@
 """Results of other programs over sessions, such as months of a data set.
 
-A file `sessions/NAME.csv` has the R@1 of one program, in the columns `days`
-(since the session of the map), `r1`, `low` and `high` (a 95 % interval). In the
-table of results, the rows of this file belong to a method NAME and have the
-factor `days`. A chart shows the curves of all files.
+A file `sessions/NAME.csv` has a row for each session. Its columns are `days`
+(since the session of the map), `r1` (R@1 of one program), and `low` and `high`
+(the limits of a 95 % interval of R@1). In the table of results, the rows of
+this file belong to a method NAME and have the factor `days`. A chart shows the
+curves of all files.
 """
 
 from collections.abc import Sequence

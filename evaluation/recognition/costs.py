@@ -117,11 +117,11 @@ def query_ms(
 ) -> float:
     """Returns the median CPU time of several queries, on one core [ms].
 
-    A query is compared with all places, including the second stage of a method
-    with two stages. The time includes neither geometric verification nor the
-    pose of the top-ranked place, because not every method estimates a pose, and
-    the time to estimate it does not depend on the number of places. The first
-    query does not count.
+    A query is compared with all places. The time includes the second stage, if
+    the method has one. The time includes neither geometric verification nor the
+    pose of the top-ranked place, because not every method estimates poses, and
+    the time to estimate a pose does not depend on the number of places. The
+    first query does not count.
 
     Args:
         method: method to measure.

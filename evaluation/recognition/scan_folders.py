@@ -43,7 +43,8 @@ def write_scores(
         query: folder of the scans of queries, one file each.
         output: the file to write.
         gate_radius: radius of geometric verification [m] (see
-            `evaluation.recognition.geometric_verification`); None for none.
+            `evaluation.recognition.geometric_verification`); None for scores
+            without this verification.
         columns: number of columns of `.bin` files; by default guessed for each
             folder from the values.
         on_note: is called with notes on how scans were read, one note of each

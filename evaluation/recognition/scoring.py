@@ -40,7 +40,7 @@ def score_places(
             excluded, the query is compared with every place, because a search
             for a few top-ranked places might return only excluded places.
         gate_radius: radius of geometric verification [m] (see `gated`); None
-            for none.
+            for scores without this verification.
         exhaustive: whether to also compare places that a search would skip only
             to save time.
         where: the name of the current query, for errors.

@@ -18,11 +18,11 @@ def ranked_methods(
 ) -> tuple[list[Ranked], str]:
     """Returns the methods ranked by mean AUC, and a sentence on the ranking.
 
-    The means are over the pairs of drives with results of all methods, without
-    the controls, in which the city does not change. If there is no such pair,
-    no method is returned, and the sentence says so. The sentence also says
-    which methods differ significantly from the first method, by the tests of
-    `differences`.
+    The means are over the pairs of drives with results of all methods.
+    Controls, in which the city does not change, do not count. If there is no
+    such pair, no method is returned, and the sentence says so. The sentence
+    also says which methods differ significantly from the first method, by the
+    tests of `differences`.
     """
     rows = results.where({STAGE: OWN}, task="place", metric="auc").rows
     ranked, _ = rank_methods(rows)

@@ -24,9 +24,10 @@ BAR_LENGTH = 50.0
 def route_picture(drive: PageDrive) -> Markup:
     """Returns a drive's route on its map from above, as an SVG element.
 
-    The route is red at its start and blue at its end. One unit is one metre; x
-    points right and y down. The picture of the map is an element `image` with
-    the id `view-<name of the drive>`, which the query browser uses as well.
+    The route is red at its start and blue at its end. One unit is one metre;
+    the x axis is directed to the right, the y axis downwards. The picture of
+    the map is an element `image` with the id `view-<name of the drive>`, which
+    the query browser uses as well.
     """
     left, right, bottom, top = drive.extent
     width, height = right - left, top - bottom

@@ -191,7 +191,7 @@ class Engine:
         return baselines
 
     def found(self, one: Pair, task: str) -> Any:
-        """Returns a task's result for a pair; its jobs must be done.
+        """Returns a task's result for a pair; the pair's jobs must be done.
 
         Raises:
             InputError: the file of the result cannot be read.

@@ -1,10 +1,10 @@
 """Files of intermediate results that name their inputs.
 
-A part is the file of one intermediate result. The file begins with a line that
-names its format and a line of JSON with its inputs. The result follows (see
-`evaluation.study.value_encoding`), compressed by zstd at its fastest level.
-Compression halves the size of maps. Spectra hardly shrink; compressing 50 MB of
-spectra takes a tenth of a second.
+A part is the file of one intermediate result. The first line of the file names
+the format, and the second line contains the inputs as JSON. The result follows
+(see `evaluation.study.value_encoding`), compressed by zstd at its fastest
+level. Compression halves the size of maps. Spectra hardly shrink; compressing
+50 MB of spectra takes a tenth of a second.
 """
 
 from collections.abc import Callable, Iterator, Mapping

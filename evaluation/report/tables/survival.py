@@ -61,7 +61,7 @@ class Survival(NamedTuple):
 
 
 def survivals(rows: Iterable[Row], stages: Mapping[str, str]) -> list[Survival]:
-    """Puts the results without and with a change of the city together.
+    """Joins the results without a change of the city to the results with it.
 
     Args:
         rows: rows of pairs of drives, and of their controls.
