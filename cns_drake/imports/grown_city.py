@@ -94,7 +94,7 @@ def grow(
 def _heights_of_lower(
     chosen: Sequence[ImportedStructure], seed: int
 ) -> dict[ImportedStructure, float]:
-    """Returns the share of its height that remains of each lower building."""
+    """Returns for each lower building the share of the height that remains."""
     least, most = _LOWER_HEIGHTS
     heights = {}
     for one in chosen:

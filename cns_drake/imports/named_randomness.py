@@ -16,7 +16,7 @@ def random_share(seed: int, purpose: str, name: str) -> float:
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
     """Returns a random generator whose seed depends only on the arguments.
 
-    `purpose` and `name` say for what it is used, and for which object.
+    `purpose` says what the generator is used for, and `name` for which object.
     """
     return np.random.default_rng(_hashed_number(seed, purpose, name))
 

@@ -129,9 +129,9 @@ def _is_here(one: ImportedStructure) -> bool:
 def _stands_at(
     one: ImportedStructure, stage: int, options: ImportOptions
 ) -> bool:
-    """Returns whether a structure stands at a stage, given by its number.
+    """Returns whether a structure stands in the stage of number `stage`.
 
-    A structure that was demolished at an unknown date stands at all stages
+    A structure that was demolished at an unknown date stands in all stages
     except the last, from its year of construction on. If this year is unknown,
     `options.undated` decides.
     """

@@ -36,7 +36,8 @@ def wall_piers(
         depth: how far the piers reach into the wall, past recessed glass [m].
         margin: distance of the middle of the outermost piers from the wall's
             ends [m].
-        entrance: width in the middle of the front that stays free [m].
+        entrance: width of the stretch without piers in the middle of the front
+            [m].
         skip: edges of the outline that get no piers.
     """
     pieces = []

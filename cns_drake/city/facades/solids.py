@@ -268,7 +268,7 @@ def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
 
     Args:
         start, end: (3,) middles of the two ends [m]. One end must not lie
-        vertically above the other end.
+            vertically above the other end.
         width: side of the square [m].
     """
     start, end = np.asarray(start, float), np.asarray(end, float)

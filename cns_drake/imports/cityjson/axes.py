@@ -65,7 +65,7 @@ def _exchange_axes(city: CityFile) -> None:
 
 
 def exchange_mirrored_axes(city: CityFile) -> None:
-    """Exchanges the first two coordinates if the city would be mirrored.
+    """Exchanges the first two coordinates if the city is mirrored otherwise.
 
     The corners of a face are counter-clockwise as seen from outside; in a
     mirrored city, faces are inside out. Coordinates are exchanged only if both

@@ -1,9 +1,9 @@
 """Reads CityJSON 1.0 to 2.0 and CityJSONSeq files.
 
-https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON holds all
-objects. In a sequence (.jsonl), the first line is of type CityJSON, and each
-further line is a feature with its own vertices. pyproj defines the order,
-direction and units of the axes of the file's reference system.
+Specification: https://www.cityjson.org/specs/2.0.1/. A file of type CityJSON
+holds all objects. In a sequence (.jsonl), the first line is of type CityJSON,
+and each further line is a feature with its own vertices. pyproj defines the
+order, direction and units of the axes of the file's reference system.
 """
 
 from collections.abc import Iterator

@@ -36,7 +36,8 @@ class ReferenceSystem:
     Attributes:
         name: name of the system in the file; "" if there is none.
         axes: direction and unit of each of the three coordinates, in words.
-        matrix: (3, 3) converts coordinates to metres east, north and up.
+        matrix: (3, 3) matrix that converts coordinates to metres east, north
+            and up.
         heights_assumed: whether the unit of heights is assumed.
     """
 
@@ -171,7 +172,7 @@ def check_lengths(name: str, place: np.ndarray, where: str) -> None:
         name: name of the reference system.
         place: (3,) place at which lengths are compared: metres east, north and
             up.
-        where: place of the name in the file, for error messages.
+        where: file and field with the name, for error messages.
 
     Raises:
         InputError: lengths differ by more than 0.5 %, as in Web Mercator

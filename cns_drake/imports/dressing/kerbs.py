@@ -37,7 +37,7 @@ def with_kerb(one: ImportedStructure) -> ImportedStructure:
 
 
 def _outer_edges(triangles: np.ndarray) -> np.ndarray:
-    """Returns the edges (N, 2, 3) that only one of triangles (M, 3, 3) has."""
+    """Returns the edges (N, 2, 3) that no two triangles (M, 3, 3) share."""
     corners = np.rint(triangles.reshape(-1, 3) * 1000.0).astype(np.int64)
     _, number = np.unique(corners, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)

@@ -60,8 +60,8 @@ class Style:
         balconies: whether every other window may have a balcony.
         plinth: height of the plinth; 0 for none.
         cornice: height of the cornice; 0 for none.
-        by_tag: which of the names `use`, `levels` (the number of storeys),
-            `wall` and `roof` the tags of the file determine.
+        by_tag: what the tags of the file determine: any of `use`, `levels` (the
+            number of storeys), `wall` and `roof`.
     """
 
     use: str

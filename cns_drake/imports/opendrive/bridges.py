@@ -67,7 +67,7 @@ def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
 def _triangles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Returns triangles between two lines (N, 3).
 
-    They look upwards if the second line is on the left.
+    The triangles look upwards if line `b` is to the left of line `a`.
     """
     return np.concatenate(
         [

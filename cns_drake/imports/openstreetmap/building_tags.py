@@ -26,7 +26,7 @@ _MOST_LEVELS = 170
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> tuple[float, float, float]:
-    """Returns three heights of a building, from its tags [m].
+    """Returns three heights of a building [m], from the building's tags.
 
     The results are the heights of the building's lowest and highest points
     above the ground, and the height of the roof only. Heights without a tag are
@@ -72,9 +72,10 @@ def heights(
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
-    """Returns why a building is left out, such as `underground`, from its tags.
+    """Returns the reason why a building is left out, such as `underground`.
 
-    The result is None if the building is not left out.
+    The reason follows from the building's tags. The result is None if the
+    building is not left out.
     """
     if not ("building" in tags or "building:part" in tags):
         return "demolished"

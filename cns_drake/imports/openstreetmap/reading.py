@@ -98,7 +98,7 @@ def _area_of(area: Any, tags: Tags) -> OsmArea:
 
 
 def _add_way(way: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
-    """Adds a way of osmium to the features, if it has two places."""
+    """Adds an osmium way to the features, if two or more nodes have places."""
     nodes = [node for node in way.nodes if node.location.valid()]
     missing = len(way.nodes) - len(nodes)
     if missing and not is_building(tags):
