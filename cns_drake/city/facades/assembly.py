@@ -113,9 +113,9 @@ class Assembly(Dice):
             self._pieces[material] = [mesh]
 
     def to_model(self, footprint: BaseGeometry) -> Model:
-        """Returns the whole building as a model; to be called once, at the end.
+        """Returns the whole building as a model.
 
-        Each material becomes one part.
+        Call this method once, at the end. Each material becomes one part.
 
         `footprint` is the ground of the building in its frame S [m].
         """

@@ -117,8 +117,8 @@ def awnings(
 def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
     """Adds awnings to a building, all in the same random colour.
 
-    `pieces` contains the awnings in the building's frame. Without any, nothing
-    is added.
+    `pieces` contains the awnings in the building's frame. Without awnings,
+    nothing is added.
     """
     if pieces:
         finish = p.pick(p.kind.choices["awnings"])

@@ -209,7 +209,7 @@ class Faces:
 
 
 def swapped(mesh: Mesh) -> Mesh:
-    """Returns a mirrored mesh: x and y are exchanged, and it faces outwards."""
+    """Returns a mirrored mesh: x and y exchanged, faces still outwards."""
     return Mesh(mesh.vertices[:, [1, 0, 2]], mesh.faces).inside_out()
 
 

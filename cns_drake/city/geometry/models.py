@@ -72,7 +72,8 @@ class Finish(NamedTuple):
         For example `[0.8, 0.7, 0.6]`, or `{brick: [0.5, 0.3, 0.2]}`.
 
         Raises:
-            ValueError: the value is neither, or there is no such material.
+            ValueError: the value is neither a colour nor a material with a
+                colour, or there is no such material.
         """
         rgb, material = value, None
         if isinstance(value, dict) and len(value) == 1:

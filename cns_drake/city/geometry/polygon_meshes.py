@@ -64,8 +64,8 @@ def _cut_into_squares(
 
     Returns:
         The piece in each square, in the order of the grid. A square that lies
-        wholly inside is given by its corners (4, 2), counter-clockwise from the
-        lower right one.
+        wholly inside a polygon is given by its corners (4, 2),
+        counter-clockwise from the lower right one.
     """
     corners, squares = squares_of_grid(geometry, size)
     is_whole = shapely.contains_properly(geometry, squares)

@@ -55,7 +55,7 @@ def _corners(ring: LinearRing) -> list[_Point]:
 def _with_corners_on_edges(
     ring: list[_Point], corners: list[_Point]
 ) -> list[_Point]:
-    """Returns a ring with all `corners` added that lie on its edges."""
+    """Adds to a ring the points of `corners` that lie on its edges."""
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts
@@ -152,7 +152,7 @@ def _opens_towards(ring: list[_Point], i: int, target: _Point) -> bool:
 
 
 def _crosses(p: _Point, q: _Point, a: _Point, b: _Point) -> bool:
-    """Returns whether segment pq meets segment ab other than at p or q."""
+    """Returns whether segment pq meets ab at a point other than p and q."""
     sides = (_cross(p, q, a), _cross(p, q, b))
     others = (_cross(a, b, p), _cross(a, b, q))
     if sides[0] * sides[1] < 0 and others[0] * others[1] < 0:

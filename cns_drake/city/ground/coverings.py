@@ -85,6 +85,6 @@ class Covering(NamedTuple):
 def water(name: str, area: BaseGeometry) -> Covering:
     """Returns the water that covers an area in W [m].
 
-    `name` is the name of its structure.
+    `name` is the name of the water's structure.
     """
     return Covering(name, "other-ground", area, (0.25, 0.38, 0.45), "water")

@@ -54,7 +54,7 @@ class _Block:
     roof: float
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
-        """Returns the solid with a new footprint and height, and a flat roof."""
+        """Returns the solid with new footprint and heights, and a flat roof."""
         plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
         return _Block(self.name, plain, polygon, low, high, 0.0)
 
