@@ -52,7 +52,7 @@ class TrajectoryErrors:
         drift: (K,) errors of position over 100 m [m]; empty if the path is
             shorter than 100 m.
         drift_deg: (K,) errors of orientation over 100 m [deg].
-        length: length of the true path along the poses [m].
+        length: length of the ground-truth path along the poses [m].
         drive_length: length of the path of the whole drive [m].
         num_outside: number of estimated poses that are left out because their
             times lie before or after the drive.

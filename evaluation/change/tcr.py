@@ -3,9 +3,9 @@
 Source: "The City that Never Settles", equations 1 to 3. The paper leaves the
 following choices open; this module makes them.
 
-- X is the map of a whole drive in world coordinates. The points of X are the
-  centroids of voxels, whose grid is fixed in the world (see
-  `evaluation.maps.voxel_maps`).
+- A map in the paper's equations, X, is the map of a whole drive in world
+  coordinates. The points of X are the centroids of voxels, whose grid is fixed
+  in the world (see `evaluation.maps.voxel_maps`).
 - TCR_sym changes if that grid is shifted. The least and the greatest value over
   `GRIDS`, shifts that are spread evenly over a voxel, show by how much.
 - The hull is widened by `HULL_MARGIN` on all sides. Flat ground is a face of

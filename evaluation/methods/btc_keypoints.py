@@ -117,7 +117,7 @@ def height_image(
         height_range: limits of the heights above the plane [m]; other points
             are left out.
         height_step: thickness of the layers of height [m].
-        num_layers: number of layers. Points above the highest layer only count
+        num_layers: number of layers. Points above the highest layer count only
             for the mean positions.
     """
     # Rows, columns and heights of the points between the limits.

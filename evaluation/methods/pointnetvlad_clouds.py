@@ -43,8 +43,8 @@ def prepare_cloud(points: np.ndarray) -> np.ndarray:
         points: (N, 3) points, x ahead, y left, z up [m].
 
     Returns:
-        (4096, 3) float32, or (0, 3) if there are no points above the ground,
-        or all of them are at one place.
+        (4096, 3) float32, or (0, 3) if there are no points above the ground, or
+        all of them are at one position.
     """
     rng = np.random.default_rng(0)
     points = _without_ground(points, rng)

@@ -245,7 +245,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         return yaw_pose(yaw, -offset[0] * cell, -offset[1] * cell)
 
     def _bev(self, points: np.ndarray) -> np.ndarray:
-        """Returns the map from above, (n, n, 6): rows along x, columns y.
+        """Returns the map from above, (n, n, 6): rows along x, columns along y.
 
         A cell holds the greatest value of each feature over its points.
         """

@@ -178,8 +178,8 @@ def _shape(p: np.ndarray, ring: np.ndarray) -> tuple[float, ...]:
     """Returns the shape of a neighbourhood: shares, normal and residuals.
 
     Demantke et al. (2011) define the shares of lines, planes and scatter.
-    Residuals from the plane are logarithms of mm, in three kinds: of all
-    points, within rings, and of the rings' means.
+    Residuals from the plane are logarithms of lengths in mm. There are three
+    kinds of residuals: of all points, within rings, and of the rings' means.
     """
     spread = p - p.mean(axis=0)
     values, vectors = np.linalg.eigh(spread.T @ spread / len(p))

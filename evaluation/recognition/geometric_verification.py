@@ -72,7 +72,9 @@ def gated(
 def estimated_poses(
     method: Method, query: Any, database: Any, places: Sequence[int]
 ) -> list[np.ndarray | None]:
-    """Returns the pose X_PQ (4, 4) of a query at each place, or None.
+    """Returns the pose X_PQ (4, 4) of a query at each place.
+
+    The pose is None at a place where the method estimates no pose.
 
     Args:
         method: method that estimates the poses.

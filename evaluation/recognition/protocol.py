@@ -187,8 +187,8 @@ class RetrievalProtocol:
     def name_with(self, method: Method) -> str:
         """Returns the name of the protocol for the results of one method.
 
-        A shipped protocol keeps its name even if the method chooses some
-        options itself (see `of`): its name does not become "own".
+        A shipped protocol is not renamed to `own` if the method chooses some
+        options itself (see `of`).
         """
         return self._named(lambda one: one.of(method))
 

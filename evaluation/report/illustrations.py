@@ -20,8 +20,8 @@ class Illustration:
         section: section of the page that shows the figure; "print" for a figure
             that the page does not show.
         num_panels: number of panels side by side; a phone shows one at a time.
-        legend: the colours (red, green, blue), each with its meaning. The page
-            shows these colours below the figure.
+        legend: colours, each as values of red, green and blue, with their
+            meanings. The page shows these colours below the figure.
     """
 
     stem: Path

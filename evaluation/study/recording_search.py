@@ -80,9 +80,9 @@ def find_recordings(
 def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
     """Returns the paths of the drives in a folder, in natural order.
 
-    Drives in KITTI's layout without a scenario are left out with a note. So are
-    drives that are not directly in the folder, except drives in the layouts of
-    CNS and KITTI.
+    Two kinds of drives are left out with a note: drives in KITTI's layout
+    without a scenario, and drives that are not directly in the folder, unless
+    they have the layout of CNS or KITTI.
 
     Args:
         folder: the folder, searched three levels down.
@@ -120,7 +120,7 @@ def _find_drives(folder: Path, on_note: Callable[[str], None]) -> list[Path]:
 def _with_scenario(
     drives: Sequence[Path], on_note: Callable[[str], None]
 ) -> list[Path]:
-    """Leaves out the drives in KITTI's layout without a scenario.
+    """Leaves out the drives in KITTI's layout that have no scenario.
 
     Args:
         drives: paths of all drives, at least one.
