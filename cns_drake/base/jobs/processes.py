@@ -13,8 +13,9 @@ import contextlib
 from contextlib import nullcontext
 import gc
 import importlib
+import math
 import multiprocessing
-from multiprocessing.connection import Connection, Pipe
+from multiprocessing.connection import Connection, Pipe, wait
 from multiprocessing.process import BaseProcess
 import os
 import pickle
@@ -65,7 +66,7 @@ if sys.platform == "linux":
     _context = multiprocessing.get_context("forkserver")
 else:
     _context = multiprocessing.get_context("spawn")
-# One thread at a time changes the environment.
+# One thread at a time changes the environment, or reads statuses.
 _starting = threading.Lock()
 
 
@@ -178,12 +179,28 @@ def _last_message(
 def _end_process(process: BaseProcess) -> int:
     """Ends a process and returns its status."""
     process.terminate()
-    process.join(PATIENCE)
-    if process.exitcode is None:
+    status = _status_within(process, PATIENCE)
+    if status is None:
         process.kill()
-        process.join()
-    assert process.exitcode is not None  # It has ended.
-    return process.exitcode
+        status = _status_within(process, math.inf)
+    assert status is not None  # It has ended.
+    return status
+
+
+def _status_within(process: BaseProcess, seconds: float) -> int | None:
+    """Returns the status of a process, or None if it runs longer than a time.
+
+    A status can be read only once. The start of a process reads the statuses of
+    all others, too, and could take one from a thread that waits for it.
+    Threads therefore ask for statuses, and start processes, in turns.
+    """
+    deadline = time.monotonic() + seconds
+    while True:
+        with _starting:
+            status = process.exitcode
+        if status is not None or time.monotonic() > deadline:
+            return status
+        wait([process.sentinel], _LOOK_INTERVAL)
 
 
 def _describe_status(status: int) -> str:

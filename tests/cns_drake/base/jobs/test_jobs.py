@@ -15,7 +15,7 @@ import pytest
 
 from cns_drake.base.errors import FailedJobsError, InputError
 from cns_drake.base.file_locks import exclusive
-from cns_drake.base.jobs import cluster
+from cns_drake.base.jobs import cluster, processes
 from cns_drake.base.jobs.cluster import (
     Cluster,
     DaskWorkers,
@@ -319,6 +319,40 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
             is_wanted,
         )
     assert not psutil.pid_exists(reports[0])
+
+
+def test_threads_ask_for_statuses_in_turns():
+    """Otherwise, a start could take the status for which a thread waits."""
+
+    class Ending:
+        """A process that has a status when it is asked for the second time."""
+
+        def __init__(self, sentinel):
+            self.sentinel = sentinel
+            self.calls = []
+
+        def terminate(self):
+            self.calls.append("terminate")
+
+        def kill(self):
+            self.calls.append("kill")
+
+        @property
+        def exitcode(self):
+            assert processes._starting.locked()
+            self.calls.append("exitcode")
+            return -15 if self.calls.count("exitcode") > 1 else None
+
+    read_end, write_end = os.pipe()
+    try:
+        os.write(write_end, b"!")
+        process = Ending(read_end)
+        assert processes._end_process(process) == -15
+    finally:
+        os.close(read_end)
+        os.close(write_end)
+    assert process.calls == ["terminate", "exitcode", "exitcode"]
+    assert not processes._starting.locked()
 
 
 def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
