@@ -69,22 +69,21 @@ def plan_queues(
             end = begin - float(rng.uniform(*_GAPS))
     places = np.array(rows).reshape(-1, 5)
     times = np.arange(0.0, duration + 2 * STEP, STEP)
-    ego_areas = shapely.polygons(ego_box.corners(*ego(times)))
-    present = ~_passed(kinds, places, ego_areas)
+    present = ~_passed(kinds, places, ego_box.corners(*ego(times)))
     tracks = Tracks(STEP, np.tile(places, (len(times), 1, 1)), present)
     walkers = Tracks(STEP, np.zeros((len(times), 0, 5)))
     return TrafficPlan(tuple(kinds), tracks, walkers)
 
 
 def _passed(
-    kinds: Sequence[VehicleKind], places: np.ndarray, ego_areas: np.ndarray
+    kinds: Sequence[VehicleKind], places: np.ndarray, corners: np.ndarray
 ) -> np.ndarray:
     """Returns which vehicles the ego car passes at each step, (K, N) bool.
 
     Args:
         kinds: kinds of the N vehicles.
         places: (N, 5) places of the vehicles, as in `TrafficPlan.vehicles`.
-        ego_areas: (K,) polygon that the ego car covers at each step.
+        corners: (K, 4, 2) corners of the ego car's box at each step [m].
     """
     boxes = [
         EgoBox(-kind.size[0] / 2, kind.size[0] / 2, kind.size[1] / 2).corners(
@@ -93,11 +92,11 @@ def _passed(
         for kind, row in zip(kinds, places, strict=True)
     ]
     tree = shapely.STRtree(shapely.polygons(boxes) if boxes else [])
-    step, near = tree.query(ego_areas, "dwithin", _LETS_PASS)
-    passed = np.zeros((len(ego_areas), len(kinds)), bool)
+    step, near = tree.query(shapely.polygons(corners), "dwithin", _LETS_PASS)
+    passed = np.zeros((len(corners), len(kinds)), bool)
     # A vehicle does not disappear during a revolution of a LiDAR. The margin of
     # one step keeps the vehicle absent in revolutions that begin before the
     # pass, or end after it.
     for shift in (-1, 0, 1):
-        passed[np.clip(step + shift, 0, len(ego_areas) - 1), near] = True
+        passed[np.clip(step + shift, 0, len(corners) - 1), near] = True
     return passed
