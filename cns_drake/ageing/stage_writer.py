@@ -135,8 +135,8 @@ class StageWriter:
 
         Today's structures come first. Structures of later years (`new`) follow
         in the order in which they are built, and structures of the past come
-        last. If more years after today are added, the instance ids of
-        structures built before stay the same.
+        last. If later years are added, today's structures and those of the
+        earlier `new` years keep their instance ids.
 
         Raises:
             InputError: there are more structures than instance ids.

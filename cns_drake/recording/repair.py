@@ -57,7 +57,7 @@ def repair_mcap(
     path: Path,
     output: Path | None = None,
 ) -> Repair:
-    """Writes the readable part of an MCAP file as a whole, indexed file.
+    """Writes the readable part of an MCAP file to a complete, indexed file.
 
     Messages keep their times, numbers and bytes, and on each topic their order;
     attachments and metadata are kept as well. A file of ROS 2 also gets a

@@ -269,7 +269,7 @@ def _read_first_pose(path: Path) -> np.ndarray:
 
 
 def _read_calibration(path: Path) -> dict[str, np.ndarray]:
-    """Returns the rows P0 and Tr of `calib.txt`, (1, 12) each, if present.
+    """Returns the row Tr of `calib.txt`, and the row P0 if present, (1, 12).
 
     Tr is the upper 3 x 4 of X_CS, the pose of the LiDAR in the camera's frame.
 

@@ -224,7 +224,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns the contexts whose retrieval keys are nearest to a query's.
 
-        The tree leaves open which of equally near contexts are found.
+        If several contexts are equally near, any of them may be found.
 
         Returns:
             (C,) indices of contexts, the nearest first; (C,) their distances.

@@ -149,7 +149,7 @@ def overlaps_with_best_match(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns how much of each query's scan its best match shows, (Q,).
+    """Returns the share of each query's scan that its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.

@@ -20,8 +20,9 @@ class Searched(NamedTuple):
         described: the described places.
         drives: name of each place's drive.
         num_here: number of places in the query's own world; they come first.
-        rows: (num_here,) index of each place in the query's own world, among
-            all places of the drives through this world.
+        rows: (num_here,) for each of the first `num_here` places, its index
+            among all places of the drives through the query's world. (The
+            database may contain only some of these places.)
     """
 
     described: DriveDescriptors

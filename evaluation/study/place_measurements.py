@@ -51,7 +51,7 @@ def shown_overlaps(
     leaves_out_itself: bool = False,
     keep: str | int = KEEP_ALL,
 ) -> dict[float, np.ndarray]:
-    """Returns how much of each query's scan its best match shows.
+    """Returns the share of each query's scan that its best match shows.
 
     Args:
         reporter: unused.
@@ -270,7 +270,7 @@ def _overlaps_of_matches(
     radius: float,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns how much of each query's scan its best match shows, (Q,).
+    """Returns the share of each query's scan that its best match shows, (Q,).
 
     Matches follow from the positions of the scans, and not from a method. The
     overlaps of a radius are therefore computed once for all methods.

@@ -42,7 +42,8 @@ def shortest_time(jobs: Sequence[Job], num_workers: int) -> float:
     """Returns the time in which jobs can be done, at best [s].
 
     Args:
-        jobs: the jobs. Needed jobs that are not among these jobs count as done.
+        jobs: the jobs. If a job needs a job that is not listed, the latter
+            counts as done.
         num_workers: number of jobs that run at a time.
     """
     ends: Mapping[str, float] = _end_times({job.name: job for job in jobs})

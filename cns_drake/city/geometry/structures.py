@@ -20,7 +20,7 @@ from cns_drake.scene.structure_names import kind_in_name
 class Structure:
     """A named object of a city: a model, and its pose in the world W.
 
-    It is the structure as a generator or an import makes it. A
+    A generator or an import makes the structure in this form. A
     `cns_drake.scene.structure_table.StructureEntry` is the entry of a structure
     in the table of a world, and a
     `cns_drake.transient.loaded_structures.LoadedStructure` is a structure that

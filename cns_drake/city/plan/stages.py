@@ -50,7 +50,7 @@ class Stage(_Model):
             cannot have this field.
         sites: groups of buildings that are under construction in this stage
             only, each group under a heading of your choice. Instead of each
-            building, the stage shows a frame that has the given height,
+            building, the stage shows a frame of the given height, together with
             scaffolds and a crane. The lot of the building must measure at least
             16 m by 16 m. The last stage cannot have this field.
     """

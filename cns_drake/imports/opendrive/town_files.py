@@ -40,7 +40,7 @@ def write_town(
         town: the town.
 
     Returns:
-        What was imported, and name of a stage -> numbers of its structures and
+        What was imported, and name of a stage -> counts of its structures and
         of its triangles.
 
     Raises:

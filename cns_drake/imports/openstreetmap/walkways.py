@@ -151,9 +151,9 @@ class _Strips:
         return self.nodes.setdefault(place, len(self.nodes))
 
     def links(self, walked: BaseGeometry) -> Iterator[tuple[_Place, _Place]]:
-        """Yields pairs of strips' ends between which people can walk.
+        """Yields pairs of ends of strips, if people can walk between the ends.
 
-        `walked` is the area on which they walk in W [m].
+        `walked` is the area on which people can walk, in frame W [m].
         """
         ends = [
             (k, s)
