@@ -59,8 +59,8 @@ class LidarSection(Mount):
         resolution: step to which recorded coordinates are rounded [m]; the
             default is 2^-10 m, about 1 mm. 0 records exact values.
         range_noise: standard deviation of a Gaussian error of the range [m].
-            The limits `min_range` and `max_range` apply to the range that
-            contains this error. Only with ideal returns.
+            The limits `min_range` and `max_range` apply after the error has
+            been added. Only with ideal returns.
         dropout: probability that a return is lost. Only with ideal returns.
         faint_dropout: additional loss of faint returns: a return of intensity I
             (from 0 to 1) is lost with the probability `faint_dropout` * (1 -
