@@ -71,18 +71,27 @@ def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
     Args:
         points: (N,) structured array, changed in place.
         name: name of the field.
-        values: (N,) float64 or, for a field of K numbers, (N, K).
+        values: (N,) or, for a field of K numbers, (N, K); float64, or integers
+            of 8 bytes for a field of such integers.
 
     Raises:
-        ValueError: if a number does not fit the field's type.
+        ValueError: if a number does not fit the field's type: it is out of
+            range, or not whole for a field of integers.
     """
+    dtype = points.dtype[name].base
+    fault = f"{name}: a number does not fit {dtype}"
+    # NumPy notices only some numbers that are out of range: as a byte, 300.0
+    # would become 44.
+    if dtype.kind in "iu":
+        limits = np.iinfo(dtype)
+        fits = (values >= limits.min) & (values <= limits.max)
+        if not (fits & (values == np.trunc(values))).all():
+            raise ValueError(fault)
     with np.errstate(over="raise", invalid="raise"):
         try:
             points[name] = values
         except FloatingPointError as error:
-            raise ValueError(
-                f"{name}: a number does not fit {points.dtype[name].base}"
-            ) from error
+            raise ValueError(fault) from error
 
 
 def to_xyzi(scan: np.ndarray) -> np.ndarray:

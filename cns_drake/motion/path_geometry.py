@@ -65,6 +65,7 @@ class SmoothPath:
 
     Attributes:
         spacing: distance between neighbouring points [m].
+        end: greatest value of the parameter u [m].
     """
 
     def __init__(self, points: np.ndarray, spacing: float):
@@ -126,7 +127,7 @@ class SmoothPath:
             p=p,
             dp=d1,
             ddp=d2,
-            yaw=self._count_turns(u, arctan2(y1, x1)),
+            yaw=self._unwrapped(u, arctan2(y1, x1)),
             dyaw=dyaw,
             ddyaw=ddyaw,
             climb=climb,
@@ -173,7 +174,7 @@ class SmoothPath:
         steps = int(np.ceil(self.end / _STEP))
         return np.linspace(0.0, self.end, steps + 1)
 
-    def _count_turns(self, u: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    def _unwrapped(self, u: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Returns the yaw (N,) plus the full turns made so far [rad]."""
         index = np.rint(np.clip(u, 0.0, self.end) / self.spacing).astype(int)
         nearby = self._knot_yaw[index.clip(0, len(self._knot_yaw) - 1)]

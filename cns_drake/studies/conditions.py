@@ -197,7 +197,7 @@ def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
     yield _CaseLevel(NO_CAUSE, 0, ())
     if experiment.levels and not experiment.cases:
         raise ValueError("levels: there are no cases")
-    numbers = num_levels(experiment)
+    numbers = levels_by_case(experiment)
     most = max(numbers.values(), default=0)
     if experiment.levels and max(experiment.levels) > most:
         raise ValueError(
@@ -206,7 +206,7 @@ def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
         )
     for name, most in numbers.items():
         members = _member_fields(experiment, name)
-        lengths = [_num_levels(one, f"cases.{name}") for one in members]
+        lengths = [_levels_of_case(one, f"cases.{name}") for one in members]
         wanted = experiment.levels or range(1, most + 1)
         for level in sorted({min(level, most) for level in wanted}):
             # Only a combined case can take a lower level of a member.
@@ -225,7 +225,7 @@ def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
             )
 
 
-def num_levels(experiment: Experiment) -> dict[str, int]:
+def levels_by_case(experiment: Experiment) -> dict[str, int]:
     """Returns the number of levels of each case, by the case's name.
 
     Raises:
@@ -237,7 +237,9 @@ def num_levels(experiment: Experiment) -> dict[str, int]:
         if name == NO_CAUSE:
             raise ValueError(f"cases.{name}: the name of what has no cause")
         members = _member_fields(experiment, name)
-        found[name] = max(_num_levels(one, f"cases.{name}") for one in members)
+        found[name] = max(
+            _levels_of_case(one, f"cases.{name}") for one in members
+        )
     return found
 
 
@@ -253,7 +255,7 @@ def _member_fields(experiment: Experiment, name: str) -> list[Case]:
     return found
 
 
-def _num_levels(case: Case, place: str) -> int:
+def _levels_of_case(case: Case, place: str) -> int:
     values = (value for _, value in leaves(case, (place,)))
     lists = (some for some in values if isinstance(some, FactorValues))
     return max(map(len, lists), default=1)

@@ -11,7 +11,7 @@ from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.progress import doing
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies.conditions import Condition, conditions, num_levels
+from cns_drake.studies.conditions import Condition, conditions, levels_by_case
 from cns_drake.studies.distractors import distracting_drives
 from cns_drake.studies.experiment import FLEET, SESSIONS, Experiment
 from cns_drake.studies.experiment_maps import ExperimentMaps, MapPairs
@@ -199,7 +199,7 @@ class Study:
         wanted = max(self.experiment.levels or (0,))
         fewer = [
             f"{name} ({number})"
-            for name, number in num_levels(self.experiment).items()
+            for name, number in levels_by_case(self.experiment).items()
             if number < wanted
         ]
         if fewer:

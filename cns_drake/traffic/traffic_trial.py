@@ -233,10 +233,11 @@ def begin_trial(task: Task, rng: np.random.Generator) -> Trial:
 
 
 def _spline_values(values: np.ndarray) -> np.ndarray:
-    """Returns the values (K - F, N, D) of a cubic B-spline at its knots.
+    """Returns the values (K - F - 1, N, D) of a cubic B-spline at its knots.
 
     Its control points are (K, N, D), at all steps; F steps are before the
-    drive. A spline through the values has no greater accelerations than the
+    drive, and the last step is only a neighbour of the one before it. A
+    spline through the values has no greater accelerations than the
     control points.
     """
     before, here, after = (

@@ -1,4 +1,4 @@
-"""Free places between the areas where new objects must not stand."""
+"""Areas, seen from above, in which new objects must not stand."""
 
 from collections.abc import Collection, Iterable
 

@@ -25,7 +25,9 @@ def point_field_datatype(dtype: np.dtype) -> int:
 
 
 def to_points(message: Any) -> np.ndarray:
-    """Returns a PointCloud2's points as an array, without copying them.
+    """Returns a PointCloud2's points as an array.
+
+    The points are not copied, unless there is padding between rows.
 
     Args:
         message: a deserialised PointCloud2, with any fields and padding.

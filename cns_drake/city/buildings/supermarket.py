@@ -160,7 +160,7 @@ def _add_dock(p: Supermarket, hall: Wing) -> None:
 
 
 def _add_shelters(p: Supermarket, wall: WallFrame) -> None:
-    """Adds curved shelters for trolleys in front of the canopy's ends."""
+    """Adds shelters for trolleys in front of the canopy's ends."""
     y = p.canopy + 0.1
     for k in range(p.shelters):
         x = 3.2 if k == 0 else wall.length - 3.2
