@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.ageing import alterations, kinds, new_buildings
-from cns_drake.ageing.lots import Lot
+from cns_drake.ageing.lots import AgeingLot
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.ageing.plots import PARTY_WALL, Plot, building_plot
 from cns_drake.ageing.standing_structures import StandingStructures
@@ -54,7 +54,7 @@ class Buildings:
         standing: StandingStructures,
         draws: YearlyDraws,
         trees: Trees,
-        lots: list[Lot],
+        lots: list[AgeingLot],
         kept_free: BaseGeometry,
     ) -> None:
         """Begins with the buildings of today.
@@ -88,7 +88,7 @@ class Buildings:
                 self._change(lot, lot.building)
         self._build_on_free_lots()
 
-    def _change(self, lot: Lot, name: str) -> None:
+    def _change(self, lot: AgeingLot, name: str) -> None:
         """Samples whether and how the building of a lot changes."""
         if kinds.is_kept(self._standing.kind(name)):
             return
@@ -101,7 +101,7 @@ class Buildings:
                 change(lot, name)
                 return
 
-    def _demolish(self, lot: Lot, name: str) -> None:
+    def _demolish(self, lot: AgeingLot, name: str) -> None:
         self._standing.record("demolished", name)
         self._standing.remove(name)
         self._remove_parts(lot)
@@ -115,7 +115,7 @@ class Buildings:
 
     def _open_site(
         self,
-        lot: Lot,
+        lot: AgeingLot,
         height: float,
         rng: np.random.Generator,
         *,
@@ -178,7 +178,7 @@ class Buildings:
             event = "felled" if kind == "vegetation" else "removed"
             standing.record(event, name, detail="for a building site")
 
-    def _remove_parts(self, lot: Lot) -> None:
+    def _remove_parts(self, lot: AgeingLot) -> None:
         """Removes what stands on a lot beside the building itself."""
         for part in lot.parts:
             self._standing.remove(part, because="plot")
@@ -187,7 +187,7 @@ class Buildings:
 
     def _put_part(
         self,
-        lot: Lot,
+        lot: AgeingLot,
         one: Structure,
         because: str,
         ignored: Sequence[str] = (),
@@ -197,7 +197,7 @@ class Buildings:
             self._standing.put(one, because=because)
             lot.parts.append(one.name)
 
-    def _use_empty(self, lot: Lot) -> None:
+    def _use_empty(self, lot: AgeingLot) -> None:
         """Uses an empty lot as a car park, a market, a yard or a garden."""
         name = f"lot_{self._standing.year:03d}y_{lot.number:03d}"
         ground = lot.plot.inside(lot.plot.area.buffer(-0.5))
@@ -206,7 +206,7 @@ class Buildings:
         for one in lot_objects(bare, use_by_size(bare), _CARS, rng):
             self._put_part(lot, one, "empty plot")
 
-    def _build_on(self, lot: Lot) -> None:
+    def _build_on(self, lot: AgeingLot) -> None:
         """Continues the building site of a lot, or finishes the building."""
         coming = lot.coming
         assert coming is not None
@@ -216,7 +216,7 @@ class Buildings:
         else:
             self._finish(lot, coming)
 
-    def _put_frame(self, lot: Lot, coming: Structure) -> None:
+    def _put_frame(self, lot: AgeingLot, coming: Structure) -> None:
         """Adds the unfinished frame of a building, with a scaffold."""
         model = new_buildings.unfinished_frame(coming, seed=lot.number)
         frame = replace(coming, name=f"{coming.name}_frame", model=model)
@@ -227,7 +227,7 @@ class Buildings:
         )
         self._standing.record("frame", coming.name, frame.name)
 
-    def _finish(self, lot: Lot, coming: Structure) -> None:
+    def _finish(self, lot: AgeingLot, coming: Structure) -> None:
         self._standing.put(coming)
         lot.building, lot.coming, lot.finished = coming.name, None, 0
         lot.plot = building_plot(coming)
@@ -276,7 +276,7 @@ class Buildings:
             hit = lot.coming is not None
             self._draws.tally.count("built", share, hit, stock if k == 0 else 0)
 
-    def _extend(self, lot: Lot, name: str) -> None:
+    def _extend(self, lot: AgeingLot, name: str) -> None:
         """Adds a storey or an annex to a building, if either fits."""
         rng = self._draws.generator("extended", name)
         triangles = self._standing.triangles(name)
@@ -314,7 +314,7 @@ class Buildings:
             or self._standing.near(area, (building,))
         )
 
-    def _renew(self, lot: Lot, name: str) -> None:
+    def _renew(self, lot: AgeingLot, name: str) -> None:
         """Gives a building new walls, and perhaps balconies."""
         standing = self._standing
         rng = self._draws.generator("renewed", name)
@@ -343,7 +343,7 @@ class Buildings:
         words += ["balconies"] if balconies else []
         standing.record("renewed", name, balconies, " ".join(words))
 
-    def _may_have_balconies(self, lot: Lot, name: str) -> bool:
+    def _may_have_balconies(self, lot: AgeingLot, name: str) -> bool:
         return (
             not lot.has_balconies
             and kinds.is_dwelling(self._standing.kind(name))
@@ -352,7 +352,7 @@ class Buildings:
 
     def _put_balconies(
         self,
-        lot: Lot,
+        lot: AgeingLot,
         name: str,
         triangles: np.ndarray,
         rng: np.random.Generator,

@@ -35,7 +35,7 @@ _DEEPEST_BELOW = 0.5
 
 
 @dataclass
-class Lot:
+class AgeingLot:
     """A plot and what stands on it.
 
     Attributes:
@@ -66,7 +66,7 @@ class Lot:
     has_balconies: bool = False
 
 
-def find_lots(world: OldWorld, kept_free: BaseGeometry) -> list[Lot]:
+def find_lots(world: OldWorld, kept_free: BaseGeometry) -> list[AgeingLot]:
     """Returns the lots of a city: first lots with buildings, then free lots.
 
     Args:
@@ -87,7 +87,7 @@ def find_lots(world: OldWorld, kept_free: BaseGeometry) -> list[Lot]:
 
 def _lots_of_buildings(
     world: OldWorld, kept_free: BaseGeometry
-) -> Iterator[Lot]:
+) -> Iterator[AgeingLot]:
     buildings = world.of_class("building")
     feet = [one.footprint for one in buildings]
     tree = shapely.STRtree(feet)
@@ -103,7 +103,7 @@ def _lots_of_buildings(
         area = max(pieces, key=lambda p: p.area).simplify(0.05)
         plot = Plot.facing(area, world.streets, one.bottom)
         z = _front_height(world, plot, one.bottom)
-        yield Lot(number, replace(plot, z=z), one.top - z, one.name)
+        yield AgeingLot(number, replace(plot, z=z), one.top - z, one.name)
 
 
 def _front_height(world: OldWorld, plot: Plot, default: float) -> float:
@@ -121,8 +121,8 @@ def _front_height(world: OldWorld, plot: Plot, default: float) -> float:
 
 
 def _free_lots(
-    world: OldWorld, kept_free: BaseGeometry, built_on: Sequence[Lot]
-) -> list[Lot]:
+    world: OldWorld, kept_free: BaseGeometry, built_on: Sequence[AgeingLot]
+) -> list[AgeingLot]:
     """Returns rectangles of open ground along streets as lots.
 
     Trees and furniture may stand on these lots.
@@ -142,7 +142,7 @@ def _free_lots(
     open_ground = world.open_ground.difference(shapely.union_all(solid))
     open_ground = open_ground.difference(kept_free.buffer(2.0))
     usual = shapely.STRtree([lot.plot.area for lot in built_on])
-    lots: list[Lot] = []
+    lots: list[AgeingLot] = []
     if open_ground.is_empty:
         return lots
     shapely.prepare(open_ground)
@@ -163,7 +163,7 @@ def _free_lots(
                 taken.append(area)
                 side = min(plot.room().bounds[2:])
                 high = min(lot.height, _HIGHEST_NEW, 2.4 * side)
-                lots.append(Lot(len(built_on) + len(lots), plot, high))
+                lots.append(AgeingLot(len(built_on) + len(lots), plot, high))
             start += 24.0
     return lots
 

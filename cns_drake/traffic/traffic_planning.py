@@ -14,7 +14,7 @@ from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
-from cns_drake.traffic.traffic_trial import FIRST_STEP, Task, begin_trial
+from cns_drake.traffic.traffic_trial import FIRST_STEP, TrafficTask, begin_trial
 
 # Greatest number of plans that are tried.
 _TRIES = 4
@@ -59,7 +59,7 @@ def plan_traffic(
     # The ego car stands until its drive begins.
     half_steps = np.arange(2 * num_steps - 1) - 2 * FIRST_STEP
     times = STEP / 2 * np.maximum(half_steps, 0)
-    task = Task(
+    task = TrafficTask(
         graph,
         walkways,
         make_streets(graph, ego_box, *ego(times[::2])),
@@ -86,7 +86,7 @@ def plan_traffic(
 
 
 def _better_plan(
-    task: Task, rng: np.random.Generator, best: TrafficPlan | None
+    task: TrafficTask, rng: np.random.Generator, best: TrafficPlan | None
 ) -> TrafficPlan:
     """Returns the plan of a new trial if better than `best`, or else `best`."""
     trial = begin_trial(task, rng)

@@ -46,7 +46,7 @@ _SPARE_SHARE = 0.06
 _APART = 0.1
 
 
-class Task(NamedTuple):
+class TrafficTask(NamedTuple):
     """What all trials of a plan have in common.
 
     Attributes:
@@ -77,7 +77,7 @@ class Trial:
 
     def __init__(
         self,
-        task: Task,
+        task: TrafficTask,
         kinds: Sequence[VehicleKind],
         crowd: Crowd,
         traffic: Traffic,
@@ -210,7 +210,7 @@ class Trial:
         )
 
 
-def begin_trial(task: Task, rng: np.random.Generator) -> Trial:
+def begin_trial(task: TrafficTask, rng: np.random.Generator) -> Trial:
     """Returns a trial in which vehicles and pedestrians have random places."""
     number = min(
         _with_spare(task.vehicles),

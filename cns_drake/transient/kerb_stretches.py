@@ -17,7 +17,7 @@ _SPACING = 1.0
 _MOST_BENT = 1.05
 
 
-class Stretch:
+class KerbStretch:
     """A straight piece of kerb.
 
     The frame of a stretch has its origin at the middle of the piece. Its x axis
@@ -140,7 +140,7 @@ class Stretch:
 
 def straight_kerbs(
     around: Surroundings, cause: str, cell: float, shortest: float
-) -> list[Stretch]:
+) -> list[KerbStretch]:
     """Returns the longest straight piece of kerb in each cell near a drive.
 
     Pieces are at most 30 m from the drive. If there are none, a note says so.
@@ -152,7 +152,7 @@ def straight_kerbs(
         cell: size of the square cells of a grid in W [m].
         shortest: least length of a piece [m].
     """
-    best: dict[tuple[int, int], Stretch] = {}
+    best: dict[tuple[int, int], KerbStretch] = {}
     for kerb in around.ground.kerbs(_SPACING):
         cells = np.floor(kerb.points / cell).astype(int)
         cuts = np.flatnonzero(np.diff(cells, axis=0).any(axis=1)) + 1
@@ -163,7 +163,7 @@ def straight_kerbs(
             walked = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
             x, y = (int(value) for value in cells[run[0]])
             outward = kerb.outwards[run].mean(axis=0)
-            stretch = Stretch(cause, (x, y), points, outward)
+            stretch = KerbStretch(cause, (x, y), points, outward)
             longest = best[x, y].length if (x, y) in best else 0.0
             if (
                 stretch.length >= shortest

@@ -8,7 +8,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry import assemble, block
 from cns_drake.city.placement.objects import OBJECTS, pick_key
 from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.transient.kerb_stretches import Stretch, straight_kerbs
+from cns_drake.transient.kerb_stretches import KerbStretch, straight_kerbs
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings
 
@@ -77,7 +77,7 @@ class _Site:
     """
 
     around: Surroundings
-    stretch: Stretch
+    stretch: KerbStretch
     x: float
     length: float
     width: float

@@ -1033,8 +1033,8 @@ NOT_RUN = {
     "test_bevplace has some of its own",
     ".venv/bin/cns-drake study stages --task place --method bevplace": "needs "
     "weights, too",
-    ".venv/bin/cns-drake study ladder suburbia --quick --task": "needs these "
-    "weights, like the others",
+    ".venv/bin/cns-drake study ladder suburbia --quick --task": "needs "
+    "weights, too",
     "# cns-drake study outside.yaml": "needs these weights, too",
     "for half in even odd": "needs scans that do not ship",
     "cns-drake train": "needs an extra, and minutes; test_training trains",

@@ -27,11 +27,10 @@ _PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
 
 def claims(piece: documents.Piece) -> list[str]:
     """Returns the recipes of a piece, or the reasons not to run it."""
-    starts = {name: recipe.start for name, recipe in RECIPES.items()}
-    starts |= {reason: start for start, reason in NOT_RUN.items()}
-    return [
-        name for name, start in starts.items() if piece.text.startswith(start)
-    ]
+    # Several pieces may have the same reason.
+    starts = [(name, recipe.start) for name, recipe in RECIPES.items()]
+    starts += [(reason, start) for start, reason in NOT_RUN.items()]
+    return [name for name, start in starts if piece.text.startswith(start)]
 
 
 def daily() -> set[str]:
