@@ -15,7 +15,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.point_clouds import point_field_datatype
+from cns_drake.base.drives.point_cloud2 import point_field_datatype
 from cns_drake.base.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 from cns_drake.base.jpeg_images import to_jpeg
 

@@ -184,21 +184,22 @@ class _Simplifier:
 
     def add_world(self, root: Element, world: Element, target: Element) -> None:
         """Adds the models of a world; `root` is the root of its file."""
-        self._note_references(root)
+        self._scan_file(root)
         self._count_saved(world)
         self._add_children(world, target, self._path.absolute().parent, 0)
 
     def _count_saved(self, world: Element) -> None:
         """Counts what a saved state of the world would change."""
-        saved = world.findall("state//model")
+        models = world.findall("state//model")
         placed = [
-            one
-            for one in saved
-            if one.find("pose") is not None or one.find("link/pose") is not None
+            model
+            for model in models
+            if model.find("pose") is not None
+            or model.find("link/pose") is not None
         ]
         self.skip("saved places of models (state)", len(placed))
-        scales = [(one.findtext("scale") or "1 1 1").split() for one in saved]
-        scaled = [one for one in scales if {*map(float, one)} != {1.0}]
+        scales = [(m.findtext("scale") or "1 1 1").split() for m in models]
+        scaled = [scale for scale in scales if {*map(float, scale)} != {1.0}]
         self.skip("saved scales of models (state)", len(scaled))
         angles = world.findall("state//joint/angle")
         self.skip("saved positions of joints (state)", len(angles))
@@ -206,12 +207,20 @@ class _Simplifier:
             for _ in world.iterfind(f"state/{tag}/*"):
                 self.skip(f"saved {tag} (state)")
 
-    def _note_references(self, root: Element) -> None:
-        """Records a file's references; counts joints that do not begin at 0."""
-        begins = [*root.iterfind(".//joint/axis/initial_position")]
-        begins += root.iterfind(".//joint/axis2/initial_position")
-        moved = [one for one in begins if float((one.text or "").strip() or 0)]
+    def _scan_file(self, root: Element) -> None:
+        """Takes in what concerns a whole file, before its models are added."""
+        self._count_moved_joints(root)
+        self._record_references(root)
+
+    def _count_moved_joints(self, root: Element) -> None:
+        """Counts the initial positions of joints that are not 0."""
+        positions = [*root.iterfind(".//joint/axis/initial_position")]
+        positions += root.iterfind(".//joint/axis2/initial_position")
+        moved = [p for p in positions if float((p.text or "").strip() or 0)]
         self.skip("initial positions of joints", len(moved))
+
+    def _record_references(self, root: Element) -> None:
+        """Records the names to which poses and frames of a file refer."""
         for element in root.iter():
             for key in ("relative_to", "attached_to", "placement_frame"):
                 self._referred.add(element.get(key, "").split("::")[-1])
@@ -291,7 +300,7 @@ class _Simplifier:
     def _read_included(self, file: Path) -> Element | None:
         """Returns a file's first model, if any; counts all other content."""
         root = read_model(file)
-        self._note_references(root)
+        self._scan_file(root)
         models = root.findall("model")
         lights, actors = root.findall("light"), root.findall("actor")
         self.skip("lights", len(lights))
@@ -316,7 +325,7 @@ class _Simplifier:
             if part.tag not in ("link", "model", "include", "frame", "joint"):
                 continue
             inside = part.iter("pose") if part.tag == "link" else part
-            for pose in [one for one in inside if one.tag == "pose"]:
+            for pose in [child for child in inside if child.tag == "pose"]:
                 if pose.get("relative_to") == "__model__":
                     pose.set("relative_to", own)
             attached = part.get("attached_to") or "__model__"
@@ -340,7 +349,7 @@ class _Simplifier:
             SubElement(made, "static").text = "true"
         self._copy_pose(model, made)
         self._add_children(model, made, folder, depth + 1)
-        if any(one.tag in ("link", "model", "frame") for one in made):
+        if any(part.tag in ("link", "model", "frame") for part in made):
             target.append(made)
 
     def _add_link(self, link: Element, target: Element, folder: Path) -> None:
@@ -385,8 +394,8 @@ class _Simplifier:
             what = f"shapes without a size ({shape.tag})"
             self.skip(what, how="made as large as SDF's default")
         kept = SubElement(SubElement(made, "geometry"), shape.tag)
-        kept.extend(one for one in shape if one.tag in _KNOWN[shape.tag])
-        made.extend(one for one in visual if one.tag.startswith("drake:"))
+        kept.extend(part for part in shape if part.tag in _KNOWN[shape.tag])
+        made.extend(part for part in visual if part.tag.startswith("drake:"))
         link.append(made)
         material = visual.find("material")
         if material is not None:

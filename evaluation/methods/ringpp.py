@@ -370,7 +370,13 @@ def _rotated(image: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _normalised_spectrum(image: np.ndarray) -> np.ndarray:
-    """Returns the spectrum (C, n, F) of an image (C, n, n), normalised."""
+    """Returns the spectrum (C, n, F) of a standardised image (C, n, n).
+
+    Before the transform, the image is shifted to zero mean and scaled to unit
+    norm, both over all channels together. The product of one spectrum with the
+    conjugate of another is then the spectrum of their normalised
+    cross-correlation.
+    """
     centred = image - image.mean()
     return scipy.fft.rfft2(centred / np.linalg.norm(centred))
 

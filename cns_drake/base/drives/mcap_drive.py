@@ -25,7 +25,7 @@ from cns_drake.base.drives.message_rows import (
     transform_row,
     vehicle_frames,
 )
-from cns_drake.base.drives.point_clouds import to_points, to_records
+from cns_drake.base.drives.point_cloud2 import to_points, to_records
 from cns_drake.base.drives.point_layouts import from_layout
 from cns_drake.base.errors import InputError
 from cns_drake.base.listing import listed

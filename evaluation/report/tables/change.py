@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.place_numbers import kept_share
@@ -27,8 +28,9 @@ def change_table(
             the visible change.
     """
 
-    def visible(one: ChangeResult) -> tuple[float | None, ...]:
-        return visible_change(evidence, one.report.source, one.report.target)
+    def visible(result: ChangeResult) -> VisibleChange:
+        report = result.report
+        return visible_change(evidence, report.source, report.target)
 
     table = Table.of(
         results,
@@ -47,10 +49,10 @@ def change_table(
             ),
             "voxels in hulls": lambda r: r.report.change.num_in_hull,
             "unchanged": lambda r: r.report.change.num_unchanged,
-            "visible change": lambda r: visible(r)[0],
-            "minus the control's": lambda r: visible(r)[2],
-            "share left": lambda r: visible(r)[3],
-            "queries": lambda r: visible(r)[1],
+            "visible change": lambda r: visible(r).share,
+            "minus the control's": lambda r: visible(r).added,
+            "share left": lambda r: visible(r).added_share,
+            "queries": lambda r: visible(r).queries,
             "least of the grids": lambda r: r.report.spread[0],
             "greatest": lambda r: r.report.spread[1],
         },
@@ -64,18 +66,29 @@ def change_table(
     return replace(table, rows=table.rows + further)
 
 
+class VisibleChange(NamedTuple):
+    """Visible change between the drives of a pair; None where it is unknown.
+
+    Attributes:
+        share: mean share of a query's scan that its right place does not show.
+        queries: number of queries.
+        added: `share` minus the mean in the control.
+        added_share: `added` as a share of `share`.
+    """
+
+    share: float | None = None
+    queries: int | None = None
+    added: float | None = None
+    added_share: float | None = None
+
+
 def visible_change(
     evidence: Evidence, database: str, query: str
-) -> tuple[float | None, ...]:
-    """Returns four values on a pair's visible change; None if unknown.
-
-    The values are: the mean visible change (share of a query's scan that its
-    right place does not show); the number of queries; the mean minus the mean
-    in the control; and this difference as a share of the pair's mean.
-    """
+) -> VisibleChange:
+    """Returns the visible change of a pair of drives."""
     known = evidence.get((database, query))
     if known is None:
-        return (None,) * 4
-    whole, queries = known.mean_visible_change
+        return VisibleChange()
+    share, queries = known.mean_visible_change
     added = known.visible_change_added
-    return whole, queries, added, float(kept_share(added, whole))
+    return VisibleChange(share, queries, added, float(kept_share(added, share)))

@@ -112,8 +112,8 @@ def recognition_table(
         ]
         cells = [column[i] for i in range(len(methods)) for column in columns]
         drives = some[0].database, some[0].query
-        whole, _, added, _ = visible_change(evidence, *drives)
-        shown = tcr.get(pair), Cell(whole, added)
+        change = visible_change(evidence, *drives)
+        shown = tcr.get(pair), Cell(change.share, change.added)
         rows.append((pair[0], " → ".join(pair[1:]), *shown, *cells))
     captions = {
         None: f", {reference.counting}",

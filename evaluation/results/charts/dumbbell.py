@@ -1,10 +1,12 @@
 """Dumbbell: a metric at the first and the last value of a factor."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 import textwrap
+from typing import TypeAlias
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cns_drake.base.errors import InputError
@@ -27,6 +29,9 @@ from evaluation.results.table_forms import title
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"
 # Columns that say which drives are compared.
 _PAIR = ("map", "database", "query")
+_DrivePair: TypeAlias = tuple[str, str, str]
+# A metric at the first and at the last value of the factor.
+_Ends: TypeAlias = tuple[float, float]
 
 
 def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
@@ -36,57 +41,20 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     if len(values) < 2:
         raise InputError(f"charts: dumbbell: {over}: the table has one value")
     before, after = values[0], values[-1]
-    found = {
-        (title(one.key[0]), *one.key[1:]): one.value
-        for one in means(chart.rows, "label", *_PAIR, over)
-    }
-    ends_of = [
-        {key[1:4]: None for key in found if key[4] == v}
-        for v in (before, after)
-    ]
-    pairs = [pair for pair in ends_of[0] if pair in ends_of[1]]
-    labels = _pair_labels(pairs)
-    heights: list[tuple[str, float]] = []
-    kept: dict[str, list[float]] = {}
+    pairs, ends = _ends_of_pairs(chart, before, after)
     figure = chart.figure((len(chart.styles) * (len(pairs) + 1) + 3) * ROW)
     axes = figure.subplots()
-    for name, (colour, _, marker) in chart.styles.items():
-        heights.append((name, len(heights)))
-        for pair, label in zip(pairs, labels, strict=True):
-            y = float(len(heights))
-            heights.append((label, y))
-            ends = [
-                found.get((name, *pair, v), math.nan) for v in (before, after)
-            ]
-            axes.plot(ends, [y, y], color=colour, lw=2.5, alpha=0.5)
-            axes.plot(ends[0], y, marker, color=colour, mfc="white", ms=7)
-            axes.plot(ends[1], y, marker, color=colour, ms=7)
-            share = float(kept_share(ends[1], ends[0]))
-            kept.setdefault(name, []).append(share)
-            if not math.isnan(share):
-                side = axes.get_yaxis_transform()
-                text = f"{100.0 * share:.0f} %"
-                axes.text(1.02, y, text, transform=side, va="center")
-    axes.set_yticks(
-        [y for _, y in heights], [escape_dollars(one) for one, _ in heights]
-    )
-    for tick_label in axes.get_yticklabels():
-        if tick_label.get_text() in map(escape_dollars, chart.styles):
-            tick_label.set_fontweight("bold")
-    axes.set_ylim(len(heights) - 0.4, -0.7)
-    first, last = (
-        value_words(v, over)
-        if over == STAGE
-        else f"at {in_words(over)} {value_words(v)}"
-        for v in (before, after)
-    )
-    text = f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
-    text = textwrap.fill(text, chart.width // 9)
+    _draw_methods(axes, chart, pairs, ends)
+    text = textwrap.fill(_axis_text(chart, before, after), chart.width // 9)
     figure.supxlabel(escape_dollars(text), fontsize=FONT)
     axes.grid(axis="x", alpha=0.3)
     axes.tick_params(length=0)
     start_at_zero(axes, x=chart.metric)
-    shares = {name: 100.0 * median_kept(kept[name]) for name in kept}
+    shares = {
+        name: 100.0
+        * median_kept(_kept_share(*ends[name, pair]) for pair in pairs)
+        for name in chart.styles
+    }
     number = f"median of {len(pairs)} pairs" if len(pairs) > 1 else "one pair"
     message = (
         f"Share of the {in_words(chart.metric)} that is retained, {number}:"
@@ -95,12 +63,94 @@ def draw_dumbbell(chart: Chart) -> tuple[str, Figure]:
     return with_significance(message, chart, after), figure
 
 
-def _pair_labels(pairs: Sequence[tuple[str, str, str]]) -> list[str]:
+def _ends_of_pairs(
+    chart: Chart, before: object, after: object
+) -> tuple[list[_DrivePair], dict[tuple[str, _DrivePair], _Ends]]:
+    """Returns the pairs of drives that have both ends, and the ends.
+
+    Args:
+        chart: a chart over a factor.
+        before: the factor's first value.
+        after: the factor's last value.
+
+    Returns:
+        The pairs, in the order of the table; and, by method and pair, the
+        metric at the first and the last value, NaN where it is unknown.
+    """
+    metric_at = {
+        (title(mean.key[0]), mean.key[1:4], mean.key[4]): mean.value
+        for mean in means(chart.rows, "label", *_PAIR, chart.keys["over"])
+    }
+    pairs_before, pairs_after = (
+        dict.fromkeys(pair for _, pair, v in metric_at if v == value)
+        for value in (before, after)
+    )
+    pairs = [pair for pair in pairs_before if pair in pairs_after]
+    ends = {
+        (name, pair): (
+            metric_at.get((name, pair, before), math.nan),
+            metric_at.get((name, pair, after), math.nan),
+        )
+        for name in chart.styles
+        for pair in pairs
+    }
+    return pairs, ends
+
+
+def _draw_methods(
+    axes: Axes,
+    chart: Chart,
+    pairs: Sequence[_DrivePair],
+    ends: Mapping[tuple[str, _DrivePair], _Ends],
+) -> None:
+    """Draws a heading for each method, and below it a row for each pair."""
+    pair_labels = _pair_labels(pairs)
+    labels: list[str] = []
+    headings = []
+    for name, (colour, _, marker) in chart.styles.items():
+        headings.append(len(labels))
+        labels.append(name)
+        for pair, label in zip(pairs, pair_labels, strict=True):
+            y = float(len(labels))
+            labels.append(label)
+            before, after = ends[name, pair]
+            axes.plot([before, after], [y, y], color=colour, lw=2.5, alpha=0.5)
+            axes.plot(before, y, marker, color=colour, mfc="white", ms=7)
+            axes.plot(after, y, marker, color=colour, ms=7)
+            share = _kept_share(before, after)
+            if not math.isnan(share):
+                side = axes.get_yaxis_transform()
+                text = f"{100.0 * share:.0f} %"
+                axes.text(1.02, y, text, transform=side, va="center")
+    axes.set_yticks(range(len(labels)), list(map(escape_dollars, labels)))
+    tick_labels = axes.get_yticklabels()
+    for row in headings:
+        tick_labels[row].set_fontweight("bold")
+    axes.set_ylim(len(labels) - 0.4, -0.7)
+
+
+def _kept_share(before: float, after: float) -> float:
+    return float(kept_share(after, before))
+
+
+def _axis_text(chart: Chart, before: object, after: object) -> str:
+    """Returns the text of the axis: the metric, and what the ends are."""
+    over = chart.keys["over"]
+    first, last = (
+        value_words(value, over)
+        if over == STAGE
+        else f"at {in_words(over)} {value_words(value)}"
+        for value in (before, after)
+    )
+    return f"{in_words(chart.metric)} {first} (hollow) and {last} (filled)"
+
+
+def _pair_labels(pairs: Sequence[_DrivePair]) -> list[str]:
     """Returns each pair's map, with the drives if the map has several pairs."""
     of_map = Counter(name for name, *_ in pairs)
     labels = []
     for name, *drives in pairs:
-        drive_names = (one.removeprefix(f"{name}_") for one in drives)
+        drive_names = (drive.removeprefix(f"{name}_") for drive in drives)
         is_alone = of_map[name] == 1
         labels.append(name if is_alone else f"{name} {' → '.join(drive_names)}")
     return labels

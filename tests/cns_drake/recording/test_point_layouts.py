@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.point_clouds import to_points, to_records
+from cns_drake.base.drives.point_cloud2 import to_points, to_records
 from cns_drake.base.drives.point_layouts import (
     from_layout,
     to_labels,

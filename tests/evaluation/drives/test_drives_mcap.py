@@ -24,7 +24,7 @@ import zstandard
 
 from cns_drake.base import poses
 from cns_drake.base.drives import mcap_file
-from cns_drake.base.drives.point_clouds import to_points
+from cns_drake.base.drives.point_cloud2 import to_points
 from cns_drake.base.errors import InputError
 from cns_drake.recording.repair import repair_mcap
 from evaluation import drives
