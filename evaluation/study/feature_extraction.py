@@ -26,9 +26,11 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import (
     DriveSummary,
-    ExtractedFeatures,
     KeptScans,
+    MappedFeatures,
+    ScannedFeatures,
     described_key,
+    kept_points,
 )
 from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
@@ -47,7 +49,7 @@ def extract_features(
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
     *,
     with_scans: bool = False,
-) -> ExtractedFeatures:
+) -> MappedFeatures:
     """Maps a recording and describes its places and queries.
 
     Each scan is read once, in order.
@@ -69,17 +71,14 @@ def extract_features(
     frames: list[int] = []
     thumbnails = []
     mapped = MappedDrive(recording, _most_scans(asked))
-    kept: KeptScans | None = None
-    if with_scans:
-        known = recording.instances
-        kept = KeptScans(mapped.name, mapped.X_WS, known and dict(known))
+    kept: dict[int, np.ndarray] = {}
 
     def keep(frame: int, cloud: np.ndarray) -> None:
         # Pictures show the scan as recorded, whatever its query sees.
         frames.append(frame)
         scan = mapped.scan(frame)
-        if kept is not None:
-            kept.keep(frame, scan, protocol.max_range)
+        if with_scans:
+            kept[frame] = kept_points(scan, protocol.max_range)
         height = MethodConfig().sensor_height
         shown = cropped(scan, protocol.max_range)
         thumbnails.append(thumbnail(shown, height, seed=frame))
@@ -99,7 +98,11 @@ def extract_features(
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )
-    return ExtractedFeatures(placed, described, kept, summary, fine)
+    scans = None
+    if with_scans:
+        known = recording.instances
+        scans = KeptScans(mapped.name, mapped.X_WS, known and dict(known), kept)
+    return MappedFeatures(placed, described, summary, fine, scans)
 
 
 def map_source(
@@ -127,7 +130,7 @@ def describe_recording(
     roles: Set[describing.Role],
     asked: Mapping[str, describing.Request],
     protocol: RetrievalProtocol = FAIR_PROTOCOL,
-) -> ExtractedFeatures:
+) -> ScannedFeatures:
     """Describes the places or queries of a recording, and keeps their scans.
 
     No map is made. Only the scans of places and queries are read, each once.
@@ -140,7 +143,7 @@ def describe_recording(
         seen.append(cloud.astype(np.float32))
 
     described = _described(drive, roles, asked, protocol, keep)
-    return ExtractedFeatures(DriveNames.of(recording), described, seen)
+    return ScannedFeatures(DriveNames.of(recording), described, seen)
 
 
 def _most_scans(asked: Mapping[str, describing.Request]) -> int:
@@ -225,15 +228,18 @@ class FeatureExtraction(Step):
             asked,
             self.protocol,
         )
+        found: MappedFeatures | ScannedFeatures
+        values: dict[Part, object]
         if self.with_map:
             found = extract_features(*arguments, with_scans=self.with_scans)
+            values = {
+                self.files.scans: found.recorded_scans,
+                self.files.fine: found.fine,
+                self.files.drive: found.drive,
+            }
         else:
             found = describe_recording(*arguments)
-        values: dict[Part, object] = {
-            self.files.scans: found.scans,
-            self.files.fine: found.fine,
-            self.files.drive: found.drive,
-        }
+            values = {self.files.scans: found.shown_scans}
         for key, described in found.described.items():
             values[self.files.described(key)] = found.placed, described
         doing("writing maps and descriptors")

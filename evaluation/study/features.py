@@ -1,7 +1,7 @@
 """What feature extraction finds in a drive: its map, descriptors and scans."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -67,61 +67,84 @@ class KeptScans:
         instances: instance id of a structure -> its name and class; None if
             unknown.
         scans: frame -> structured array (M,) with coordinates and instance ids
-            of the points within range.
+            of the points within range; see `kept_points`.
     """
 
     name: str
     X_WS: np.ndarray
     instances: Mapping[int, Mapping] | None
-    scans: dict[int, np.ndarray] = field(default_factory=dict)
+    scans: dict[int, np.ndarray]
 
     def __len__(self) -> int:
         """Returns the number of frames of the drive."""
         return len(self.X_WS)
-
-    def keep(self, frame: int, scan: np.ndarray, max_range: float) -> None:
-        """Stores a scan in `scans`.
-
-        Args:
-            frame: number of the frame.
-            scan: structured array (M,) in the sensor's frame.
-            max_range: limit of the coordinates in the frame of the rotated
-                sensor [m]. A point is stored if some rotation of the sensor can
-                bring all its coordinates within this limit.
-        """
-        # A corner of the cube may lie on an axis of a rotated sensor.
-        max_range *= math.sqrt(3.0)
-        names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
-        kept = within_range(xyz(scan), max_range)
-        # A view would hold all fields.
-        self.scans[frame] = repack_fields(scan[names][kept])
 
     def scan(self, index: int) -> np.ndarray:
         """Returns the scan of a frame, which must have been kept."""
         return self.scans[index]
 
 
+def kept_points(scan: np.ndarray, max_range: float) -> np.ndarray:
+    """Returns the points of a scan that any rotation of the sensor may need.
+
+    Args:
+        scan: structured array (M,) in the sensor's frame.
+        max_range: limit of the coordinates in the frame of the rotated sensor
+            [m]. A point is kept if some rotation of the sensor can bring all
+            its coordinates within this limit.
+
+    Returns:
+        Structured array (K,) of x, y, z and, if the scan has it, the instance.
+    """
+    # A corner of the cube may lie on an axis of a rotated sensor.
+    max_range *= math.sqrt(3.0)
+    names = [one for one in scan.dtype.names or () if one in _KEPT_FIELDS]
+    kept = within_range(xyz(scan), max_range)
+    # A view would hold all fields.
+    return repack_fields(scan[names][kept])
+
+
 @dataclass(frozen=True)
 class ExtractedFeatures:
-    """The results of reading a recording once: map, places and queries.
+    """What every reading of a recording yields: its names and descriptors.
 
     Attributes:
         placed: names of the drive, its world frame and its map.
         described: key of a method -> its descriptors of the places and
             queries; empty if the drive has neither.
-        scans: scans of places and queries; None if they are not kept. If there
-            is a map, this is a `KeptScans` with the recorded scans. Otherwise
-            it is a list of arrays (N, 3) float32, in which queries are changed
-            as the protocol says: rotated, tilted or without a sector.
-        drive: the drive with its map; None without a map.
-        fine: (K, 3) cloud for pictures in W [m]; None without a map.
     """
 
     placed: DriveNames
     described: dict[str, DriveDescriptors]
-    scans: KeptScans | list[np.ndarray] | None
-    drive: DriveSummary | None = None
-    fine: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class MappedFeatures(ExtractedFeatures):
+    """The features of a drive that is mapped.
+
+    Attributes:
+        drive: the drive with its map.
+        fine: (K, 3) cloud for pictures in W [m].
+        recorded_scans: scans of places and queries as they were recorded; None
+            if they are not kept.
+    """
+
+    drive: DriveSummary
+    fine: np.ndarray
+    recorded_scans: KeptScans | None
+
+
+@dataclass(frozen=True)
+class ScannedFeatures(ExtractedFeatures):
+    """The features of a drive of which only places and queries are read.
+
+    Attributes:
+        shown_scans: scans (N, 3) float32 of places and queries, as methods get
+            them: within range, and those of queries changed as the protocol
+            says (rotated, tilted or without a sector) [m].
+    """
+
+    shown_scans: list[np.ndarray]
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:

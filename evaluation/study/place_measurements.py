@@ -396,5 +396,4 @@ def _scans_and_descriptors(
         return scans.read(), lambda k: parts[k].read()[1]
     asked = {one.key: (one.make(), {role}, protocol) for one in methods}
     found = describe_recording(drive(), {role}, asked, protocol)
-    assert isinstance(found.scans, list)
-    return found.scans, lambda k: found.described.pop(methods[k].key)
+    return found.shown_scans, lambda k: found.described.pop(methods[k].key)
