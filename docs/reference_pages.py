@@ -9,6 +9,7 @@ the input files, tables of options from the programs themselves.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import is_dataclass
 import inspect
 from pathlib import Path
 import typing
@@ -174,18 +175,26 @@ def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
 
 
 def explain_fields(model: type[BaseModel]) -> tuple[str, dict[str, str]]:
-    """Returns what the docstring says of a model, and of each field."""
-    docstring = griffe.Docstring(inspect.getdoc(model) or "")
+    """Returns what docstrings say of a model, and of each field.
+
+    Fields that a model shares with a configuration for Drake are explained in
+    the docstring of the dataclass with these fields.
+    """
+    bases = [base for base in model.__mro__[:0:-1] if is_dataclass(base)]
     description = ""
     meanings = {}
-    for section in docstring.parse("google"):
-        if section.kind is griffe.DocstringSectionKind.text:
-            description = description or section.value
-        if section.kind is griffe.DocstringSectionKind.attributes:
-            meanings = {
-                attribute.name: " ".join(attribute.description.split())
-                for attribute in section.value
-            }
+    for explained in (*bases, model):
+        docstring = griffe.Docstring(inspect.getdoc(explained) or "")
+        texts = []
+        for section in docstring.parse("google"):
+            if section.kind is griffe.DocstringSectionKind.text:
+                texts.append(section.value)
+            if section.kind is griffe.DocstringSectionKind.attributes:
+                meanings |= {
+                    attribute.name: " ".join(attribute.description.split())
+                    for attribute in section.value
+                }
+        description = texts[0] if texts else ""
     return _prose(description), meanings
 
 

@@ -24,7 +24,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.lcm import LcmBuses
 
 from cns_drake.base.errors import describe_validation_error
-from cns_drake.sensors.imu.config import ImuSection
+from cns_drake.sensors.imu.config import ImuDescription, ImuSection
 from cns_drake.sensors.imu.imu import Imu, add_imu
 from cns_drake.sensors.lcm_publishing import (
     Interface,
@@ -34,7 +34,7 @@ from cns_drake.sensors.lcm_publishing import (
     publish_measurements,
 )
 from cns_drake.sensors.lidar.adding import add_described_lidar
-from cns_drake.sensors.lidar.config import LidarSection
+from cns_drake.sensors.lidar.config import LidarDescription, LidarSection
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from cns_drake.sensors.odometry import odometry
@@ -49,31 +49,32 @@ _RATE = 20
 
 
 @dataclass
-class LidarConfig:
-    """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
-
-    Most fields are the same as for a LiDAR in a scenario. Unlike in a scenario,
-    coordinates are not rounded by default, and the default rate is the rate of
-    the data sheet.
+class PublishedSensor:
+    """The place of a sensor and of its messages, of whatever kind it is.
 
     Attributes:
-        name: name of the system; the channel is `DRAKE_POINT_CLOUD_<name>`.
+        name: name of the system, and part of the channel's name.
         X_PB: pose of the sensor B in a frame P of the plant. The field
             `base_frame` of this pose names P; by default P is the world frame.
-        preset: name of the unit, from the table of presets.
+        lcm_bus: name of the bus on which the measurements are published.
+    """
+
+    name: str
+    X_PB: Transform = field(default_factory=Transform)
+    lcm_bus: str = "default"
+
+
+@dataclass
+class LidarConfig(LidarDescription, PublishedSensor):
+    """The configuration of a LiDAR, for YAML and `ApplyLidarConfig`.
+
+    The fields are those of a `LidarDescription`, of all sensors (`name`, `X_PB`
+    and `lcm_bus`), and the following. Unlike in a scenario, coordinates are not
+    rounded by default.
+
+    Attributes:
         rate: revolutions per second, at most 1000; by default the rate of the
             data sheet.
-        columns: columns in a revolution; by default the number in the preset.
-        min_range: nearest range [m]; by default the nearest range of the
-            preset.
-        max_range: farthest range [m]; by default the farthest range of the
-            preset.
-        resolution: step of the coordinates; 0 for exact values [m].
-        range_noise: standard deviation of a Gaussian error of ranges [m].
-        dropout: probability that a return is lost.
-        faint_dropout: additional loss of faint returns: a return of intensity I
-            is also lost with the probability `faint_dropout` * (1 - I).
-        motion_distortion: whether beams are cast at their own firing times.
         causal: whether a scan covers the revolution that ends at its time, so
             that a controller can use it at once.
         capture_offset: time of the first published scan [s]; the other scans
@@ -82,12 +83,7 @@ class LidarConfig:
         output_delay: time from a scan's capture to its publication [s], less
             than a revolution. The message keeps the time of the capture. The
             ports of the `Lidar` are not delayed.
-        returns: `ideal` or `calibrated`.
-        echoes: which echoes of a beam are reported, with calibrated returns.
-        unit_seed: seed of the errors that this individual unit has, in
-            calibrated returns.
         seed: seed of the noise.
-        lcm_bus: name of the bus on which the scans are published.
 
     Example:
         from pydrake.common.yaml import yaml_load_typed
@@ -99,50 +95,25 @@ class LidarConfig:
     """
 
     name: str = "lidar"
-    X_PB: Transform = field(default_factory=Transform)
-    preset: str = "cns"
     rate: float | None = None
-    columns: int | None = None
-    min_range: float | None = None
-    max_range: float | None = None
-    resolution: float = 0.0
-    range_noise: float = 0.0
-    dropout: float = 0.0
-    faint_dropout: float = 0.0
-    motion_distortion: bool = False
     causal: bool = False
     capture_offset: float = 0.0
     output_delay: float = 0.0
-    returns: str = "ideal"
-    echoes: str = "strongest"
-    unit_seed: int = 0
     seed: int = 0
-    lcm_bus: str = "default"
 
 
 @dataclass
-class ImuConfig:
+class ImuConfig(ImuDescription, PublishedSensor):
     """The configuration of an IMU, for YAML and `ApplyImuConfig`.
 
+    The fields are those of an `ImuDescription`, of all sensors (`name`, `X_PB`
+    and `lcm_bus`), and the following.
+
     Attributes:
-        name: name of the systems; the channel is `DRAKE_IMU_<name>`.
-        X_PB: pose of the sensor B in a frame P of the plant. The field
-            `base_frame` of this pose names P; by default P is the world frame.
         rate: samples per second; any number is possible, as for `add_imu`. By
             default the rate in the file `kalibr`, or 20 if no file states a
             rate.
-        kalibr: path of a file in Kalibr's format with the noise densities; by
-            default there is no noise.
-        accelerometer_turn_on_bias: standard deviation of the constant bias of
-            each axis of the accelerometer [m/s^2].
-        gyroscope_turn_on_bias: standard deviation of the constant bias of each
-            axis of the gyroscope [rad/s].
-        accelerometer_range: largest specific force that an axis can measure
-            [m/s^2]; by default no limit.
-        gyroscope_range: largest angular velocity that an axis can measure
-            [rad/s]; by default no limit.
         seed: seed of the errors.
-        lcm_bus: name of the bus on which the samples are published.
 
     Example:
         from cns_drake import ImuConfig
@@ -151,27 +122,18 @@ class ImuConfig:
     """
 
     name: str = "imu"
-    X_PB: Transform = field(default_factory=Transform)
-    rate: float | None = None
-    kalibr: str | None = None
-    accelerometer_turn_on_bias: float = 0.0
-    gyroscope_turn_on_bias: float = 0.0
-    accelerometer_range: float | None = None
-    gyroscope_range: float | None = None
     seed: int = 0
-    lcm_bus: str = "default"
 
 
 @dataclass
-class OdometryConfig:
+class OdometryConfig(PublishedSensor):
     """The configuration of exact odometry, for YAML and `ApplyOdometryConfig`.
 
+    The fields are those of all sensors (`name`, `X_PB` and `lcm_bus`), and the
+    following. B is the observed frame.
+
     Attributes:
-        name: name of the system; the channel is `DRAKE_ODOMETRY_<name>`.
-        X_PB: pose of the observed frame B in a frame P of the plant. The field
-            `base_frame` of this pose names P; by default P is the world frame.
         rate: messages per second; by default 20.
-        lcm_bus: name of the bus on which the odometry is published.
 
     Example:
         from cns_drake import OdometryConfig
@@ -180,9 +142,7 @@ class OdometryConfig:
     """
 
     name: str = "odometry"
-    X_PB: Transform = field(default_factory=Transform)
     rate: int | None = None
-    lcm_bus: str = "default"
 
 
 Config: TypeAlias = LidarConfig | ImuConfig | OdometryConfig

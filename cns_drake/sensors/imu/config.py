@@ -1,7 +1,6 @@
 """The description of an IMU, and the file of its noise densities."""
 
-from __future__ import annotations
-
+from dataclasses import dataclass
 import math
 from pathlib import Path
 
@@ -22,17 +21,16 @@ from cns_drake.sensors.sensor_config import (
 KALIBR_FILE = "imu.yaml"
 
 
-class ImuSection(Mount):
-    """An IMU. By default it is ideal, with one sample per scan.
+# Drake's YAML reads the types of the fields, which thus must not be texts, as
+# `from __future__ import annotations` makes them.
+@dataclass(init=False, repr=False, eq=False)
+class ImuDescription:
+    """An IMU's rate and errors, in a scenario and in an `ImuConfig` alike.
+
+    An `ImuSection` limits the values of the fields.
 
     Attributes:
-        xyz: position in `base_link` [m].
-        rpy_deg: roll, pitch, yaw in `base_link` [deg].
-        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. The
-            rate must be at most 1000 and at least the scan rate, and the time
-            between two samples must be a whole number of nanoseconds. By
-            default the rate in the file `kalibr`; without this file, one sample
-            per scan.
+        rate: samples per second [Hz].
         kalibr: file in Kalibr's format with the four noise densities of the
             IMU. By default there is no noise.
         accelerometer_turn_on_bias: standard deviation of the constant bias that
@@ -43,6 +41,27 @@ class ImuSection(Mount):
             either direction [m/s^2]. By default no limit.
         gyroscope_range: largest angular velocity that an axis can measure, in
             either direction [rad/s]. By default no limit.
+    """
+
+    rate: float | None = None
+    kalibr: str | None = None
+    accelerometer_turn_on_bias: float = 0.0
+    gyroscope_turn_on_bias: float = 0.0
+    accelerometer_range: float | None = None
+    gyroscope_range: float | None = None
+
+
+class ImuSection(ImuDescription, Mount):
+    """An IMU. By default it is ideal, with one sample per scan.
+
+    Attributes:
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        rate: samples per second [Hz], such as 100, 200, 250, 400 or 500. The
+            rate must be at most 1000 and at least the scan rate, and the time
+            between two samples must be a whole number of nanoseconds. By
+            default the rate in the file `kalibr`; without this file, one sample
+            per scan.
     """
 
     xyz: Triple = (-1.0, 0.0, 1.6)
@@ -116,7 +135,7 @@ class ImuSection(Mount):
         changed = kalibr.replaced(rostopic="/imu/data", update_rate=rate)
         return changed.model_dump()
 
-    def _read_kalibr(self) -> KalibrImu | None:
+    def _read_kalibr(self) -> "KalibrImu | None":
         return None if self.kalibr is None else read_kalibr(Path(self.kalibr))
 
 

@@ -1,7 +1,6 @@
 """Descriptions of a LiDAR and the weather, and their conversion to models."""
 
-from __future__ import annotations
-
+from dataclasses import dataclass
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -44,20 +43,23 @@ class WeatherConfig(Section):
     snowfall: float = Field(default=0.0, ge=0.0, le=300.0)
 
 
-class LidarSection(Mount):
-    """A LiDAR on the vehicle.
+# Drake's YAML reads the types of the fields, which thus must not be texts, as
+# `from __future__ import annotations` makes them.
+@dataclass(init=False, repr=False, eq=False)
+class LidarDescription:
+    """A LiDAR and its errors, in a scenario and in a `LidarConfig` alike.
+
+    A `LidarSection` limits the values of the fields.
 
     Attributes:
         preset: name of the LiDAR model, from the table of presets in the
             documentation.
-        xyz: position in `base_link` [m].
-        rpy_deg: roll, pitch, yaw in `base_link` [deg].
         columns: number of columns (azimuths) per revolution; by default the
             preset's.
         min_range: smallest range that is measured [m]; by default the preset's.
         max_range: largest range that is measured [m]; by default the preset's.
-        resolution: step to which recorded coordinates are rounded [m]; the
-            default is 2^-10 m, about 1 mm. 0 records exact values.
+        resolution: step to which coordinates are rounded [m]. 0 gives exact
+            values.
         range_noise: standard deviation of a Gaussian error of the range [m].
             The limits `min_range` and `max_range` apply after the error has
             been added. Only with ideal returns.
@@ -79,6 +81,30 @@ class LidarSection(Mount):
         unit_seed: seed of the errors in the ranges, angles and gains of an
             individual unit's lasers. Use the same seed in all drives with the
             same unit. Only with calibrated returns.
+    """
+
+    preset: str = "cns"
+    columns: int | None = None
+    min_range: float | None = None
+    max_range: float | None = None
+    resolution: float = 0.0
+    range_noise: float = 0.0
+    dropout: float = 0.0
+    faint_dropout: float = 0.0
+    motion_distortion: bool = False
+    returns: str = "ideal"
+    echoes: str = Echoes.STRONGEST.value
+    unit_seed: int = 0
+
+
+class LidarSection(LidarDescription, Mount):
+    """A LiDAR on the vehicle.
+
+    Attributes:
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        resolution: step to which recorded coordinates are rounded [m]; the
+            default is 2^-10 m, about 1 mm. 0 records exact values.
         rate: revolutions per second [Hz]. The rate of the fastest LiDAR of the
             drive must be a multiple of this rate. If the lasers of a unit fire
             at a fixed frequency, a revolution has more columns at a lower
@@ -88,7 +114,7 @@ class LidarSection(Mount):
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
-    preset: str = "cns"
+    # Fields of the description, with their limits.
     columns: int | None = Field(default=None, ge=4, le=8192)
     min_range: float | None = Field(default=None, ge=0.0)
     max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
@@ -98,7 +124,6 @@ class LidarSection(Mount):
     range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
     dropout: float = Field(default=0.0, ge=0.0, le=1.0)
     faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
-    motion_distortion: bool = False
     returns: Literal["ideal", "calibrated"] = field_off_by_default("ideal")
     echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
         field_off_by_default(Echoes.STRONGEST)
@@ -114,7 +139,7 @@ class LidarSection(Mount):
         return preset
 
     @model_validator(mode="after")
-    def _check_returns(self) -> LidarSection:
+    def _check_returns(self) -> "LidarSection":
         if self.returns == "ideal":
             if self.echoes != Echoes.STRONGEST:
                 raise ValueError(
@@ -135,7 +160,7 @@ class LidarSection(Mount):
         return self
 
     @model_validator(mode="after")
-    def _check_unit(self) -> LidarSection:
+    def _check_unit(self) -> "LidarSection":
         unit = LIDAR_PRESETS[self.preset].pattern
         if self.columns and unit.num_columns is None:
             raise ValueError(f"the preset '{self.preset}' has no columns")
@@ -147,7 +172,7 @@ class LidarSection(Mount):
             )
         return self
 
-    def with_preset(self, preset: str) -> LidarSection:
+    def with_preset(self, preset: str) -> "LidarSection":
         """Returns this description of a LiDAR, with another model.
 
         The name of the preset, the number of columns and the range limits come
@@ -221,7 +246,7 @@ def describe_unit(config: LidarSection) -> dict[str, Any]:
 
 def make_returns(
     config: LidarSection, weather: WeatherConfig, name: str, seed: int
-) -> CalibratedReturns | None:
+) -> "CalibratedReturns | None":
     """Returns the model of calibrated returns; None for ideal returns.
 
     Args:

@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 import dataclasses
 import inspect
+import typing
 
 from drake import lcmt_drake_signal, lcmt_point_cloud
 from helpers.browser import chromium, has_chromium
@@ -139,7 +140,7 @@ def test_fields_are_those_of_a_scenario(struct, section):
     assert list(inspect.signature(struct).parameters) == [
         f.name for f in dataclasses.fields(struct)
     ]
-    assert struct.__annotations__.keys() >= fields.keys()
+    assert typing.get_type_hints(struct).keys() >= fields.keys()
 
 
 @pytest.mark.parametrize("preset", ["vlp-16", "hokuyo-ust-20lx", "avia"])
