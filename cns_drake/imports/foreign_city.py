@@ -1,10 +1,13 @@
 """An imported city, independent of its file format."""
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.streets import Street, StreetPlaces
+from cns_drake.imports.streets import Street
 from cns_drake.imports.structures import ImportedStructure
 
 
@@ -25,6 +28,21 @@ class SmallObject:
     kind: str
     xy: tuple[float, float]
     yaw: float | None
+
+
+@dataclass(frozen=True)
+class StreetPlaces:
+    """Crossings, traffic signals and footpaths of a city.
+
+    Attributes:
+        crossed: nodes of streets at which people cross.
+        signals: (N, 2) places of traffic signals [m].
+        paths: middle lines of footpaths, (M, 2) each [m].
+    """
+
+    crossed: AbstractSet[int] = frozenset()
+    signals: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    paths: Sequence[np.ndarray] = ()
 
 
 @dataclass(frozen=True)

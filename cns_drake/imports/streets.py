@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,21 @@ class Street:
     tags: Mapping[str, str] = field(default_factory=dict)
 
 
+class StreetPiece(NamedTuple):
+    """A piece of a street between two nodes.
+
+    Attributes:
+        street: the whole street.
+        line: (N, 2) middle of the piece, in the direction of the street's line
+            [m].
+        nodes: the first and the last node of the piece.
+    """
+
+    street: Street
+    line: np.ndarray
+    nodes: tuple[int, int]
+
+
 def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
     """Returns the number of street ends at each node.
 
@@ -56,12 +72,10 @@ def ends_at_nodes(streets: Iterable[Street]) -> Counter[int]:
 
 def cut_at_nodes(
     streets: Sequence[Street], also: AbstractSet[int] = frozenset()
-) -> Iterator[tuple[Street, np.ndarray, tuple[int, int]]]:
-    """Cuts streets where they meet, and at the nodes in `also`.
+) -> Iterator[StreetPiece]:
+    """Yields the pieces of streets, cut where they meet and at nodes in `also`.
 
-    Yields:
-        For each piece: its street, its middle line (N, 2) [m], and its first
-        and its last node.
+    The pieces of a street follow each other in the direction of its line.
     """
     uses = Counter(node for street in streets for node in street.nodes)
     for street in streets:
@@ -72,20 +86,6 @@ def cut_at_nodes(
             if k in (0, last) or uses[node] > 1 or node in also
         ]
         for first, after in pairwise(cuts):
+            line = street.line[first : after + 1]
             ends = street.nodes[first], street.nodes[after]
-            yield street, street.line[first : after + 1], ends
-
-
-@dataclass(frozen=True)
-class StreetPlaces:
-    """Crossings, traffic signals and footpaths of a city.
-
-    Attributes:
-        crossed: nodes of streets at which people cross.
-        signals: (N, 2) places of traffic signals [m].
-        paths: middle lines of footpaths, (M, 2) each [m].
-    """
-
-    crossed: AbstractSet[int] = frozenset()
-    signals: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    paths: Sequence[np.ndarray] = ()
+            yield StreetPiece(street, line, ends)

@@ -68,11 +68,13 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
     Streets are cut where they meet.
     """
     lanes: list[Lane] = []
-    for way, (street, line, (begin, end)) in enumerate(cut_at_nodes(streets)):
-        if street.forward:
-            lanes.append(Lane(line, begin, end, street.aside, way))
-        if street.backward:
-            lanes.append(Lane(line[::-1], end, begin, street.aside, way))
+    for number, piece in enumerate(cut_at_nodes(streets)):
+        begin, end = piece.nodes
+        aside = piece.street.aside
+        if piece.street.forward:
+            lanes.append(Lane(piece.line, begin, end, aside, number))
+        if piece.street.backward:
+            lanes.append(Lane(piece.line[::-1], end, begin, aside, number))
     return [lane for lane in lanes if lane.length > 0.0]
 
 

@@ -9,6 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.foreign_city import StreetPlaces
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
@@ -23,12 +24,7 @@ from cns_drake.imports.openstreetmap.way_tags import (
     sidewalk_sides,
     street_width,
 )
-from cns_drake.imports.streets import (
-    KERB_HEIGHT,
-    SIDEWALK_WIDTH,
-    Street,
-    StreetPlaces,
-)
+from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
 from cns_drake.imports.structures import ImportedStructure
 
 _ROAD = Look("Road", "road", None, 0.0)

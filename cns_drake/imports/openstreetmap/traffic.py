@@ -9,6 +9,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.foreign_city import StreetPlaces
 from cns_drake.imports.openstreetmap.signals import (
     junctions_with_signals,
     with_signals,
@@ -19,7 +20,7 @@ from cns_drake.imports.openstreetmap.street_lanes import (
 )
 from cns_drake.imports.openstreetmap.walkways import find_walkways
 from cns_drake.imports.options import DriveOn
-from cns_drake.imports.streets import Street, StreetPlaces
+from cns_drake.imports.streets import Street
 from cns_drake.imports.structures import ImportedStructure
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
