@@ -5,6 +5,7 @@ https://wiki.openstreetmap.org/wiki/Key:building:levels
 
 from collections.abc import Mapping
 import re
+from typing import NamedTuple
 
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.tags import (
@@ -21,16 +22,41 @@ _USUAL_LEVELS = 3
 _TALLEST = 850.0  # [m]
 _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
+# Least number of levels that is plausible; half a level is a low building.
+_LEAST_LEVELS = 0.5
+# Least height of a building's highest point above the ground [m].
+_LEAST_HIGH = 1.0
+# Least height of a building from its lowest to its highest point [m].
+_LEAST_HEIGHT = 0.5
+# Least height of the walls below a roof [m].
+LEAST_WALL = 0.1
+
+
+class BuildingHeights(NamedTuple):
+    """Heights of a building [m].
+
+    Attributes:
+        low: height of the lowest point above the ground.
+        high: height of the highest point above the ground.
+        roof: height of the roof, from its eaves to its highest point.
+    """
+
+    low: float
+    high: float
+    roof: float
 
 
 def heights(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
-) -> tuple[float, float, float]:
-    """Returns three heights of a building [m], from the building's tags.
+) -> BuildingHeights:
+    """Returns the heights of a building, from the building's tags.
 
-    The results are the heights of the building's lowest and highest points
-    above the ground, and the height of the roof only. Heights without a tag are
-    estimated, for example from the number of levels.
+    Heights without a tag are estimated, for example from the number of levels.
+
+    Args:
+        tags: tags of the building.
+        where: id of the building, and the counts to which faults of its tags
+            are added. By default such faults are not counted.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
@@ -41,7 +67,7 @@ def heights(
 
     roof_levels = number("roof:levels")
     # A building may have no levels of its own if its roof has some.
-    levels = number("building:levels", 0.0 if roof_levels else 0.5)
+    levels = number("building:levels", 0.0 if roof_levels else _LEAST_LEVELS)
     roof = metres("roof:height")
     if roof is None:
         roof = STOREY_HEIGHT * (roof_levels or 1.0)
@@ -63,12 +89,12 @@ def heights(
     low = metres("min_height")
     if low is None:
         low = STOREY_HEIGHT * (number("building:min_level") or 0.0)
-    high = max(high, 1.0)
+    high = max(high, _LEAST_HIGH)
     if low >= high and where is not None:
         name, faults = where
         faults.add("building that begins above its top, lowered", name)
-    low = min(low, high - 0.5)
-    return low, high, min(roof, high - low - 0.1)
+    low = min(low, high - _LEAST_HEIGHT)
+    return BuildingHeights(low, high, min(roof, high - low - LEAST_WALL))
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
@@ -105,8 +131,11 @@ def building_kind(tags: Mapping[str, str]) -> str:
 
     It is `building` if the tags state no kind.
     """
-    for kind, found in TABLES["buildings"].items():
-        if any(tags.get(key) in one.split() for key, one in found.items()):
+    for kind, values_of_keys in TABLES["buildings"].items():
+        if any(
+            tags.get(key) in values.split()
+            for key, values in values_of_keys.items()
+        ):
             return str(kind)
     value = tags.get("building", "yes")
     return "building" if value == "yes" else value

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 
 from cns_drake.imports.building_years import construction_year, year_of_date
@@ -16,6 +17,7 @@ from cns_drake.imports.colours import RED_ROOF
 from cns_drake.imports.faces import parts_of, valid_parts
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.building_tags import (
+    LEAST_WALL,
     building_kind,
     heights,
     why_absent,
@@ -31,11 +33,15 @@ from cns_drake.imports.structures import ImportedStructure, make_imported
 TWICE = "building drawn twice, taken once"
 _NESTED = "building inside another one, taken as its part"
 # An outline lies in another one if this share of its area does.
-_INSIDE = 0.9
-# Parts are the whole building if they cover at least this share of an outline.
-_ALL_OF_IT = 0.9
-# Remainders of an outline that are narrower than this are dropped [m].
-_SLIVER = 0.25
+_INSIDE_SHARE = 0.9
+# Parts are meant as the whole building if they leave at most this share of its
+# outline uncovered.
+_MOST_UNCOVERED = 0.1
+# Parts are enlarged by this before they are cut out of their outline, so that
+# no sliver remains where their edges differ by a rounding error [m].
+_SEAM = 0.01
+# Pieces of an outline are dropped if no circle of this radius fits in [m].
+_SLIVER_RADIUS = 0.25
 # Least height of a passage [m].
 _LEAST_CLEAR = 2.0
 # Least height of the building above a passage [m].
@@ -44,7 +50,16 @@ _LINTEL = 0.4
 
 @dataclass(frozen=True)
 class _Block:
-    """A solid of a building: footprint, lowest and highest point, roof [m]."""
+    """A solid of a building.
+
+    Attributes:
+        name: id of its area in the file.
+        tags: tags of this area.
+        polygon: footprint in W [m].
+        low: height of the lowest point above the ground [m].
+        high: height of the highest point above the ground [m].
+        roof: height of the roof [m]; 0 for a flat roof.
+    """
 
     name: str
     tags: Tags
@@ -55,8 +70,8 @@ class _Block:
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
         """Returns the solid with new footprint and heights, and a flat roof."""
-        plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
-        return _Block(self.name, plain, polygon, low, high, 0.0)
+        tags = {k: v for k, v in self.tags.items() if k != "roof:shape"}
+        return _Block(self.name, tags, polygon, low, high, 0.0)
 
 
 def standing_buildings(
@@ -72,15 +87,15 @@ def standing_buildings(
         with_gone: whether to also yield buildings that were demolished at an
             unknown date.
     """
-    for one in areas:
-        absent = why_absent(one.tags)
+    for area in areas:
+        absent = why_absent(area.tags)
         is_past = absent == "demolished" and (
-            with_gone or year_of_date(one.tags.get("end_date", ""))
+            with_gone or year_of_date(area.tags.get("end_date", ""))
         )
         if absent is None or is_past:
-            yield one
+            yield area
         else:
-            faults.add(f"{absent} building, left out", one.name)
+            faults.add(f"{absent} building, left out", area.name)
 
 
 def make_buildings(
@@ -115,7 +130,7 @@ def make_buildings(
     for whole, blocks in _grouped_by_building(outlines, parts):
         walls, roofs = [], []
         for block in _solids_with_openings(blocks, through, faults):
-            wall, top = extruded(
+            wall, roof = extruded(
                 block.polygon,
                 block.low,
                 block.high,
@@ -125,7 +140,7 @@ def make_buildings(
                 block.roof,
             )
             walls.append(wall)
-            roofs.append(top)
+            roofs.append(roof)
         copies[whole.name] += 1
         copy = copies[whole.name]
         number = f"_{copy}" if copy > 1 else ""
@@ -153,10 +168,10 @@ def _outlines_and_parts(
     parts: list[_Block] = []
     for name, tags, polygons in areas:
         low, high, roof = heights(tags, (name, faults))
-        group = parts if has_tag(tags, "building:part") else outlines
+        blocks = parts if has_tag(tags, "building:part") else outlines
         for polygon in polygons:
-            for one in valid_parts(local.polygon(polygon), name, faults):
-                group.append(_Block(name, tags, one, low, high, roof))
+            for footprint in valid_parts(local.polygon(polygon), name, faults):
+                blocks.append(_Block(name, tags, footprint, low, high, roof))
     return outlines, parts
 
 
@@ -168,9 +183,11 @@ def _grouped_by_building(
     A part that lies in no outline is a building of its own. Parts do not belong
     to a former building that once stood in their place.
     """
-    outlines = sorted(outlines, key=lambda one: is_gone(one.tags))
+    # Standing buildings come first, so they have the same numbers as in the
+    # tree.
+    outlines = sorted(outlines, key=lambda outline: is_gone(outline.tags))
     standing = STRtree(
-        [one.polygon for one in outlines if not is_gone(one.tags)]
+        [outline.polygon for outline in outlines if not is_gone(outline.tags)]
     )
     of_outline: dict[int, list[_Block]] = {}
     alone = []
@@ -184,8 +201,8 @@ def _grouped_by_building(
             alone.append((part, [part]))
     return [
         *(
-            (one, _with_parts(one, of_outline.get(k, [])))
-            for k, one in enumerate(outlines)
+            (outline, _with_parts(outline, of_outline.get(number, [])))
+            for number, outline in enumerate(outlines)
         ),
         *alone,
     ]
@@ -198,25 +215,26 @@ def _solids_with_openings(
 
     Above an opening, a solid stays whole, with its roof.
     """
-    for one in blocks:
-        found = passages.through(one.polygon, one.low)
-        if found is None:
-            yield one
+    for block in blocks:
+        opening = passages.through(block.polygon, block.low)
+        if opening is None:
+            yield block
             continue
-        area, clear = found
-        below_roof = one.high - one.roof - _LINTEL
-        if below_roof < _LEAST_CLEAR:
-            below_roof = one.high - _LINTEL
-        clear = min(clear, below_roof)
-        if clear < max(_LEAST_CLEAR, one.low):
-            faults.add("building too low for its passage, not opened", one.name)
-            yield one
+        area, clear = opening
+        highest = block.high - block.roof - _LINTEL
+        if highest < _LEAST_CLEAR:
+            # The passage extends into the roof.
+            highest = block.high - _LINTEL
+        clear = min(clear, highest)
+        if clear < max(_LEAST_CLEAR, block.low):
+            kind = "building too low for its passage, not opened"
+            faults.add(kind, block.name)
+            yield block
             continue
-        for piece in parts_of(one.polygon.difference(area)):
-            if not piece.buffer(-_SLIVER).is_empty:
-                yield one.replaced(piece, one.low, clear)
-        roof = min(one.roof, one.high - clear - 0.1)
-        yield replace(one, low=clear, roof=roof)
+        for piece in _without_slivers(block.polygon.difference(area)):
+            yield block.replaced(piece, block.low, clear)
+        roof = min(block.roof, block.high - clear - LEAST_WALL)
+        yield replace(block, low=clear, roof=roof)
 
 
 def _taken_once(
@@ -227,45 +245,42 @@ def _taken_once(
     If an outline were used twice, or used as a whole building inside another
     one, two walls could stand in the same place and hide each other's windows.
     """
-    tree = STRtree([one.polygon for one in outlines])
+    tree = STRtree([outline.polygon for outline in outlines])
     whole: dict[int, _Block] = {}
     nested = []
-    by_area = sorted(
+    largest_first = sorted(
         range(len(outlines)), key=lambda k: -outlines[k].polygon.area
     )
-    for number in by_area:
-        one = outlines[number]
+    for number in largest_first:
+        outline = outlines[number]
         around = [
             k
-            for k in tree.query(one.polygon, "intersects").tolist()
-            if k in whole and _lies_in(one, whole[k])
+            for k in tree.query(outline.polygon, "intersects").tolist()
+            if k in whole and _lies_in(outline, whole[k])
         ]
-        twins = [k for k in around if _lies_in(whole[k], one)]
+        twins = [k for k in around if _lies_in(whole[k], outline)]
         dates = [_dates(whole[k].tags) for k in around]
         if twins:
-            faults.add(TWICE, one.name)
+            faults.add(TWICE, outline.name)
             twin = whole[twins[0]]
-            tags = {**one.tags, **twin.tags}
-            if twin.tags.get("building") == "yes":
-                tags |= {k: v for k, v in one.tags.items() if k == "building"}
-            whole[twins[0]] = replace(twin, tags=tags)
-        elif dates and _dates(one.tags) in ({}, *dates):
-            faults.add(_NESTED, one.name)
-            nested.append(one)
+            whole[twins[0]] = replace(twin, tags=_common_tags(twin, outline))
+        elif dates and _dates(outline.tags) in ({}, *dates):
+            faults.add(_NESTED, outline.name)
+            nested.append(outline)
         else:
-            whole[number] = one
+            whole[number] = outline
     return [whole[k] for k in sorted(whole)], nested
 
 
-def _lies_in(one: _Block, other: _Block) -> bool:
+def _lies_in(outline: _Block, other: _Block) -> bool:
     """Returns whether an outline lies in another one.
 
     The result is False for buildings that stood at different times.
     """
-    if is_gone(one.tags) or is_gone(other.tags):
+    if is_gone(outline.tags) or is_gone(other.tags):
         return False
-    dates, others = _dates(one.tags), _dates(other.tags)
-    # One that has ended may have made room for the other.
+    dates, others = _dates(outline.tags), _dates(other.tags)
+    # A building that was demolished may have made room for the other.
     if dates.get("end_date") != others.get("end_date"):
         return False
     starts = {
@@ -273,8 +288,20 @@ def _lies_in(one: _Block, other: _Block) -> bool:
     }
     if len(starts) > 1:
         return False
-    shared = one.polygon.intersection(other.polygon).area
-    return bool(shared >= _INSIDE * one.polygon.area)
+    shared = outline.polygon.intersection(other.polygon).area
+    return bool(shared >= _INSIDE_SHARE * outline.polygon.area)
+
+
+def _common_tags(kept: _Block, twin: _Block) -> Tags:
+    """Returns the tags of a building that was drawn twice.
+
+    The tags of the outline that is kept take precedence, except a tag that says
+    no more than that there is a building.
+    """
+    tags = {**twin.tags, **kept.tags}
+    if tags.get("building") == "yes" and "building" in twin.tags:
+        tags["building"] = twin.tags["building"]
+    return tags
 
 
 def _dates(tags: Tags) -> dict[str, str]:
@@ -290,33 +317,49 @@ def is_gone(tags: Tags) -> bool:
 
 
 def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
-    """Returns the blocks of a building.
+    """Returns the solids of a building with an outline and parts.
 
-    If the parts cover the outline, the building consists of the parts only.
-    Otherwise the outline's own solid is added. It fills the rest of the
-    outline, and the space below parts that begin above the ground.
+    These are the parts, and the outline's own solid beside the parts, without
+    slivers. If more than 10 % of the outline is beside the parts, the outline's
+    own solid also fills the space below parts that begin above the ground.
+    Otherwise the parts are meant as the whole building, and this space stays
+    open. Without parts, the result is the outline's own solid.
     """
     if not parts:
         return [outline]
     covered = shapely.union_all([part.polygon for part in parts])
-    rest = outline.polygon.difference(covered.buffer(0.01))
-    blocks = list(parts)
-    if rest.area > (1.0 - _ALL_OF_IT) * outline.polygon.area:
-        by_bottom = sorted(parts, key=lambda part: part.low)
-        below = rest
-        for part in by_bottom:
-            # The area that no lower part covers.
-            shadow = part.polygon.difference(below)
-            top = min(part.low, outline.high)
-            if top > outline.low:
-                blocks += [
-                    outline.replaced(piece, outline.low, top)
-                    for piece in parts_of(shadow)
-                ]
-            below = shapely.union(below, part.polygon)
-    blocks += [
+    uncovered = outline.polygon.difference(covered.buffer(_SEAM))
+    solids = list(parts)
+    if uncovered.area > _MOST_UNCOVERED * outline.polygon.area:
+        solids += _solids_below(parts, outline, uncovered)
+    solids += [
         outline.replaced(piece, outline.low, outline.high)
-        for piece in parts_of(rest)
-        if not piece.buffer(-_SLIVER).is_empty
+        for piece in _without_slivers(uncovered)
     ]
-    return blocks
+    return solids
+
+
+def _solids_below(
+    parts: Iterable[_Block], outline: _Block, uncovered: BaseGeometry
+) -> Iterator[_Block]:
+    """Yields solids that fill a building's outline below its parts.
+
+    `uncovered` is the area of the outline beside all parts, which the outline's
+    own solid fills.
+    """
+    filled = uncovered
+    for part in sorted(parts, key=lambda part: part.low):
+        # Of parts above each other, only the lowest is supported.
+        open_below = part.polygon.difference(filled)
+        top = min(part.low, outline.high)
+        if top > outline.low:
+            for piece in parts_of(open_below):
+                yield outline.replaced(piece, outline.low, top)
+        filled = shapely.union(filled, part.polygon)
+
+
+def _without_slivers(area: BaseGeometry) -> Iterator[Polygon]:
+    """Yields the polygons of an area, except those that are narrow."""
+    for piece in parts_of(area):
+        if not piece.buffer(-_SLIVER_RADIUS).is_empty:
+            yield piece

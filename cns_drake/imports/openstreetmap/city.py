@@ -173,7 +173,7 @@ def _count_walled_up(
     count_walled_up(
         [(one.name, LineString(one.line)) for one in driven],
         [
-            (local.polygon(polygon), heights(one.tags)[0])
+            (local.polygon(polygon), heights(one.tags).low)
             for one in buildings
             if not is_gone(one.tags)
             for polygon in one.polygons
