@@ -102,10 +102,14 @@ def import_city(
             staged = dressing.city
         doing(f"writing {output}")
         _write_lanes(draft, source, city, bare, staged.kept, drives, side)
-        bottom = (
-            dressing.bottom if dressing else ground_structures(bare, ground)
+        guessed_ground = (
+            dressing.guessed_ground
+            if dressing
+            else ground_structures(bare, ground)
         )
-        sizes = map_files.write_world(draft, source, staged, bottom, dressing)
+        sizes = map_files.write_world(
+            draft, source, staged, guessed_ground, dressing
+        )
         facts = map_files.city_facts(
             city, options, list(staged.standing), changes, dressing
         )

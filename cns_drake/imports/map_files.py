@@ -1,6 +1,6 @@
 """Writes the files of an imported city."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,9 @@ from cns_drake.scene.map_folder import (
 
 # Column of the structure table: the year in which a building was built.
 YEAR_COLUMN = "built"
-_CRUISE = 8.0  # [m/s]
+# Speed of drives without a speed limit [m/s].
+_CRUISE = 8.0
+# Greatest accelerations of a drive [m/s^2].
 _ACCELERATION = {"longitudinal_acceleration": 2.0, "lateral_acceleration": 2.5}
 
 
@@ -33,7 +35,7 @@ def write_world(
     draft: Path,
     source: Path,
     city: StagedCity,
-    bottom: Sequence[Structure],
+    guessed_ground: Sequence[Structure],
     dressing: Dressing | None = None,
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages of a map, their meshes and the structure table.
@@ -42,27 +44,71 @@ def write_world(
         draft: folder of the map.
         source: imported file, named in comments.
         city: the structures of each stage.
-        bottom: structures of the guessed ground, which are in all stages.
+        guessed_ground: structures of the ground that the file does not have,
+            which are in all stages.
         dressing: details that were added to buildings and streets; None if no
             details were added.
 
     Returns:
         Name of a stage -> numbers of structures and of triangles in the stage.
     """
-    structures = [*bottom, *(one.structure for one in city.kept)]
-    versions = (
-        one.structure for some in city.standing.values() for one in some
-    )
-    table = structure_table(structures, versions)
-    if dressing is not None:
-        names = [one.structure.name for one in city.kept]
-        origins = [dressing.origins.get(name, "file") for name in names]
-        table = with_column(table, "origin", ["guess"] * len(bottom) + origins)
-    years = [one.year for one in city.kept]
-    if any(years):
-        texts = ["" if year is None else str(year) for year in years]
-        table = with_column(table, YEAR_COLUMN, [""] * len(bottom) + texts)
+    table = _structure_table(city, guessed_ground, dressing)
     (draft / STRUCTURES_NAME).write_text(table, "utf-8")
+    triangles = _write_meshes(
+        draft, [*guessed_ground, *(kept.structure for kept in city.kept)]
+    )
+    sizes = {}
+    for stage, standing in city.standing.items():
+        structures = [
+            *guessed_ground,
+            *(member.structure for member in standing),
+        ]
+        text = world_sdf(
+            f"{draft.name}_{stage}",
+            structures,
+            comment=f"Imported by cns-drake from {source.name}.",
+        )
+        (draft / stage_name(stage)).write_text(text, "utf-8")
+        sizes[stage] = stage_size(structures, triangles)
+    return sizes
+
+
+def _structure_table(
+    city: StagedCity,
+    guessed_ground: Sequence[Structure],
+    dressing: Dressing | None,
+) -> str:
+    """Returns the structure table of a city, as the text of a CSV file.
+
+    A dressed city has a column for the origin of structures, and a city with
+    years of construction has a column for these. The arguments are as for
+    `write_world`.
+    """
+    table = structure_table(
+        [*guessed_ground, *(kept.structure for kept in city.kept)],
+        (
+            member.structure
+            for standing in city.standing.values()
+            for member in standing
+        ),
+    )
+    if dressing is not None:
+        names = [kept.structure.name for kept in city.kept]
+        origins = [dressing.origins.get(name, "file") for name in names]
+        cells = ["guess"] * len(guessed_ground) + origins
+        table = with_column(table, "origin", cells)
+    years = [kept.year for kept in city.kept]
+    if any(years):
+        cells = [""] * len(guessed_ground)
+        cells += ["" if year is None else str(year) for year in years]
+        table = with_column(table, YEAR_COLUMN, cells)
+    return table
+
+
+def _write_meshes(
+    draft: Path, structures: Iterable[Structure]
+) -> dict[str, int]:
+    """Writes the meshes of structures; returns mesh -> number of triangles."""
     triangles: dict[str, int] = {}
     for structure in structures:
         for name, mesh in structure.model.meshes.items():
@@ -72,17 +118,7 @@ def write_world(
                 path = draft / MESH_FOLDER / f"{name}.obj"
                 path.write_text(text, "utf-8")
                 triangles[name] = triangles_in(text)
-    sizes = {}
-    for stage, some in city.standing.items():
-        standing = [*bottom, *(one.structure for one in some)]
-        text = world_sdf(
-            f"{draft.name}_{stage}",
-            standing,
-            comment=f"Imported by cns-drake from {source.name}.",
-        )
-        (draft / stage_name(stage)).write_text(text, "utf-8")
-        sizes[stage] = stage_size(standing, triangles)
-    return sizes
+    return triangles
 
 
 def city_facts(
@@ -183,6 +219,10 @@ def write_drives(
 ) -> None:
     """Writes the routes of a map, and a scenario for each route and stage.
 
+    The drive of the last stage, which is the query, takes the first route. The
+    drives of earlier stages take the second route, if there is one. A stage's
+    other drive takes the other route.
+
     Args:
         folder: folder of the map.
         stages: name of a stage -> words that end the titles of its drives, such
@@ -197,8 +237,6 @@ def write_drives(
     speeds = dict(zip("ab", cruise, strict=False))
     map_folder = MapFolder(folder)
     for number, (stage, when) in enumerate(stages.items()):
-        # The query drive is in the last stage. Its route is not that of the
-        # database drives.
         letters = "ab"[: len(routes)]
         if number < len(stages) - 1:
             letters = letters[::-1]

@@ -45,14 +45,14 @@ class Dressing:
             structure of the file with added details, or `lot` for a random
             structure. All other structures are as in the file.
         facts: counts of details from the file and of random details.
-        bottom: structures of the guessed ground; empty if the file has a
-            terrain.
+        guessed_ground: structures of the ground that was guessed; empty if the
+            file has a terrain.
     """
 
     city: StagedCity
     origins: Mapping[str, str]
     facts: Mapping[str, Any]
-    bottom: Sequence[Structure]
+    guessed_ground: Sequence[Structure]
 
 
 def dress_city(
@@ -93,10 +93,16 @@ def dress_city(
     added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
     if drives:
         added += lane_marks(streets, drives)
-    bottom = ground_structures(kept, ground)
+    guessed_ground = ground_structures(kept, ground)
     everything = [*kept, *added]
     placed = dress_streets(
-        everything, city.small_objects, streets, drives, ground, bottom, seed
+        everything,
+        city.small_objects,
+        streets,
+        drives,
+        ground,
+        guessed_ground,
+        seed,
     )
     changed = dict(buildings.buildings)
     at_random = buildings.at_random + Counter(one.kind for one in added)
@@ -122,8 +128,8 @@ def dress_city(
     )
     _check_number(len(dressed.kept))
     if is_paved:
-        bottom = list(map(in_paving_colour, bottom))
-    return Dressing(dressed, origins, facts, bottom)
+        guessed_ground = list(map(in_paving_colour, guessed_ground))
+    return Dressing(dressed, origins, facts, guessed_ground)
 
 
 def _paved_terrain(

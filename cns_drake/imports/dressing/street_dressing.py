@@ -48,7 +48,7 @@ def dress_streets(
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
     ground: Ground,
-    bottom: Sequence[Structure],
+    guessed_ground: Sequence[Structure],
     seed: int,
 ) -> PlacedObjects:
     """Places small objects along the streets of a city, and returns them.
@@ -63,14 +63,14 @@ def dress_streets(
         streets: the streets along which objects are added.
         drives: the drives of the map.
         ground: heights of the ground on which objects stand.
-        bottom: ground that was made for a file without a terrain, as
+        guessed_ground: ground that was made for a file without a terrain, as
             structures; empty if the file has a terrain.
         seed: seed of all random draws.
     """
     found = PlacedObjects()
     if not drives:
         return found
-    room = StreetRoom(structures, drives, ground, bottom, found)
+    room = StreetRoom(structures, drives, ground, guessed_ground, found)
     near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)

@@ -84,7 +84,7 @@ class StreetRoom:
         structures: Sequence[ImportedStructure],
         drives: Sequence[WaypointRoute],
         ground: Ground,
-        bottom: Sequence[Structure],
+        guessed_ground: Sequence[Structure],
         found: PlacedObjects,
     ):
         """Takes what already stands, and the drives whose paths stay free.
@@ -93,8 +93,8 @@ class StreetRoom:
             structures: structures of the city.
             drives: the drives, which are kept free.
             ground: the ground on which objects stand.
-            bottom: structures of a guessed ground; none if the file has
-                terrain.
+            guessed_ground: structures of the ground that was guessed; none if
+                the file has terrain.
             found: gets the objects that are placed.
         """
         self.found = found
@@ -116,7 +116,7 @@ class StreetRoom:
         roads = triangles(lambda o: o.kind == "Road")
         self._roads = UpperSides(turned_up(roads))
         paved = triangles(lambda o: o.is_ground or o.kind == "Sidewalk")
-        laid = joined_triangles([paved, ground_triangles(bottom)])
+        laid = joined_triangles([paved, ground_triangles(guessed_ground)])
         self._laid = UpperSides(turned_up(laid))
         self._taken = Occupancy()
         self._names = {one.structure.name for one in structures}

@@ -278,14 +278,14 @@ def test_a_city_counts_what_is_from_the_file_and_what_at_random(
     monkeypatch.setattr(dressed_city, "MAX_INSTANCE", len(result.city.kept))
     with pytest.raises(InputError, match="more than instance ids"):
         dress_city(staged, again, [drive_of(again)], ground, 0)
-    (bottom,) = ground_structures(staged.kept, ground)
-    (seen,) = result.bottom
+    (guessed,) = ground_structures(staged.kept, ground)
+    (seen,) = result.guessed_ground
     # Four houses of 500 m^2 in 180 m by 44 m.
     assert (
         seen.model.parts[0].rgb
-        == dressed_city.in_paving_colour(bottom).model.parts[0].rgb
+        == dressed_city.in_paving_colour(guessed).model.parts[0].rgb
     )
-    assert seen.model.parts[0].rgb != bottom.model.parts[0].rgb
+    assert seen.model.parts[0].rgb != guessed.model.parts[0].rgb
 
 
 def test_only_cars_stand_on_another_street(tmp_path):
