@@ -1,7 +1,7 @@
 """Reads the geometries of CityJSON objects, also those made from templates."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,34 +20,49 @@ _NESTING = {
 }
 
 
-class Templates:
+class Templates(NamedTuple):
     """Geometry templates of a file, which objects place in the world.
 
     Attributes:
-        vertices: (N, 3) vertices of the document that is being read [m]. The
-            caller sets them for each document.
+        geometries: the templates, as in the file.
+        points: (N, 3) vertices of all templates, in coordinates of the file.
+    """
+
+    geometries: Sequence[Any] = ()
+    points: np.ndarray = np.zeros((0, 3))
+
+
+def read_templates(document: dict, where: str) -> Templates:
+    """Returns the templates in a document of type CityJSON.
+
+    `where` names the file and the line of the document in error messages.
+
+    Raises:
+        InputError: the vertices of the templates cannot be used.
+    """
+    templates = document.get("geometry-templates")
+    templates = templates if isinstance(templates, dict) else {}
+    points = to_triples(
+        templates.get("vertices-templates", []),
+        f"{where}: geometry-templates.vertices-templates",
+    )
+    return Templates(templates.get("templates") or [], points)
+
+
+class GeometrySource(NamedTuple):
+    """What the geometries of a document refer to.
+
+    Attributes:
+        vertices: (N, 3) vertices of the document [m].
+        templates: templates of the file.
         system: reference system of the templates.
     """
 
-    def __init__(self, whole: dict, where: str):
-        """Takes the templates in a document of type CityJSON.
+    vertices: np.ndarray
+    templates: Templates
+    system: ReferenceSystem
 
-        `where` names the file and the line of the document in error messages.
-
-        Raises:
-            InputError: the vertices of the templates cannot be used.
-        """
-        templates = whole.get("geometry-templates")
-        templates = templates if isinstance(templates, dict) else {}
-        self._geometries = templates.get("templates") or []
-        self._points = to_triples(
-            templates.get("vertices-templates", []),
-            f"{where}: geometry-templates.vertices-templates",
-        )
-        self.vertices = np.zeros((0, 3))
-        self.system = ReferenceSystem()
-
-    def place(self, instance: dict) -> tuple[Any, np.ndarray]:
+    def instance(self, instance: dict) -> tuple[Any, np.ndarray]:
         """Returns an instance's template, and the vertices of the instance.
 
         The vertices (N, 3) are the template's vertices, transformed to the
@@ -60,12 +75,12 @@ class Templates:
         Raises:
             LookupError, TypeError, ValueError: if the instance is faulty.
         """
-        template = self._geometries[instance["template"]]
+        template = self.templates.geometries[instance["template"]]
         (reference,) = instance["boundaries"]
         X = np.array(instance["transformationMatrix"], dtype=np.float64)
         X = X.reshape(4, 4)
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = self._points @ X[:3, :3].T + X[:3, 3]
+            placed = self.templates.points @ X[:3, :3].T + X[:3, 3]
         is_affine = (X[3] == [0.0, 0.0, 0.0, 1.0]).all()
         if reference < 0 or not is_affine:
             raise ValueError
@@ -77,22 +92,22 @@ class Templates:
 
 
 def read_geometry(
-    geometry: Any, templates: Templates, name: str, faults: ImportFaults
+    geometry: Any, source: GeometrySource, name: str, faults: ImportFaults
 ) -> CityGeometry | None:
     """Returns a geometry of an object; None if the geometry cannot be read.
 
     Args:
         geometry: the geometry in the file.
-        templates: the templates, and the vertices to which indices refer.
+        source: the vertices and templates to which the geometry refers.
         name: id of the object, as an example in `faults`.
         faults: counts geometries and faces that are left out.
     """
-    vertices = templates.vertices
+    vertices = source.vertices
     try:
         lod = _level_of_detail(geometry.get("lod"))
         kind = geometry["type"]
         if kind == "GeometryInstance":
-            geometry, vertices = templates.place(geometry)
+            geometry, vertices = source.instance(geometry)
             kind = geometry["type"]
             lod = lod or _level_of_detail(geometry.get("lod"))
         if kind not in _NESTING:
@@ -107,18 +122,19 @@ def read_geometry(
     except (LookupError, TypeError, ValueError, AttributeError):
         faults.add("geometry that is not an object, left out", name)
         return None
-    faces, kept = [], []
-    for boundary, one in zip(boundaries, kinds, strict=True):
+    faces, kinds_of_faces = [], []
+    for boundary, kind_of_face in zip(boundaries, kinds, strict=True):
         face = _face_of_boundary(boundary, vertices)
         if face is None:
             faults.add("face with unknown vertices, left out", name)
         else:
             faces.append(face)
-            kept.append(one)
-    return CityGeometry(lod, faces, kept, _NESTING[kind] > 0)
+            kinds_of_faces.append(kind_of_face)
+    return CityGeometry(lod, faces, kinds_of_faces, _NESTING[kind] > 0)
 
 
 def _level_of_detail(value: object) -> float:
+    """Returns the level of detail that a geometry states; 0 if none."""
     return float(str(value)) if value is not None else 0.0
 
 
@@ -149,7 +165,7 @@ def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
     for _ in range(nesting):
         if not isinstance(values, list) or None in values:
             return unknown
-        values = [one for group in values for one in group]
+        values = [value for group in values for value in group]
     if not isinstance(values, list) or len(values) != number:
         return unknown
     if not isinstance(surfaces, list):

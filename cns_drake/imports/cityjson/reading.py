@@ -17,7 +17,12 @@ from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.json_text import parse_json
 from cns_drake.imports.cityjson.axes import exchange_mirrored_axes, settle_axes
 from cns_drake.imports.cityjson.city_file import CityFile, CityObject
-from cns_drake.imports.cityjson.geometries import Templates, read_geometry
+from cns_drake.imports.cityjson.geometries import (
+    GeometrySource,
+    Templates,
+    read_geometry,
+    read_templates,
+)
 from cns_drake.imports.cityjson.reference_systems import (
     ReferenceSystem,
     check_lengths,
@@ -26,6 +31,10 @@ from cns_drake.imports.cityjson.reference_systems import (
 from cns_drake.imports.cityjson.vertices import read_vertices
 from cns_drake.imports.faults import ImportFaults
 
+# Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
+# Coordinates that extend over less than this are therefore degrees, if the
+# city's height, which is in metres in both cases, is greater than this.
+_DEGREES_BELOW = 1.0
 # Members of objects that are read, or that do not place anything.
 _KNOWN_MEMBERS = {
     "type", "geometry", "attributes", "parents", "children", "children_roles",
@@ -47,8 +56,7 @@ def read_cityjson(path: Path) -> CityFile:
         raise InputError(f"{path}: no object has a surface")
     exchange_mirrored_axes(city)
     low, high = city.bounds()
-    within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
-    if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
+    if _look_like_degrees(low, high):
         raise InputError(
             f"{path}: coordinates look like degrees; project them to metres"
             " first (for example with cjio's crs_reproject)"
@@ -62,6 +70,17 @@ def read_cityjson(path: Path) -> CityFile:
     return city
 
 
+def _look_like_degrees(low: np.ndarray, high: np.ndarray) -> bool:
+    """Returns whether a city's coordinates are longitude, latitude and metres.
+
+    `low` and `high` (3,) are the least and the greatest coordinates of the
+    city.
+    """
+    are_places = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
+    *sides, height = (high - low).tolist()
+    return bool(are_places and max(sides) < _DEGREES_BELOW < height)
+
+
 def _read_documents(path: Path) -> CityFile:
     """Returns the content of a file: the objects of all its documents.
 
@@ -69,9 +88,10 @@ def _read_documents(path: Path) -> CityFile:
         InputError: a document cannot be read, or is not CityJSON.
     """
     city = CityFile()
+    # The last document of type CityJSON, and the name of its reference system.
     whole: dict = {}
     whole_system = ""
-    templates = Templates({}, "")
+    templates = Templates()
     for number, document in _documents(path):
         kind = document.get("type")
         where = str(path) if number == 0 else f"{path}: line {number}"
@@ -86,7 +106,7 @@ def _read_documents(path: Path) -> CityFile:
                 )
             if not city.objects:
                 city.system, whole_system = system, system.name
-            templates = Templates(document, where)
+            templates = read_templates(document, where)
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
         _read_objects(document, whole, templates, where, city)
@@ -102,7 +122,7 @@ def _check_version(document: dict, where: str) -> None:
 
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
-    """Yields each JSON object of a file, after the number of its line.
+    """Yields the number of each line of a file, and the JSON object in it.
 
     The number is 0 if the whole file is one object.
     """
@@ -138,10 +158,10 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
     metadata = document.get("metadata")
     if not isinstance(metadata, dict):
         return ReferenceSystem()
-    found = metadata.get("referenceSystem", metadata.get("crs", ""))
-    if isinstance(found, dict):
-        found = f"EPSG:{found.get('epsg', '')}"
-    return reference_system(str(found), f"{where}: metadata.referenceSystem")
+    name = metadata.get("referenceSystem", metadata.get("crs", ""))
+    if isinstance(name, dict):
+        name = f"EPSG:{name.get('epsg', '')}"
+    return reference_system(str(name), f"{where}: metadata.referenceSystem")
 
 
 def _read_objects(
@@ -153,6 +173,8 @@ def _read_objects(
 ) -> None:
     """Adds the objects of a document to a city.
 
+    The first document with vertices also settles the order of the city's axes.
+
     Args:
         document: the document, a JSON object.
         whole: the last document of type CityJSON, whose transform the document
@@ -160,6 +182,9 @@ def _read_objects(
         templates: the templates of `whole`.
         where: place of the document, for error messages.
         city: the city, which gets the objects.
+
+    Raises:
+        InputError: the objects, the vertices or the transform cannot be used.
     """
     objects = document.get("CityObjects", {})
     if not isinstance(objects, dict):
@@ -173,8 +198,8 @@ def _read_objects(
     if not city.objects and len(vertices):
         _count_assumptions(city)
         settle_axes(city, vertices)
-    templates.vertices = city.system.to_metres(vertices)
-    templates.system = city.system
+    vertices = city.system.to_metres(vertices)
+    source = GeometrySource(vertices, templates, city.system)
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
             value.get("type"), str
@@ -183,7 +208,7 @@ def _read_objects(
             continue
         if name in city.objects:
             city.faults.add("object that is there twice, its last taken", name)
-        city.objects[name] = _read_object(name, value, templates, city.faults)
+        city.objects[name] = _read_object(name, value, source, city.faults)
     _add_parents(objects, city)
 
 
@@ -203,13 +228,13 @@ def _count_assumptions(city: CityFile) -> None:
 
 
 def _read_object(
-    name: str, value: dict, templates: Templates, faults: ImportFaults
+    name: str, value: dict, source: GeometrySource, faults: ImportFaults
 ) -> CityObject:
     for key in value.keys() - _KNOWN_MEMBERS:
         faults.add(f"{key} of an object, not read", name)
     listed = value.get("geometry") or []
     geometries = [
-        read_geometry(geometry, templates, name, faults)
+        read_geometry(geometry, source, name, faults)
         for geometry in (listed if isinstance(listed, list) else [listed])
     ]
     parents = value.get("parents") or []
@@ -219,7 +244,7 @@ def _read_object(
         value["type"],
         attributes if isinstance(attributes, dict) else {},
         list(map(str, parents if isinstance(parents, list) else [])),
-        [one for one in geometries if one is not None],
+        [geometry for geometry in geometries if geometry is not None],
     )
 
 
