@@ -105,24 +105,34 @@ class Crowd:
             t: time at which the step begins [s].
             seed: seed of the random choice of the pedestrians' next walkways.
         """
-        crossings, walkers = self._crossings, self.walkers
-        opened = crossings["opened"]
-        begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)
-        # The placeholder gives up its permission when the group begins to walk.
-        crossings["users"][begun] -= 1
-        opened[begun] = -np.inf
-        crossings["closed"][begun] = t
-        is_waiting = np.zeros(len(walkers), bool)
-        waited = np.zeros(len(crossings), bool)
-        for i in np.flatnonzero(self._follow_paths()).tolist():
-            is_waiting[i] = not self._go_on(i, t, seed, waited)
-        crossings["waits"][~waited] = np.inf
+        walkers = self.walkers
+        self._close_crossings(t)
+        is_waiting = self._begin_next_paths(t, seed)
         force = social_forces(self._paths, walkers, is_waiting)
         move_walkers(self._paths, walkers, force)
         self._note_crossers()
         x, y = walkers["velocity"].T
         speed = np.sqrt(x * x + y * y)
         walkers["phase"] += gait_rate(speed) * STEP
+        self._turn_back(is_waiting)
+
+    def _close_crossings(self, t: float) -> None:
+        """Closes crossings whose group has begun to walk at time `t` [s]."""
+        crossings = self._crossings
+        opened = crossings["opened"]
+        begun = (opened >= 0.0) & (opened + WALK_GROUP <= t)
+        # The placeholder gives up its permission when the group begins to walk.
+        crossings["users"][begun] -= 1
+        opened[begun] = -np.inf
+        crossings["closed"][begun] = t
+
+    def _turn_back(self, is_waiting: np.ndarray) -> None:
+        """Makes pedestrians turn back who are stuck, or in the way of others.
+
+        `is_waiting` (N,) says which pedestrians wait for a crossing.
+        """
+        walkers = self.walkers
+        x, y = walkers["velocity"].T
         paths = self._paths.paths[walkers["path"]]
         # Others may push a pedestrian back.
         along = self._paths.tangents[paths["first"] + walkers["at"]]
@@ -179,39 +189,78 @@ class Crowd:
         is_near = ahead(last) < AT_NODE
         return is_near & (walkers["at"] >= paths["num_points"] - 3)
 
-    def _go_on(self, i: int, t: float, seed: int, waited: np.ndarray) -> bool:
-        """Lets the i-th pedestrian begin its next path, unless it has to wait.
+    def _begin_next_paths(self, t: float, seed: int) -> np.ndarray:
+        """Lets pedestrians go on who are near the end of their path.
 
-        If it asks for a crossing, this is recorded in `waited` (C,).
+        Args:
+            t: present time [s].
+            seed: seed of the random choice of next paths.
 
         Returns:
-            Whether it has begun its next path.
+            (N,) bool, which pedestrians have to wait for a crossing.
         """
-        walkers, paths = self.walkers, self._paths.paths
-        if walkers["next_path"][i] < 0:
-            walkers["next_path"][i] = self._draw_next(i, seed)
-        after = int(walkers["next_path"][i])
-        crossings = self._crossings
-        c = paths["crossing"][after]
-        # A pedestrian that turns back on a crossing already has permission.
-        if c >= 0 and c != paths["crossing"][walkers["path"][i]]:
-            if crossings["users"][c] == 0:
-                crossings["waits"][c] = min(crossings["waits"][c], t)
-                waited[c] = True
-                waits = t - crossings["waits"][c]
-                if not crossings["marked"][c] and waits > _GIVES_UP:
-                    walkers["next_path"][i] = -1
-                return False
-            if t >= crossings["opened"][c] + WALK_GROUP:
-                return False
-        for path, change in ((walkers["path"][i], -1), (after, 1)):
-            c = paths["crossing"][path]
-            if c >= 0:
-                crossings["users"][c] += change
-                crossings["closed"][c] = t
+        walkers, crossings = self.walkers, self._crossings
+        is_waiting = np.zeros(len(walkers), bool)
+        is_requested = np.zeros(len(crossings), bool)
+        for i in np.flatnonzero(self._follow_paths()).tolist():
+            if walkers["next_path"][i] < 0:
+                walkers["next_path"][i] = self._draw_next(i, seed)
+            entered = self._crossing_entered(i)
+            if entered < 0 or self._is_walk_on(entered, t):
+                self._begin_path(i, t)
+                continue
+            is_waiting[i] = True
+            # While others still walk, the crossing cannot be requested.
+            if crossings["users"][entered] == 0:
+                is_requested[entered] = True
+                self._request_crossing(i, entered, t)
+        crossings["waits"][~is_requested] = np.inf
+        return is_waiting
+
+    def _crossing_entered(self, i: int) -> int:
+        """Returns the crossing that the i-th pedestrian's next path enters.
+
+        The result is -1 if the path leads over no crossing, or if the
+        pedestrian turns back on a crossing and therefore has permission.
+        """
+        before, after = self.walkers[["path", "next_path"]][i]
+        crossing = self._paths.paths["crossing"]
+        is_same = crossing[after] == crossing[before]
+        return -1 if is_same else int(crossing[after])
+
+    def _is_walk_on(self, crossing: int, t: float) -> bool:
+        """Returns whether pedestrians may step onto a crossing at time t [s].
+
+        They may while the crossing is open for a group that gathers.
+        """
+        users, opened = self._crossings[["users", "opened"]][crossing]
+        return bool(users > 0 and t < opened + WALK_GROUP)
+
+    def _request_crossing(self, i: int, crossing: int, t: float) -> None:
+        """Records that the i-th pedestrian waits for a crossing at time t [s].
+
+        A pedestrian who has waited too long for a gap in the traffic will draw
+        another path.
+        """
+        one = self._crossings[crossing]
+        one["waits"] = min(one["waits"], t)
+        if not one["marked"] and t - one["waits"] > _GIVES_UP:
+            self.walkers["next_path"][i] = -1
+
+    def _begin_path(self, i: int, t: float) -> None:
+        """Moves the i-th pedestrian to its next path at time t [s].
+
+        Crossings that it leaves or enters are updated.
+        """
+        walkers, crossings = self.walkers, self._crossings
+        before, after = walkers[["path", "next_path"]][i]
+        for path, change in ((before, -1), (after, 1)):
+            crossing = self._paths.paths["crossing"][path]
+            if crossing >= 0:
+                crossings["users"][crossing] += change
+                crossings["closed"][crossing] = t
         walkers["path"][i], walkers["at"][i] = after, 0
         walkers["next_path"][i] = -1
-        return True
 
     def _draw_next(self, i: int, seed: int) -> int:
         """Returns a random next path; it leads back only if no other exists."""
