@@ -23,14 +23,14 @@ from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.scene.world import World
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic import lane_graph, queues
-from cns_drake.traffic.ego_car import EgoBox
+from cns_drake.traffic.ego_car import EgoBox, EgoPath
 from cns_drake.traffic.fcd_trace import read_fcd
 from cns_drake.traffic.fcd_traffic import play_trace
 from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
 from cns_drake.traffic.traffic_motion import traffic_structures
-from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.traffic_planning import plan_traffic
 from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicle_placement import room_for_vehicles

@@ -1,5 +1,6 @@
 """The ego car's box, and when it is on each lane and crossing."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ STEP = 0.1
 # Half the width of the strip of a lane that vehicles need, including their
 # distance from the ego car [m].
 _HALF_LANE = 1.45
+# The ego car's motion: times (K,) -> places (K, 2) [m] and headings (K,) [rad].
+EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 class EgoBox(NamedTuple):

@@ -10,14 +10,14 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.elementary import cos, sin
 from cns_drake.base.errors import InputError
-from cns_drake.traffic.ego_car import EgoBox
+from cns_drake.traffic.ego_car import EgoBox, EgoPath
 from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject, kind_name
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.lane_heights import LaneHeights
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 from cns_drake.traffic.walkers import gait_rate
 

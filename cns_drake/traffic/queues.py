@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 
 from cns_drake.base.elementary import arcsin, arctan2
-from cns_drake.traffic.ego_car import STEP, EgoBox
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind, draw_kinds
 
 # Least and greatest gap between vehicles in a queue [m].

@@ -27,7 +27,11 @@ from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.system_names import check_unused_names
 from cns_drake.traffic.body_shapes import Limb, vehicle_limbs, walker_limbs
 from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
+from cns_drake.traffic.traffic_plan import TrafficPlan
+
+# A pedestrian's box, which contains swinging limbs [m].
+WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 
 
 class TrafficBody(NamedTuple):

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.vehicle_kinds import VehicleKind
-
-# A pedestrian's box, which contains swinging limbs [m].
-WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
-# The ego car's motion: times (K,) -> places (K, 2) [m] and headings (K,) [rad].
-EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -31,8 +24,8 @@ class TrafficPlan:
         left_out: number of requested bodies that are left out because they
             would collide.
         positions: (K,) distances of the ego car along its path at times
-            `KNOT_PERIOD` apart [m]; None if the ego car does not follow other
-            vehicles.
+            `cns_drake.motion.speed_profile.KNOT_PERIOD` apart [m]; None if the
+            ego car does not follow other vehicles.
         notes: notes for the user.
     """
 

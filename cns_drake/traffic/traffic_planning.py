@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.traffic.ego_car import STEP, EgoBox
+from cns_drake.traffic.ego_car import STEP, EgoBox, EgoPath
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
 from cns_drake.traffic.streets import make_streets
-from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.traffic_trial import FIRST_STEP, TrafficTask, begin_trial
 
 # Greatest number of plans that are tried.

@@ -20,7 +20,7 @@ from cns_drake.scene.structure_names import structure_name
 from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.scenario_traffic import EGO_BOX, plan_scenario_traffic
 from cns_drake.traffic.lane_file import read_lanes
-from cns_drake.traffic.traffic_plan import WALKER_SIZE
+from cns_drake.traffic.traffic_motion import WALKER_SIZE
 from cns_drake.traffic.traffic_planning import plan_traffic
 
 WIDTH = 12.5

@@ -11,8 +11,12 @@ from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import MAX_INSTANCE
 from cns_drake.traffic.body_states import bodies_at
 from cns_drake.traffic.tracks import Tracks
-from cns_drake.traffic.traffic_motion import make_traffic, traffic_structures
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from cns_drake.traffic.traffic_motion import (
+    WALKER_SIZE,
+    make_traffic,
+    traffic_structures,
+)
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.vehicle_kinds import (
     KINDS,
     LARGEST,

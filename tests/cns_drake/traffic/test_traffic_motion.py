@@ -22,12 +22,13 @@ from cns_drake.traffic.body_states import (
 )
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_motion import (
+    WALKER_SIZE,
     add_traffic,
     connect_traffic,
     make_traffic,
     traffic_structures,
 )
-from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from cns_drake.traffic.traffic_plan import TrafficPlan
 from cns_drake.traffic.vehicle_kinds import KINDS
 
 T = 2.0

@@ -23,7 +23,7 @@ from cns_drake.traffic.lane_graph import (
 )
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
-from cns_drake.traffic.traffic_plan import WALKER_SIZE
+from cns_drake.traffic.traffic_motion import WALKER_SIZE
 from cns_drake.traffic.traffic_planning import plan_traffic
 from cns_drake.traffic.traffic_trial import Trial
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE

@@ -21,7 +21,7 @@ from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
 from cns_drake.traffic.streets import make_streets
-from cns_drake.traffic.traffic_plan import WALKER_SIZE
+from cns_drake.traffic.traffic_motion import WALKER_SIZE
 from cns_drake.traffic.traffic_planning import plan_traffic
 from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicle_records import (
