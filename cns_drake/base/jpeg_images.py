@@ -10,6 +10,10 @@ import numpy as np
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+# Levels of a picture of one level are divided by this instead of by zero; 255
+# times its reciprocal is finite.
+_LEAST_SPREAD = 1e-300
+
 
 def to_jpeg(
     picture: Image, quality: int = 75, longest: int | None = None
@@ -44,7 +48,7 @@ def _to_8_bits(picture: Image) -> Image:
     shown = np.zeros(values.shape, np.uint8)
     if known.any():
         low, high = np.percentile(values[known], (1.0, 99.0))
-        scale = 255.0 / max(high - low, np.finfo(float).tiny)
+        scale = 255.0 / max(high - low, _LEAST_SPREAD)
         with np.errstate(over="ignore"):
             levels = np.clip((values[known] - low) * scale, 0.0, 255.0)
         shown[known] = np.rint(levels)

@@ -41,8 +41,10 @@ def test_depth_without_a_return_and_one_level():
     shown = seen(depth, "TIFF")
     assert shown[20, 2] < 8
     assert shown[20, 40] > shown[20, 20] + 40
-    flat = seen(np.full((8, 8), 40000, np.uint16))
-    assert len(np.unique(flat)) == 1
+    # A number that is none, as a cast of it would be, differs by processor.
+    with np.errstate(all="raise"):
+        flat = seen(np.full((8, 8), 40000, np.uint16))
+    assert not flat.any()
 
 
 def test_pictures_of_8_bits_stay():
