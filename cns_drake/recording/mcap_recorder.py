@@ -201,26 +201,12 @@ class McapRecorder(LeafSystem):
         """
         super().__init__()
         cameras, further, layouts = cameras or {}, further or {}, layouts or {}
-        own_depth = [name for name, one in cameras.items() if one.depth]
-        check_sensor_names(
-            (
-                *X_BSs,
-                *cameras,
-                *map(depth_frame, own_depth),
-                *dict.fromkeys(s.frame or n for n, s in further.items()),
-            )
-        )
+        _check_frames(X_BSs, cameras, further)
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
         if schedule is None:
-            topics = recorded_topics.recording_topics(
-                X_BSs,
-                camera_names=cameras,
-                layouts=layouts,
-                further=[sensor.topic for sensor in further.values()],
-                depth_camera_names=own_depth,
-            )
             assert period is not None
+            topics = _recorded_topics(X_BSs, cameras, further, layouts)
             schedule = make_schedule({topic.name: period for topic in topics})
         self._schedule = schedule
         self._bag = bag
@@ -253,10 +239,8 @@ class McapRecorder(LeafSystem):
             self._add_scan_port(name, convert)
         for name, X_BS in X_BSs.items():
             if X_BS is None:
-                self._poses[name] = (
-                    self._declare_pose_port(name),
-                    RigidTransform(),
-                )
+                port = self._declare_pose_port(name)
+                self._poses[name] = port, RigidTransform()
         for name, camera in cameras.items():
             self._add_camera_ports(name, camera)
         for name, sensor in further.items():
@@ -510,6 +494,48 @@ class McapRecorder(LeafSystem):
         if not isinstance(message, bytes):
             message = ros_types.serialize(message)
         self._bag.write(topic.name, stamp_ns, message, sequence)
+
+
+def _check_frames(
+    X_BSs: Mapping[str, RigidTransform | None],
+    cameras: Mapping[str, RecordedCamera],
+    further: Mapping[str, RecordedSensor],
+) -> None:
+    """Checks that the sensors' frames can all be parts of one recording.
+
+    Raises:
+        ValueError: names are not unique, or cannot be parts of ROS 2 topics.
+    """
+    check_sensor_names(
+        (
+            *X_BSs,
+            *cameras,
+            *map(depth_frame, _with_own_depth(cameras)),
+            # Further sensors may share a frame.
+            *dict.fromkeys(s.frame or n for n, s in further.items()),
+        )
+    )
+
+
+def _recorded_topics(
+    X_BSs: Mapping[str, RigidTransform | None],
+    cameras: Mapping[str, RecordedCamera],
+    further: Mapping[str, RecordedSensor],
+    layouts: Mapping[str, str],
+) -> tuple[Topic, ...]:
+    """Returns all topics of a recording."""
+    return recorded_topics.recording_topics(
+        X_BSs,
+        camera_names=cameras,
+        layouts=layouts,
+        further=[sensor.topic for sensor in further.values()],
+        depth_camera_names=_with_own_depth(cameras),
+    )
+
+
+def _with_own_depth(cameras: Mapping[str, RecordedCamera]) -> list[str]:
+    """Returns the names of cameras whose depth images have their own frame."""
+    return [name for name, camera in cameras.items() if camera.depth]
 
 
 def _fixed_poses(

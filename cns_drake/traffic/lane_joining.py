@@ -57,54 +57,82 @@ def join_lanes(
         for k, lane in enumerate(merged)
         if not lane.connects and SPACING * len(points[k]) >= _SHORTEST_LANE
     ]
+    ways = [way for k in long for way in _ways_from(k, after, set(long))]
     number = {k: row for row, k in enumerate(long)}
     left_of = {right: left for left, right in beside.items()}
-    # Places in the same junction, as trees: place -> its parent.
-    parents: dict[tuple[int, str], tuple[int, str]] = {}
-
-    def cluster(place: tuple[int, str]) -> tuple[int, str]:
-        while (parent := parents.get(place, place)) != place:
-            place = parent
-        return place
-
-    ways = []
-    for k in long:
-        for short, last in _ways(k, after, set(long)):
-            tail = points[k][-_STOP_STEPS - 1 :]
-            head = points[last][: _STOP_STEPS + 1]
-            between = (points[one] for one in short)
-            line = np.concatenate([tail, *between, head])
-            limit = min(merged[one].limit for one in (k, *short, last))
-            ways.append((k, last, line, limit))
-            for place in ((last, "start"), *((one, "whole") for one in short)):
-                parents[cluster(place)] = cluster((k, "end"))
-    keys = dict.fromkeys(cluster((k, "end")) for k in long)
-    junctions = {key: row for row, key in enumerate(keys)}
+    junction_after = _junctions(long, ways)
     pieces = [
         Piece(
             points[k][_STOP_STEPS:-_STOP_STEPS],
             merged[k].limit,
             False,
             after=tuple(
-                len(long) + row for row, way in enumerate(ways) if way[0] == k
+                len(long) + row for row, way in enumerate(ways) if way.lane == k
             ),
             left=number.get(left_of.get(k, -1), -1),
             right=number.get(beside.get(k, -1), -1),
-            junction=junctions[cluster((k, "end"))],
+            junction=junction_after[k],
         )
         for k in long
     ]
     pieces += [
         Piece(
-            resampled(line),
-            limit,
+            resampled(way.line(points)),
+            min(merged[k].limit for k in (way.lane, *way.short, way.next_lane)),
             True,
-            (number[last],),
-            junction=junctions[cluster((k, "end"))],
+            (number[way.next_lane],),
+            junction=junction_after[way.lane],
         )
-        for k, last, line, limit in ways
+        for way in ways
     ]
     return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)))
+
+
+class _Way(NamedTuple):
+    """A path from one long lane to the next, by the numbers of the lanes.
+
+    Attributes:
+        lane: the lane from which the way leads.
+        short: the short lanes of the way.
+        next_lane: the lane to which the way leads.
+    """
+
+    lane: int
+    short: tuple[int, ...]
+    next_lane: int
+
+    def line(self, points: Sequence[np.ndarray]) -> np.ndarray:
+        """Returns the line (N, 3) from the stop line to the next lane [m].
+
+        Args:
+            points: (M, 3) points of each lane.
+        """
+        tail = points[self.lane][-_STOP_STEPS - 1 :]
+        head = points[self.next_lane][: _STOP_STEPS + 1]
+        return np.concatenate([tail, *(points[k] for k in self.short), head])
+
+
+def _junctions(long: Sequence[int], ways: Iterable[_Way]) -> dict[int, int]:
+    """Returns the number of the junction at the end of each long lane.
+
+    Ways that share a short lane, the lane from which they lead, or the lane to
+    which they lead, are in the same junction.
+    """
+    # Places in the same junction, as trees: place -> its parent.
+    parents: dict[tuple[int, str], tuple[int, str]] = {}
+
+    def root(place: tuple[int, str]) -> tuple[int, str]:
+        while (parent := parents.get(place, place)) != place:
+            place = parent
+        return place
+
+    for way in ways:
+        whole = ((k, "whole") for k in way.short)
+        for place in ((way.next_lane, "start"), *whole):
+            parents[root(place)] = root((way.lane, "end"))
+    roots = {k: root((k, "end")) for k in long}
+    number = {key: row for row, key in enumerate(dict.fromkeys(roots.values()))}
+    return {k: number[key] for k, key in roots.items()}
 
 
 def usual_limit(limits: ArrayLike, lengths: ArrayLike) -> float:
@@ -175,10 +203,10 @@ def _merged_lanes(
     return merged, following, beside
 
 
-def _ways(
-    first: int, after: Sequence[Sequence[int]], long: set[int]
-) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Yields the short lanes after a lane, and the long lane after them.
+def _ways_from(
+    lane: int, after: Sequence[Sequence[int]], long: set[int]
+) -> Iterator[_Way]:
+    """Yields the ways from a long lane.
 
     Each long lane is reached in one way: the first of the ways with the fewest
     short lanes.
@@ -187,11 +215,11 @@ def _ways(
     reached: set[int] = set()
     while waiting:
         short = waiting.pop(0)
-        for k in after[short[-1] if short else first]:
+        for k in after[short[-1] if short else lane]:
             if k in reached:
                 continue
             reached.add(k)
             if k in long:
-                yield short, k
+                yield _Way(lane, short, k)
             elif len(short) < _MOST_SHORT:
                 waiting.append((*short, k))

@@ -91,12 +91,44 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         traffic: vehicles and crossings, changed in place.
         k: number of the current time step.
     """
-    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
-    t = k * STEP
+    num_cars, num_pieces = len(traffic.cars), len(traffic.streets.pieces)
+    first = _first_without_permission(traffic, k)
+    since = _arrivals(traffic, first, k)
+    # Pieces that small, and large, vehicles must not enter now.
+    taken = np.zeros((2, num_pieces), np.bool_)
+    last = _mark_permitted(traffic, taken)
+    blocked = np.zeros(num_pieces, np.bool_)
+    for who in np.argsort(since):
+        if since[who] == np.inf:
+            break
+        if who < num_cars:
+            last = _serve_vehicle(
+                traffic, who, since[who], k, taken, blocked, last
+            )
+        else:
+            last = _serve_crossing(traffic, who - num_cars, k, last)
+            _take_crossing(traffic, taken, who - num_cars)
+
+
+@compiled
+def _first_without_permission(traffic: Traffic, k: int) -> np.ndarray:
+    """Returns the first vehicle without permission on each lane.
+
+    Permissions that a vehicle cannot use are withdrawn before: after its signal
+    has changed, and behind a vehicle without permission.
+
+    Args:
+        traffic: vehicles and crossings, changed in place.
+        k: number of the current time step.
+
+    Returns:
+        (P,) number of the vehicle; -1 for none, and for pieces that are not
+        lanes.
+    """
+    streets, cars = traffic.streets, traffic.cars
     pieces = streets.pieces
-    num_cars = len(cars)
     first = np.full(len(pieces), -1)
-    for i in range(num_cars):
+    for i in range(len(cars)):
         lane = cars[i].path[CURRENT]
         if lane < 0 or pieces[lane].is_way:
             continue
@@ -119,7 +151,7 @@ def grant_ways(traffic: Traffic, k: int) -> None:
             s = cars[i].s * (pieces[other].length / pieces[lane].length)
             if first[other] < 0 or s > cars[first[other]].s:
                 first[other] = i
-    for i in range(num_cars):
+    for i in range(len(cars)):
         lane = cars[i].path[CURRENT]
         if lane < 0 or not cars[i].granted or cars[i].v > _STANDSTILL_SPEED:
             continue
@@ -130,7 +162,29 @@ def grant_ways(traffic: Traffic, k: int) -> None:
         if ahead.s * scale > cars[i].s:
             # Behind a vehicle without permission, a driver cannot use it.
             cars[i].granted, cars[i].held = False, -1
-    since = np.full(num_cars + len(crossings), np.inf)
+    return first
+
+
+@compiled
+def _arrivals(traffic: Traffic, first: np.ndarray, k: int) -> np.ndarray:
+    """Returns since when vehicles and pedestrians ask for permission.
+
+    Vehicles that ask for the first time are marked as waiting. Crossings that
+    the last pedestrian has left are closed.
+
+    Args:
+        traffic: vehicles and crossings, changed in place.
+        first: (P,) first vehicle without permission on each lane; -1 for none.
+        k: number of the current time step.
+
+    Returns:
+        (N + C,) times at the N vehicles and C crossings, inf for those that do
+        not ask [s].
+    """
+    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
+    t = k * STEP
+    pieces = streets.pieces
+    since = np.full(len(cars) + len(crossings), np.inf)
     for lane in range(len(pieces)):
         if first[lane] < 0:
             continue
@@ -162,14 +216,22 @@ def grant_ways(traffic: Traffic, k: int) -> None:
                 car.since = t
                 since[first[lane]] = min(since[first[lane]], t)
     for c in range(len(crossings)):
-        since[num_cars + c] = crossings[c].waits
-        one = crossings[c]
-        if one.users == 0 and (one.is_open or one.waits > t):
-            one.order, one.is_open = 0, False
-    # Pieces that small, and large, vehicles must not enter now.
-    taken = np.zeros((2, len(pieces)), np.bool_)
+        crossing = crossings[c]
+        since[len(cars) + c] = crossing.waits
+        if crossing.users == 0 and (crossing.is_open or crossing.waits > t):
+            crossing.order, crossing.is_open = 0, False
+    return since
+
+
+@compiled
+def _mark_permitted(traffic: Traffic, taken: np.ndarray) -> int:
+    """Marks the ways that permissions so far exclude, in `taken` (2, P).
+
+    The result is the highest `order` so far.
+    """
+    streets, cars, crossings = traffic.streets, traffic.cars, traffic.crossings
     last = 1
-    for i in range(num_cars):
+    for i in range(len(cars)):
         if cars[i].held >= 0:
             last = max(last, cars[i].order)
             rear = rear_on_way(streets, cars[i])
@@ -177,41 +239,67 @@ def grant_ways(traffic: Traffic, k: int) -> None:
     for c in range(len(crossings)):
         last = max(last, crossings[c].order)
         _take_crossing(traffic, taken, c)
-    blocked = np.zeros(len(pieces), np.bool_)
-    for who in np.argsort(since):
-        if since[who] == np.inf:
-            break
-        if who >= num_cars:
-            last = _serve_crossing(traffic, who - num_cars, k, last)
-            _take_crossing(traffic, taken, who - num_cars)
-            continue
-        car = cars[who]
-        if car.path[CURRENT + 1] < 0:
-            choose_way(traffic, who)
-        way, is_large = car.path[CURRENT + 1], car.large
-        if blocked[way] or not _is_ready(streets, car, k):
-            continue
-        if not _has_room(traffic, who, k):
-            if car.guided and t > since[who] + _LONG_WAIT:
-                # It has no other way to take: the next room is for it.
-                for other in range(len(pieces)):
-                    first_after = streets.after[pieces[other].after_first]
-                    blocked[other] |= first_after == car.path[CURRENT + 2]
-            continue
-        # The ego car's plan has no time to wait on a way.
-        is_near = streets.until[k, way] < _EGO_COMES
-        if taken[int(is_large), way] and (
-            is_near or not _is_soon_free(traffic, who, way, t)
-        ):
-            if is_near or t > since[who] + _LONG_WAIT:
-                # Later arrivals must not go first again and again.
-                clear = streets.clear[int(is_large), way]
-                blocked |= clear[: len(pieces)] > 0.0
-            continue
-        _mark_excluded(streets, taken, way, is_large, 0.0)
-        last += 1
-        car.granted, car.held, car.order = True, way, last
-        car.since, car.refused = np.inf, 0.0
+    return last
+
+
+@compiled
+def _serve_vehicle(
+    traffic: Traffic,
+    i: int,
+    since: float,
+    k: int,
+    taken: np.ndarray,
+    blocked: np.ndarray,
+    last: int,
+) -> int:
+    """Permits the i-th vehicle to enter its way, if it may.
+
+    Args:
+        traffic: vehicles and crossings, changed in place.
+        i: number of the vehicle.
+        since: since when the vehicle asks for permission [s].
+        k: number of the current time step.
+        taken: (2, P) pieces that small, and large, vehicles must not enter now;
+            changed in place.
+        blocked: (P,) pieces that are kept free for vehicles that have waited
+            long; changed in place.
+        last: highest `order` so far.
+
+    Returns:
+        The new highest `order`.
+    """
+    streets = traffic.streets
+    pieces = streets.pieces
+    t = k * STEP
+    car = traffic.cars[i]
+    if car.path[CURRENT + 1] < 0:
+        choose_way(traffic, i)
+    way, is_large = car.path[CURRENT + 1], car.large
+    if blocked[way] or not _is_ready(streets, car, k):
+        return last
+    if not _has_room(traffic, i, k):
+        if car.guided and t > since + _LONG_WAIT:
+            # It has no other way to take: the next room is for it.
+            for other in range(len(pieces)):
+                first_after = streets.after[pieces[other].after_first]
+                blocked[other] |= first_after == car.path[CURRENT + 2]
+        return last
+    # The ego car's plan has no time to wait on a way.
+    is_near = streets.until[k, way] < _EGO_COMES
+    if taken[int(is_large), way] and (
+        is_near or not _is_soon_free(traffic, i, way, t)
+    ):
+        if is_near or t > since + _LONG_WAIT:
+            # Later arrivals must not go first again and again.
+            clear = streets.clear[int(is_large), way]
+            for other in range(len(pieces)):
+                blocked[other] |= clear[other] > 0.0
+        return last
+    _mark_excluded(streets, taken, way, is_large, 0.0)
+    last += 1
+    car.granted, car.held, car.order = True, way, last
+    car.since, car.refused = np.inf, 0.0
+    return last
 
 
 @compiled
@@ -285,29 +373,29 @@ def _serve_crossing(traffic: Traffic, c: int, k: int, last: int) -> int:
     `last` is the highest `order` so far; the result is the new highest `order`.
     """
     streets, cars = traffic.streets, traffic.cars
-    one = traffic.crossings[c]
+    crossing = traffic.crossings[c]
     place = len(streets.pieces) + c
     t = k * STEP
-    if one.users > 0:
+    if crossing.users > 0:
         return last
-    needed = one.length / _WALKING_SPEED + WALK_GROUP + _WALKING_RESERVE
-    if one.order == 0:
-        if t < one.closed + _REST:
+    needed = crossing.length / _WALKING_SPEED + WALK_GROUP + _WALKING_RESERVE
+    if crossing.order == 0:
+        if t < crossing.closed + _REST:
             return last
-        if not one.marked and not _is_gap(traffic, c):
+        if not crossing.marked and not _is_gap(traffic, c):
             return last
         if _until_red(streets, place, t) < min(
             needed, streets.signals.green_for[place] - _LATE
         ):
             return last
         last += 1
-        one.order = last
+        crossing.order = last
     if streets.until[k, place] < needed:
-        one.order = 0
+        crossing.order = 0
         return last
     for i in range(len(cars)):
         car = cars[i]
-        if car.held < 0 or car.order > one.order:
+        if car.held < 0 or car.order > crossing.order:
             continue
         rear = rear_on_way(streets, car)
         size = int(car.large)
@@ -316,9 +404,9 @@ def _serve_crossing(traffic: Traffic, c: int, k: int, last: int) -> int:
         if rear < clear and ahead < _stops_within(car):
             return last
     # A placeholder holds the permission until the group begins to walk.
-    one.users, one.opened, one.is_open = 1, t, True
+    crossing.users, crossing.opened, crossing.is_open = 1, t, True
     # Vehicles that have not arrived yet wait for it, whatever their order.
-    one.order = 1
+    crossing.order = 1
     return last
 
 
@@ -415,21 +503,23 @@ def _has_room(traffic: Traffic, i: int, k: int) -> bool:
         end = pieces[beyond].length
         at = traffic.head[beyond]
         while at >= 0:
-            other = traffic.entries[at]
-            if other.who != i and other.rear >= 0.0:
-                speed = max(other.speed, 0.0)
-                end = min(end, other.rear + speed**2 / (2 * _LAST_BRAKES))
-            at = other.after
+            entry = traffic.entries[at]
+            if entry.who != i and entry.rear >= 0.0:
+                speed = max(entry.speed, 0.0)
+                end = min(end, entry.rear + speed**2 / (2 * _LAST_BRAKES))
+            at = entry.after
         for j in range(len(cars)):
-            one = cars[j]
-            current = one.path[CURRENT]
+            other = cars[j]
+            current = other.path[CURRENT]
             comes = (
-                (one.granted and one.path[CURRENT + 2] == beyond)
-                or (pieces[current].is_way and one.path[CURRENT + 1] == beyond)
-                or (current == beyond and one.s < one.length)
+                (other.granted and other.path[CURRENT + 2] == beyond)
+                or (
+                    pieces[current].is_way and other.path[CURRENT + 1] == beyond
+                )
+                or (current == beyond and other.s < other.length)
             )
             if comes and j != i:
-                end -= one.length + _STANDING_GAP
+                end -= other.length + _STANDING_GAP
         has_room = end >= car.length + _STANDING_GAP
     if not has_room and not car.guided:
         car.refused += STEP

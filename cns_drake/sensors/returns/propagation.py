@@ -238,54 +238,50 @@ def _advance_to_hits(
     beam, distance = np.empty(count, np.int64), np.empty(count)
     energy, reflecting = np.empty(count), np.empty(count, np.int32)
     part = 0
-    # The continued rays: the ray before, directions, shares, and so on.
+    # The continued rays, at most two from each hit.
     before, d_Wset = np.empty(2 * count, np.int64), np.empty((2 * count, 3))
     share, depth = np.empty(2 * count), np.empty(2 * count)
     inside, reach = np.empty(2 * count, np.int32), np.empty(2 * count)
     way = 0
     flat = _FLATNESS + divergence
     for ray in range(count):
-        medium = ways.inside[ray]
-        geometry = met.geometry[ray]
+        medium, geometry = ways.inside[ray], met.geometry[ray]
         left, sent = ways.depth[ray], ways.energy[ray]
         length = ways.length[ray] + met.ranges[ray]
         if medium >= 0:
-            per_metre = _LEAF_PROJECTION * materials.leaf_area_density[medium]
-            left -= per_metre * met.ranges[ray]
+            density = materials.leaf_area_density[medium]
+            left -= _optical_depth(density, met.ranges[ray])
             if left < 0.0:
                 # Beyond the reach of the ray there is a leaf in any case.
-                way_in = ways.depth[ray] / per_metre
+                to_leaf = _path_length(density, ways.depth[ray])
                 beam[part] = ways.beam[ray]
-                distance[part] = ways.length[ray] + way_in
+                distance[part] = ways.length[ray] + to_leaf
                 energy[part] = sent * materials.reflectivity[medium]
                 reflecting[part] = medium
                 part += 1
                 continue
         if geometry < 0:
             continue
-        if materials.kind[geometry] == LEAVES:
-            before[way], share[way], depth[way] = ray, 1.0, left
-            inside[way], reach[way] = -1, max_range - length
-            if met.is_outside[ray]:
-                density = materials.leaf_area_density[geometry]
-                way_in = left / (_LEAF_PROJECTION * density)
-                inside[way], reach[way] = geometry, min(way_in, reach[way])
+        kind, cosine = materials.kind[geometry], met.cosine[ray]
+        if kind == LEAVES or (kind == SPRAYS and left > _SPRAY):
+            depth[way], inside[way], reach[way] = _beyond_leaves(
+                kind,
+                left,
+                medium,
+                geometry,
+                materials.leaf_area_density[geometry],
+                met.is_outside[ray],
+            )
+            before[way], share[way] = ray, 1.0
+            reach[way] = min(reach[way], max_range - length)
             for axis in range(3):
                 d_Wset[way, axis] = met.d_Wset[ray, axis]
             way += 1
             continue
-        if materials.kind[geometry] == SPRAYS and left > _SPRAY:
-            before[way], share[way], depth[way] = ray, 1.0, left - _SPRAY
-            inside[way], reach[way] = medium, max_range - length
-            for axis in range(3):
-                d_Wset[way, axis] = met.d_Wset[ray, axis]
-            way += 1
-            continue
-        cosine = met.cosine[ray]
         beam[part], distance[part] = ways.beam[ray], length
         energy[part] = reflected_energy(sent, geometry, cosine, materials)
         reflecting[part] = geometry
-        if materials.kind[geometry] == GLASS:
+        if kind == GLASS:
             mirrored, through = pane_shares(cosine)
             if cosine > np.cos(flat):
                 # The mirrored light fills a cone of the beam's width; a
@@ -303,21 +299,13 @@ def _advance_to_hits(
                         d_Wset[way, axis] = met.d_Wset[ray, axis] + to_pane
                     way += 1
         part += 1
-    before, d_Wset = before[:way], d_Wset[:way]
-    begin = np.empty((way, 3))
-    for k in range(way):
-        for axis in range(3):
-            begin[k, axis] = (
-                ways.p_Wset[before[k], axis]
-                + met.ranges[before[k]] * ways.d_Wset[before[k], axis]
-                + _SKIN * d_Wset[k, axis]
-            )
     light = Light(
         beam[:part], distance[:part], energy[:part], reflecting[:part]
     )
+    before, d_Wset = before[:way], d_Wset[:way]
     return light, Ways(
         ways.beam[before],
-        begin,
+        _behind_hits(ways, met, before, d_Wset),
         d_Wset,
         ways.time[before],
         ways.length[before] + met.ranges[before],
@@ -326,3 +314,69 @@ def _advance_to_hits(
         inside[:way],
         reach[:way].astype(np.float32),
     )
+
+
+@compiled
+def _optical_depth(density: float, length: float) -> float:
+    """Returns the optical depth of a path [m] through leaves [1/m]."""
+    return _LEAF_PROJECTION * density * length
+
+
+@compiled
+def _path_length(density: float, depth: float) -> float:
+    """Returns the length of a path [m] of an optical depth in leaves [1/m]."""
+    return depth / (_LEAF_PROJECTION * density)
+
+
+@compiled
+def _beyond_leaves(
+    kind: int,
+    left: float,
+    medium: int,
+    geometry: int,
+    density: float,
+    is_outside: bool,
+) -> tuple[float, int, float]:
+    """Returns how a ray goes on beyond the surface of a crown or a spray.
+
+    Args:
+        kind: `LEAVES` or `SPRAYS`.
+        left: optical depth that the ray still passes at its hit.
+        medium: index of the geometry inside which the ray is before; -1 for
+            none.
+        geometry: index of the geometry that the ray hits.
+        density: leaf area density of that geometry [1/m].
+        is_outside: whether the ray hits the outside of its surface.
+
+    Returns:
+        `depth`, `inside` and `reach` of `Ways`. `reach` is inf where nothing
+        but the LiDAR's range limits it.
+    """
+    if kind == SPRAYS:
+        return left - _SPRAY, medium, np.inf
+    if is_outside:
+        return left, geometry, _path_length(density, left)
+    return left, -1, np.inf
+
+
+@compiled
+def _behind_hits(
+    ways: Ways, met: BeamHits, before: np.ndarray, d_Wset: np.ndarray
+) -> np.ndarray:
+    """Returns points (M, 3) a little behind the hits of rays [m].
+
+    Args:
+        ways: the rays.
+        met: hits of the rays.
+        before: (M,) rows of the rays.
+        d_Wset: (M, 3) unit directions behind the hits.
+    """
+    result = np.empty((len(before), 3))
+    for k, ray in enumerate(before):
+        for axis in range(3):
+            result[k, axis] = (
+                ways.p_Wset[ray, axis]
+                + met.ranges[ray] * ways.d_Wset[ray, axis]
+                + _SKIN * d_Wset[k, axis]
+            )
+    return result
