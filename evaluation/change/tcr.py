@@ -240,6 +240,28 @@ def covered(
     return np.all(near, axis=0)
 
 
+def judge_points(
+    points: np.ndarray, other: np.ndarray, tau: float = TAU
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how the change ratio (TCR) counts the points of a fine map.
+
+    Args:
+        points: (N, 3) points of the map [m].
+        other: (M, 3) voxel centroids of the other map, M > 0 [m].
+        tau: distance up to which a point has a counterpart [m].
+
+    Returns:
+        (N,) bool, whether a point lacks a counterpart in the other map; and
+        (N,) bool, whether a point is in the other map's convex hull and
+        therefore counts.
+    """
+    # The search stops at the bound, because all distances beyond `tau` count
+    # alike. SciPy finds only neighbours that are nearer than the bound, so
+    # `tau` itself, which still counts as near, has to lie well below it.
+    distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
+    return distances > tau, in_convex_hull(points, other, HULL_MARGIN)
+
+
 def _directed_change(
     source: np.ndarray,
     target: np.ndarray,

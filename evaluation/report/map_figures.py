@@ -11,9 +11,8 @@ from matplotlib.patches import Patch
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.change.convex_hull import in_convex_hull
 from evaluation.change.drive_change import ChangeResult
-from evaluation.change.tcr import HULL_MARGIN, TAU
+from evaluation.change.tcr import judge_points
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.point_rendering import (
     Picture,
@@ -61,27 +60,6 @@ _PANEL_INCHES = 4.2
 _OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
 _SMALL_OBLIQUE = replace(_OBLIQUE, pixels_per_metre=1.8)
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
-
-
-def judge_points(
-    points: np.ndarray, other: np.ndarray, tau: float = TAU
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how the change ratio (TCR) counts the points of a fine map.
-
-    Args:
-        points: (N, 3) points of the map [m].
-        other: (M, 3) voxel centroids of the other map, M > 0 [m].
-        tau: distance up to which a point has a counterpart [m].
-
-    Returns:
-        (N,) bool, whether a point lacks a counterpart in the other map; and
-        (N,) bool, whether a point is in the other map's convex hull and
-        therefore counts.
-    """
-    # A distance beyond the bound only counts as far away, so the search stops
-    # there.
-    distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
-    return distances > tau, in_convex_hull(points, other, HULL_MARGIN)
 
 
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:

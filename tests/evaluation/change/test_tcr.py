@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.points import from_xyz
-from evaluation.change.tcr import covered, temporal_change
+from evaluation.change.tcr import covered, judge_points, temporal_change
 from evaluation.maps.voxel_maps import voxelise
 
 NO_POINTS = np.empty((0, 3))
@@ -233,3 +233,21 @@ def test_coverage():
         False,
         True,
     ]
+
+
+def test_points_of_fine_maps_count_as_in_the_metric():
+    other = np.array(
+        [[x, y, z] for x in (0, 20) for y in (0, 20) for z in (0, 20)], float
+    )
+    points = np.array(
+        [
+            [0.0, 0.0, 4.4],
+            [0.0, 0.0, 4.6],
+            [10.0, 10.0, 10.0],
+            [40.0, 0.0, 0.0],
+            [24.0, 0.0, 0.0],
+        ]
+    )
+    absent, in_hull = judge_points(points, other)
+    assert absent.tolist() == [False, True, True, True, False]
+    assert in_hull.tolist() == [True, True, True, False, False]

@@ -11,27 +11,9 @@ from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.methods import shipped_methods
 from evaluation.report import curve_figures
-from evaluation.report.map_figures import judge_points, top_view, voxel_of_each
+from evaluation.report.map_figures import top_view, voxel_of_each
 from evaluation.results.figure_files import PIXELS, save_figure
 from evaluation.results.figure_text import name_lines
-
-
-def test_change_picture_has_the_colours_of_the_metric():
-    other = np.array(
-        [[x, y, z] for x in (0, 20) for y in (0, 20) for z in (0, 20)], float
-    )
-    points = np.array(
-        [
-            [0.0, 0.0, 4.4],
-            [0.0, 0.0, 4.6],
-            [10.0, 10.0, 10.0],
-            [40.0, 0.0, 0.0],
-            [24.0, 0.0, 0.0],
-        ]
-    )
-    absent, in_hull = judge_points(points, other)
-    assert absent.tolist() == [False, True, True, True, False]
-    assert in_hull.tolist() == [True, True, True, False, False]
 
 
 def test_view_from_above_shows_the_route_and_60_m_around():
