@@ -76,7 +76,11 @@ def cloud_at(
             X_FS = X_S0W @ X_WS[index]
             if X_FS0 is not None:
                 X_FS = X_FS0 @ X_FS
-        return cropped(scan, max_range, X_FS, fields, drive.name)
+        if not fields:
+            return cropped(scan, max_range, X_FS)
+        return cropped_with_fields(
+            scan, max_range, fields, X_FS, source=drive.name
+        )
 
     return clouds.read_only(
         np.concatenate([*map(cropped_scan, range(first, end))])
@@ -84,11 +88,7 @@ def cloud_at(
 
 
 def cropped(
-    scan: np.ndarray,
-    max_range: float,
-    X_FS: np.ndarray | None = None,
-    fields: tuple[str, ...] = (),
-    source: str = "",
+    scan: np.ndarray, max_range: float, X_FS: np.ndarray | None = None
 ) -> np.ndarray:
     """Returns the points of a scan that are finite and within range.
 
@@ -97,12 +97,34 @@ def cropped(
         max_range: greatest absolute x, y and z of a point in F [m].
         X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
             F is S.
-        fields: names of further fields of the points, besides x, y and z.
-        source: name of the drive, for error messages.
 
     Returns:
-        (K, 3) float64 in F; with fields, a structured array (K,) of float64 x,
-        y, z and the fields.
+        (K, 3) float64 in F [m].
+    """
+    p_F = _coordinates(scan, X_FS)
+    return p_F.compress(within_range(p_F, max_range), axis=0)
+
+
+def cropped_with_fields(
+    scan: np.ndarray,
+    max_range: float,
+    fields: tuple[str, ...],
+    X_FS: np.ndarray | None = None,
+    *,
+    source: str,
+) -> np.ndarray:
+    """Returns the same points as `cropped`, with further fields.
+
+    Args:
+        scan: structured array (N,) in the frame S of a sensor.
+        max_range: greatest absolute x, y and z of a point in F [m].
+        fields: names of further fields of the points, besides x, y and z.
+        X_FS: (4, 4) pose of the sensor in the frame F of the result; by default
+            F is S.
+        source: name of the drive or file, for error messages.
+
+    Returns:
+        Structured array (K,) of float64 x, y, z in F [m] and the fields.
 
     Raises:
         InputError: if the scan lacks a field.
@@ -114,18 +136,9 @@ def cropped(
                 f"{source}: its points have no field {name!r} (they have"
                 f" {', '.join(known)})"
             )
-    p_F = clouds.xyz(scan)
-    if X_FS is not None:
-        x, y, z = p_F.T
-        # Unlike a matrix product, products and sums that are computed one by
-        # one are rounded in the same way on every processor.
-        with np.errstate(invalid="ignore"):
-            rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
-        p_F = np.stack(rows, axis=1)
+    p_F = _coordinates(scan, X_FS)
     kept = within_range(p_F, max_range)
     p_F = p_F.compress(kept, axis=0)
-    if not fields:
-        return p_F
     cloud = np.empty(
         len(p_F),
         [(axis, np.float64) for axis in "xyz"]
@@ -136,3 +149,21 @@ def cropped(
     for name in fields:
         cloud[name] = scan[name].compress(kept, axis=0)
     return cloud
+
+
+def _coordinates(scan: np.ndarray, X_FS: np.ndarray | None) -> np.ndarray:
+    """Returns the points (N, 3) of a scan in the frame F [m].
+
+    Args:
+        scan: structured array (N,) in the frame S of a sensor.
+        X_FS: (4, 4) pose of the sensor in F; None if F is S.
+    """
+    p_S = clouds.xyz(scan)
+    if X_FS is None:
+        return p_S
+    x, y, z = p_S.T
+    # Unlike a matrix product, products and sums that are computed one by one
+    # are rounded in the same way on every processor.
+    with np.errstate(invalid="ignore"):
+        rows = [r[0] * x + r[1] * y + r[2] * z + r[3] for r in X_FS[:3]]
+    return np.stack(rows, axis=1)

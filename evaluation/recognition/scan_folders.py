@@ -13,7 +13,7 @@ from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
 from evaluation.clouds.notes import OnNote, no_note
-from evaluation.drives.scan_clouds import cropped
+from evaluation.drives.scan_clouds import cropped, cropped_with_fields
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
@@ -145,12 +145,13 @@ def _read_cropped(
     scan = read_cloud(path, columns, on_note)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())
-    cloud = cropped(
-        scan,
-        RetrievalProtocol.max_range,
-        fields=method.point_fields,
-        source=str(path),
-    )
+    max_range = RetrievalProtocol.max_range
+    if method.point_fields:
+        cloud = cropped_with_fields(
+            scan, max_range, method.point_fields, source=str(path)
+        )
+    else:
+        cloud = cropped(scan, max_range)
     if len(cloud) == 0:
         raise InputError(f"{path}: no finite point within range")
     return point_arrays.read_only(cloud), len(points) - num_finite

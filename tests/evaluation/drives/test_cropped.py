@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.drives.scan_clouds import cropped
+from evaluation.drives.scan_clouds import cropped, cropped_with_fields
 
 
 def random_scan(number, seed=3):
@@ -91,7 +91,7 @@ def test_fields_stay_with_their_points(X):
     # The field shows where in the scan a point was.
     scan["t"] = np.arange(len(scan))
     plain = cropped(scan, 50.0, X)
-    found = cropped(scan, 50.0, X, fields=("t", "ring"))
+    found = cropped_with_fields(scan, 50.0, ("t", "ring"), X, source="drive")
     assert 0 < len(found) < len(scan)
     assert found.dtype.names == ("x", "y", "z", "t", "ring")
     np.testing.assert_array_equal(
@@ -107,4 +107,4 @@ def test_fields_stay_with_their_points(X):
 
 def test_a_field_that_a_scan_lacks():
     with pytest.raises(InputError, match=r"^drive: .* no field 'echo' .*x, y"):
-        cropped(random_scan(3), 50.0, None, ("echo",), "drive")
+        cropped_with_fields(random_scan(3), 50.0, ("echo",), source="drive")
