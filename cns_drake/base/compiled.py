@@ -43,11 +43,16 @@ def compiled(function: _Function) -> _Function:
     options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
         dispatcher = numba.njit(cache=True, **options)(function)
-        name = f"{function.__module__}.{function.__qualname__}.lock"
-        kept = Path(dispatcher.stats.cache_path)
-        dispatcher.compile = _compiling_once(dispatcher.compile, kept / name)
+        lock = f"{function.__module__}.{function.__qualname__}.lock"
+        dispatcher.compile = _compiling_once(
+            dispatcher.compile,
+            function.__name__,
+            Path(dispatcher.stats.cache_path) / lock,
+        )
         return dispatcher
     except RuntimeError:
+        # Numba raises this error if no locator finds a cache folder: here, if
+        # `_ByContent.from_function` returns None.
         return numba.njit(**options)(function)
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
@@ -71,7 +76,7 @@ class _ByContent:
     def from_function(
         cls, function: Callable, file: str
     ) -> "_ByContent | None":
-        """Returns a function's locator; None if its folder is read-only."""
+        """Returns a function's locator; None if it cannot write its cache."""
         place = cls(function, Path(file).parent)
         try:
             place.ensure_cache_path()
@@ -94,7 +99,7 @@ class _ByContent:
 
 
 def _compiling_once(
-    compile_for: Callable[[tuple], object], file: Path
+    compile_for: Callable[[tuple], object], name: str, file: Path
 ) -> Callable[[tuple], object]:
     """Returns a function that compiles once for all processes.
 
@@ -105,12 +110,12 @@ def _compiling_once(
 
     Args:
         compile_for: function that compiles for types of arguments.
+        name: name of the compiled function, for messages of progress.
         file: file that is locked during the compilation.
     """
 
     def compile_once(types: tuple) -> object:
         with contextlib.ExitStack() as stack:
-            name = file.stem.rpartition(".")[2]
             stack.enter_context(interlude(f"compiling {name}"))
             # This lock excludes other processes but not other threads: numba
             # compiles one thread at a time already, and a second lock could

@@ -161,5 +161,5 @@ def test_an_interrupt_waits_until_a_function_is_compiled(tmp_path):
         done.append(types)
 
     with pytest.raises(KeyboardInterrupt):
-        compiled._compiling_once(compile_for, tmp_path / "one.lock")(())
+        compiled._compiling_once(compile_for, "one", tmp_path / "one.lock")(())
     assert done == [()]
