@@ -46,8 +46,9 @@ from cns_drake.sensors.camera.renderer import (
 _SIDES = 64
 # Pose, colour and surface of a geometry.
 _Member = tuple[RigidTransform, tuple[float, float, float], TriangleSurface]
-# What the geometries of one mesh share: kind of the copy, frame (None for
-# geometry that never moves), and look or class.
+# What the geometries of one mesh share: kind of the copy; frame (None for
+# geometry that never moves); and group, which is the name of a look in the copy
+# for colours, and the number of a class in the copy for classes.
 _MeshKey = tuple[str, FrameId | None, str | int]
 
 
@@ -122,7 +123,8 @@ class CameraScene(LeafSystem):
         self.frames = {f: own.id() for f, own in self.frames.items()}
         for k, ((kind, frame, group), members) in enumerate(parts.items()):
             if kind in self.scene_graphs:
-                self._register_mesh(f"mesh_{k}", kind, frame, group, members)
+                made = _make_instance(f"mesh_{k}", group, members)
+                self._register(kind, frame, made)
         self._poses = self.DeclareAbstractInputPort(
             "frame_poses", Value(object())
         )
@@ -133,29 +135,17 @@ class CameraScene(LeafSystem):
             {self.all_input_ports_ticket()},
         )
 
-    def _register_mesh(
-        self,
-        name: str,
-        kind: str,
-        frame: FrameId | None,
-        group: str | int,
-        members: list[_Member],
+    def _register(
+        self, kind: str, frame: FrameId | None, made: GeometryInstance
     ) -> None:
-        """Registers a mesh of merged geometry, anchored if `frame` is None."""
-        merged, owners = merge_triangles(
-            [(k, X, surface) for k, (X, _, surface) in enumerate(members)]
-        )
-        rgb = np.array([rgb for _, rgb, _ in members])[owners]
-        corners = merged.p_GVset[merged.triangles]
-        middle = np.round(corners.mean(axis=(0, 1)))
-        fronts = np.stack([X.rotation().matrix()[:, 1] for X, *_ in members])
-        mesh = make_mesh(corners, middle, rgb, group, owners, fronts)
-        made = GeometryInstance(RigidTransform(middle), mesh, name)
-        properties = PerceptionProperties()
-        is_class = kind == "classes"
-        label = RenderLabel(group) if is_class else RenderLabel.kDontCare
-        properties.AddProperty("label", "id", label)
-        made.set_perception_properties(properties)
+        """Registers a geometry with one of the copies.
+
+        Args:
+            kind: kind of the copy, a key of `scene_graphs`.
+            frame: the moving frame in the original that carries the geometry;
+                None for geometry that never moves.
+            made: the geometry.
+        """
         scene_graph, source = self.scene_graphs[kind], self._sources[kind]
         if frame is None:
             scene_graph.RegisterAnchoredGeometry(source, made)
@@ -213,3 +203,34 @@ def _group_geometries(
             key = kind, None if is_anchored else frame, group
             parts.setdefault(key, []).append((X_FG, rgb, surface))
     return parts
+
+
+def _make_instance(
+    name: str, group: str | int, members: Sequence[_Member]
+) -> GeometryInstance:
+    """Returns geometries merged into one mesh, ready to be registered.
+
+    Args:
+        name: name of the mesh, unique in its copy.
+        group: name of the look that the geometries share, or number of their
+            class, which is then also their render label.
+        members: pose in the mesh's frame (or in the world if it never moves),
+            colour and surface of each geometry.
+    """
+    merged, owners = merge_triangles(
+        [(k, X, surface) for k, (X, _, surface) in enumerate(members)]
+    )
+    rgb = np.array([rgb for _, rgb, _ in members])[owners]
+    corners = merged.p_GVset[merged.triangles]
+    # A mesh has coordinates in single precision, which are too coarse far from
+    # its origin. Whole metres are exact in single precision, too.
+    middle = np.round(corners.mean(axis=(0, 1)))
+    fronts = np.stack([X.rotation().matrix()[:, 1] for X, *_ in members])
+    mesh = make_mesh(corners, middle, rgb, group, owners, fronts)
+    made = GeometryInstance(RigidTransform(middle), mesh, name)
+    properties = PerceptionProperties()
+    is_look = isinstance(group, str)
+    label = RenderLabel.kDontCare if is_look else RenderLabel(group)
+    properties.AddProperty("label", "id", label)
+    made.set_perception_properties(properties)
+    return made
