@@ -279,11 +279,22 @@ class BagWriter:
         return stream
 
     def _continues(self, stream: PartFile, preamble: io.BytesIO) -> bool:
-        """Returns whether an existing file is the start of this recording."""
+        """Returns whether this recording can continue a file.
+
+        The result is True if the file is empty, because no run has begun it. A
+        file with content must have the fingerprint of this recording, and begin
+        with the same records.
+
+        Args:
+            stream: the file.
+            preamble: the records before the messages of this recording.
+        """
         if not stream.replaying:
             return True
         found = ""
         path = self._files.fingerprint
+        # The part file belongs to the interrupted run. The file with the final
+        # name may still belong to a finished recording that is being replaced.
         if part_path(path).is_file():
             path = part_path(path)
         if path.is_file():

@@ -11,14 +11,15 @@ from cns_drake.base.file_locks import open_plain
 
 
 class PartFile(io.BufferedRandom):
-    """A binary file that a process can resume by writing it again.
+    """A binary file that keeps what a run writes again, and replaces the rest.
 
     A process that resumes an interrupted file writes all bytes again from the
-    start of the file. As long as these bytes equal the bytes in the file,
-    nothing changes on the disk. At the first different byte, the file is cut
-    off, and all further bytes are written. The result is the same as if the
-    file had been empty. The part that both runs have in common is never lost,
-    and there is no second copy on the disk.
+    start of the file. While it replays, written bytes are only compared with
+    the file: equal bytes are kept. At the first difference, the rest of the
+    file is cut off, and from then on bytes are written as in any file.
+
+    The result is the same as if the file had been empty. The part that both
+    runs have in common is never lost, and there is no second copy on the disk.
 
     Only one process can write the file at a time. The file is locked until it
     is closed or its process ends in any way.
@@ -60,7 +61,18 @@ class PartFile(io.BufferedRandom):
         self.replaying = False
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
-        """Writes the next bytes."""
+        """Writes the next bytes, or keeps them if the file has the same.
+
+        While the file is being replayed, bytes that equal the file's next bytes
+        are not written. At the first difference, the rest of the file is cut
+        off, and replaying ends.
+
+        Args:
+            data: the next bytes.
+
+        Returns:
+            Number of bytes, as for any file.
+        """
         if self.replaying:
             start = self.tell()
             if self.read(len(data)) == data:
