@@ -92,8 +92,9 @@ class Table:
     """Rows under a header; numbers stay numbers until they are written.
 
     A missing value is written as an empty cell in CSV, and as a dash in other
-    formats. Truth values are written as 0 or 1. A table cannot contain a value
-    outside of its column's range, see `evaluation.results.ranges`.
+    formats. Truth values are written as 0 or 1. Each number is checked against
+    the range of its metric, which the heading of its column or group names; see
+    `evaluation.results.ranges`.
 
     Attributes:
         header: name of each column.
@@ -101,8 +102,11 @@ class Table:
             an empty cell.
         groups: headings above the columns, each with the number of columns that
             it spans. An empty heading is not written. Together, the headings
-            span all columns; without headings, the list is empty.
+            span all columns. By default there are no headings.
         caption: what the table shows.
+
+    Raises:
+        InputError: a cell is outside the range of the column's metric.
     """
 
     header: tuple[str, ...]
@@ -251,7 +255,12 @@ class Table:
 
 
 def _checked(name: str, value: object) -> object:
-    """Returns a cell of a column, checked by `evaluation.results.ranges`."""
+    """Returns a cell after a check that it is in the range of its metric.
+
+    Args:
+        name: heading that names the metric.
+        value: the cell.
+    """
     if isinstance(value, Cell):
         if value.value is None:
             return value
