@@ -149,14 +149,18 @@ class VoxelAccumulator:
         """
         self._voxel_size = voxel_size
         self._divisions = divisions
+        # Hash table of the occupied voxels; see `SLOT`.
         self._table = np.zeros(2 * _BATCH, dtype=SLOT)
+        # Number of slots in use: the occupied voxels.
         self._size = 0
-        # One bit for each part of a slot's voxel: whether it has a sample.
+        # One bit for each cell of a slot's voxel: whether it has a sample.
         num_bytes = (divisions**3 + 7) // 8
         self._sampled = np.zeros((len(self._table), num_bytes), dtype=np.uint8)
+        # The samples [m], with room for more; heights are above `Z_ORIGIN`.
         self._samples = np.empty((0, 3))
         self._num_samples = 0
         self._num_ignored = 0
+        # The x, y and z of a batch of points in the frame of their cloud [m].
         self._columns = np.zeros((3, _BATCH))
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
