@@ -36,9 +36,9 @@ from cns_drake.sensors.camera.config import CameraSection
 from cns_drake.sensors.imu.config import ImuSection
 from cns_drake.sensors.lidar.config import LidarSection, WeatherConfig
 from cns_drake.sensors.odometry.config import OdometrySection
-from cns_drake.studies.experiment import Experiment, MadeMap
-from cns_drake.studies.lost_structures import Losses
-from cns_drake.studies.sampled_drives import DrawnRoute, Fleet
+from cns_drake.studies.drives.lost_structures import Losses
+from cns_drake.studies.drives.sampled_drives import DrawnRoute, Fleet
+from cns_drake.studies.experiments.experiment import Experiment, MadeMap
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 from evaluation.methods.published_networks import NetworkConfig

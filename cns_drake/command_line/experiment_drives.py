@@ -29,7 +29,7 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     """
     from cns_drake.base.yaml_files import read_yaml
     from cns_drake.scenarios.scenario_files import write_scenarios
-    from cns_drake.studies.experiment_files import (
+    from cns_drake.studies.experiments.experiment_files import (
         load_experiment,
         shipped_experiments,
     )

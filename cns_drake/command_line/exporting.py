@@ -406,7 +406,7 @@ def _write_overlap_table(
 ) -> None:
     """Writes the overlaps between a database and a query drive."""
     with uninterrupted():
-        from cns_drake.studies import pair_export
+        from cns_drake.studies.exports import pair_export
 
     if len(drives) != 2:
         raise InputError(
@@ -449,7 +449,7 @@ def _write_training_data(
     """
     with uninterrupted():
         from cns_drake.scenarios.scenario_files import load_scenario
-        from cns_drake.studies import pair_export
+        from cns_drake.studies.exports import pair_export
 
     tested = [load_scenario(name) for name in held_out]
     taken = {one.name for one in tested}
@@ -485,8 +485,8 @@ def _write_truth(
     """
     with uninterrupted():
         from cns_drake.base.complete_files import check_new_folder
-        from cns_drake.studies.labelled_drive import open_labelled
-        from cns_drake.studies.map_truth import write_truth
+        from cns_drake.studies.ground_truth.labelled_drive import open_labelled
+        from cns_drake.studies.ground_truth.map_truth import write_truth
         from evaluation.map_update.labels import Label
 
     check_new_folder(output)

@@ -297,7 +297,7 @@ def generate(
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_files import load_scenario
         from cns_drake.scenarios.shipped import recordable_drives
-        from cns_drake.studies.recording import record_all
+        from cns_drake.studies.recordings.recording import record_all
 
     cluster = choose_cluster(jobs, scheduler)
     if not names and vary is None:

@@ -17,7 +17,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
 
 if TYPE_CHECKING:
-    from cns_drake.studies.experiment import Experiment
+    from cns_drake.studies.experiments.experiment import Experiment
 
 
 @commands.former_options({"--quick": "--no-recordings"})
@@ -52,7 +52,7 @@ def reproduce(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.studies import reproduction
+        from cns_drake.studies.recordings import reproduction
         from evaluation.command_line.suggestions import suggest_comparison
 
     cluster = choose_cluster(jobs, scheduler)
@@ -133,8 +133,8 @@ def study(
             do nothing else.
     """
     with uninterrupted():
-        from cns_drake.studies.experiment import named_programs
-        from cns_drake.studies.experiment_files import (
+        from cns_drake.studies.experiments.experiment import named_programs
+        from cns_drake.studies.experiments.experiment_files import (
             load_experiment,
             parse_override,
             shipped_experiments,
@@ -202,7 +202,9 @@ def _chosen_experiment(
         InputError: the experiment or an option cannot be used.
     """
     with uninterrupted():
-        from cns_drake.studies.experiment_files import load_experiment
+        from cns_drake.studies.experiments.experiment_files import (
+            load_experiment,
+        )
         from evaluation.study.chosen_methods import expanded_names
 
     experiment = load_experiment(name, overrides, quick=quick, on_note=note)

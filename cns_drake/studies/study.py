@@ -1,37 +1,47 @@
 """Makes and measures the pairs of drives of an experiment on maps."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.errors import InputError, errors_at
+from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.progress import doing
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies.conditions import Condition, conditions, levels_by_case
-from cns_drake.studies.distractors import distracting_drives
-from cns_drake.studies.experiment import FLEET, SESSIONS, Experiment
-from cns_drake.studies.experiment_maps import ExperimentMaps, MapPairs
-from cns_drake.studies.frozen_drives import (
+from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
+from cns_drake.studies.experiments.conditions import (
+    Condition,
+    conditions,
+    levels_by_case,
+)
+from cns_drake.studies.experiments.experiment import FLEET, SESSIONS, Experiment
+from cns_drake.studies.experiments.method_variants import method_variants
+from cns_drake.studies.experiments.protocol_fields import condition_protocol
+from cns_drake.studies.maps.experiment_maps import ExperimentMaps, MapPairs
+from cns_drake.studies.maps.made_maps import MadeMaps
+from cns_drake.studies.pairs.distractors import distracting_drives
+from cns_drake.studies.pairs.frozen_drives import (
     check_frozen,
     drives_fingerprint,
     frozen_drives,
 )
-from cns_drake.studies.made_maps import MadeMaps
-from cns_drake.studies.map_task import DrivenMapTask
-from cns_drake.studies.method_choices import choose_variants
-from cns_drake.studies.protocol_fields import condition_protocol
-from cns_drake.studies.recorded_conditions import recorded_conditions
-from cns_drake.studies.seen_task import SeenTask
-from cns_drake.studies.simulated_pairs import SimulatedPairs
-from cns_drake.studies.viewpoints import VIEWPOINTS, with_lidars_beside
+from cns_drake.studies.pairs.recorded_conditions import recorded_conditions
+from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.tasks.map_task import DrivenMapTask
+from cns_drake.studies.tasks.seen_task import SeenTask
+from evaluation.methods import optional_methods
 from evaluation.results.charts.kinds import check_chart
 from evaluation.results.keys import LEVEL
 from evaluation.results.page import write_page
 from evaluation.results.table import QUERIES, RESULTS
+from evaluation.study.chosen_methods import (
+    STANDARD,
+    MethodChoice,
+    choose_methods,
+)
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.extraction_jobs import ExtractionJobs
 from evaluation.study.map_drives import MapDrives
@@ -131,7 +141,7 @@ class Study:
         self._conditions = conditions(self.experiment)
         self._tasks = made_tasks(self._wanted_tasks(), TASKS, self.source)
         with errors_at(f"{self.source}: methods", "--method: "):
-            self._variants = choose_variants(self.experiment.methods)
+            self._variants = _choose_variants(self.experiment.methods)
         if self.experiment.frozen is not None:
             with errors_at(f"{self.source}: frozen"):
                 frozen_drives(self.experiment.frozen)
@@ -347,3 +357,41 @@ def _has_several(condition: Condition) -> bool:
         ):
             return True
     return False
+
+
+def _choose_variants(
+    wanted: Mapping[str, Mapping[str, Any]] | None,
+) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
+    """Returns the chosen methods by key, each with columns of its settings.
+
+    Args:
+        wanted: maps a method's name or Python file to the method's settings;
+            None for all standard methods.
+
+    Raises:
+        InputError: a method is unknown, or a setting is wrong.
+    """
+    files = [Path(one) for one in wanted or () if one.endswith(".py")]
+    known = {one.name: one for one in choose_methods([STANDARD, *files])}
+    if wanted is None:
+        wanted = {name: {} for name in known}
+    known |= {name: MethodChoice(name) for name in optional_methods()}
+    found = {}
+    for name, settings, given in method_variants(wanted):
+        place = f"methods.{name}."
+        if name.endswith(".py"):
+            path = Path(name).absolute()
+            name = next(n for n, one in known.items() if one.file == path)
+        if name not in known:
+            raise InputError(
+                f"no method {name!r} (known: {', '.join(known)})"
+                f"{did_you_mean(name, known)}"
+            )
+        choice = replace(known[name], settings=settings)
+        choice.make()  # A wrong setting is found before anything slow.
+        columns = {
+            f"methods.{name}.{column.removeprefix(place)}": one
+            for column, one in given.items()
+        }
+        found[choice.key] = choice, columns
+    return found

@@ -9,14 +9,15 @@ import pytest
 import yaml
 
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies import changed_drives, experiment, side_fields
-from cns_drake.studies.conditions import conditions
-from cns_drake.studies.experiment import Experiment
-from cns_drake.studies.experiment_files import (
+from cns_drake.studies.drives import changed_drives, side_fields
+from cns_drake.studies.drives.lost_structures import Losses
+from cns_drake.studies.experiments import experiment
+from cns_drake.studies.experiments.conditions import conditions
+from cns_drake.studies.experiments.experiment import Experiment
+from cns_drake.studies.experiments.experiment_files import (
     load_experiment,
     shipped_experiments,
 )
-from cns_drake.studies.lost_structures import Losses
 from cns_drake.studies.study import TASKS
 from evaluation.localisation import results, tracking
 from evaluation.recognition import faults, place_numbers, place_outcome

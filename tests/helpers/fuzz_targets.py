@@ -37,8 +37,8 @@ from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scan_files import save_scan
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.conditions import conditions
-from cns_drake.studies.experiment_files import load_experiment
+from cns_drake.studies.experiments.conditions import conditions
+from cns_drake.studies.experiments.experiment_files import load_experiment
 from cns_drake.studies.study import Study
 from evaluation import drives
 from evaluation.clouds.cloud_files import read_cloud

@@ -1,7 +1,7 @@
 """Two drives past walls, as sessions with labels by rays."""
 
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.labelled_drive import LabelledDrive
+from cns_drake.studies.ground_truth.labelled_drive import LabelledDrive
 from helpers.small_map import box_visual, world_text
 from helpers.tiny_drive import tiny_scenario
 

@@ -37,7 +37,7 @@ except InputError:
 STUDY = """
 from cns_drake import InputError
 try:
-    import cns_drake.studies.reproduction
+    import cns_drake.studies.recordings.reproduction
 except InputError as error:
     print(error)
 """

@@ -12,7 +12,10 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies.exact_overlap import VisibleSurfaces, sights_of
+from cns_drake.studies.ground_truth.exact_overlap import (
+    VisibleSurfaces,
+    sights_of,
+)
 from cns_drake.studies.training.sampled_city import SampledCity
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cloud_at

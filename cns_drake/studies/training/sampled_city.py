@@ -22,10 +22,10 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import STAGES_NAME, MapFolder
-from cns_drake.studies.redrawing import marked_yaml, redrawn_inputs
+from cns_drake.studies.drives.viewpoints import with_lidars_moved
+from cns_drake.studies.maps.redrawing import marked_yaml, redrawn_inputs
 from cns_drake.studies.training.sampled_stages import STAGES, draw_stages
 from cns_drake.studies.training.sampled_streets import draw_streets
-from cns_drake.studies.viewpoints import with_lidars_moved
 
 # First seed, far from the seeds of all experiments and tests.
 _FIRST_SEED = 500_000

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.studies.turned_inputs import turned_content
+from cns_drake.studies.maps.turned_inputs import turned_content
 
 
 def draw_streets(rng: np.random.Generator) -> dict[str, Any]:

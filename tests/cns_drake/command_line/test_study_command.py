@@ -7,7 +7,7 @@ import pytest
 
 from cns_drake.__main__ import main
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiment_files import (
+from cns_drake.studies.experiments.experiment_files import (
     load_experiment,
     shipped_experiments,
 )

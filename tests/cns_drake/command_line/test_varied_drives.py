@@ -9,7 +9,7 @@ import yaml
 
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
-from cns_drake.studies import recording
+from cns_drake.studies.recordings import recording
 from evaluation.change.drive_maps import read_map
 from evaluation.drives import open_drive
 from evaluation.methods import make_method

@@ -7,7 +7,7 @@ import typer
 from cns_drake.command_line import cli as simulator
 from cns_drake.command_line import exporting
 from cns_drake.command_line.exporting import Format
-from cns_drake.studies.experiment_files import shipped_experiments
+from cns_drake.studies.experiments.experiment_files import shipped_experiments
 from evaluation.command_line import cli as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}

@@ -16,7 +16,7 @@ from cns_drake.export.exporting import export_drive
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.scenario_files import check_files, load_scenario
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.recording import is_recorded
+from cns_drake.studies.recordings.recording import is_recorded
 
 KALIBR = {
     "accelerometer_noise_density": 0.01,

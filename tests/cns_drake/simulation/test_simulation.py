@@ -18,7 +18,7 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.simulation import simulation, stage_loading
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.stage_loading import load_stage
-from cns_drake.studies.recording import is_recorded, record_all
+from cns_drake.studies.recordings.recording import is_recorded, record_all
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 

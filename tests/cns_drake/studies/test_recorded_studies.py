@@ -11,7 +11,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiment import Experiment
+from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.study import run_study
 from evaluation.change.drive_maps import read_map
 from evaluation.drives import open_drive

@@ -16,10 +16,10 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
-from cns_drake.studies import map_step
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiment import Experiment
-from cns_drake.studies.experiment_files import load_experiment
+from cns_drake.studies.experiments.experiment import Experiment
+from cns_drake.studies.experiments.experiment_files import load_experiment
+from cns_drake.studies.maps import map_step
 from cns_drake.studies.study import Study, run_study
 from evaluation.change.drive_maps import DriveMap
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
@@ -478,7 +478,7 @@ def test_pairs_of_maps_begin_with_the_first_drive(town, tmp_path):
 
 @pytest.mark.slow
 def test_maps_are_labelled(town, tmp_path, jobs_done, monkeypatch):
-    from cns_drake.studies import map_task as update
+    from cns_drake.studies.tasks import map_task as update
 
     monkeypatch.setattr(update, "find_spec", lambda name: None)
     notes = []

@@ -523,8 +523,8 @@ def test_commands_that_need_no_cluster_do_not_load_it():
     script = (
         "import sys\n"
         "import cns_drake.command_line.cli\n"
-        "import cns_drake.studies.recording\n"
-        "import cns_drake.studies.reproduction\n"
+        "import cns_drake.studies.recordings.recording\n"
+        "import cns_drake.studies.recordings.reproduction\n"
         "import evaluation.command_line.cli, cns_drake.base.jobs.running\n"
         "assert not {'dask', 'distributed'} & sys.modules.keys()\n"
     )

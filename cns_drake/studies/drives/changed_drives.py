@@ -1,0 +1,324 @@
+"""Drives of a map with the changes that a condition of an experiment makes."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cns_drake.base.errors import InputError, errors_at, validated
+from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.roads.random_route import draw_route
+from cns_drake.roads.route import Route
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import check_files
+from cns_drake.scene.map_folder import MapFolder
+from cns_drake.scene.world import load_world
+from cns_drake.sensors.lidar.config import WeatherConfig
+from cns_drake.simulation.scenario_traffic import load_ways
+from cns_drake.studies.drives.lost_structures import Losses, lost_structures
+from cns_drake.studies.drives.named_stages import find_stage
+from cns_drake.studies.drives.sampled_drives import DrawnRoute
+from cns_drake.studies.drives.side_fields import QUERY_FIELDS
+from cns_drake.studies.drives.viewpoints import (
+    checked_viewpoint,
+    with_lidars_beside,
+    with_lidars_moved,
+)
+from cns_drake.studies.experiments.nested_fields import Changes
+from cns_drake.traffic.vehicle_placement import room_for_vehicles
+from evaluation.results.keys import LAST, OWN
+
+# Fields of a drive that do not change the drive itself.
+_UNUSED_FIELDS = (*QUERY_FIELDS, "distractors", "years", "rates")
+# Sections whose random numbers depend on the seed of the condition.
+_SEEDED = ("transient", "traffic", "ride", "driver")
+_RETURNS = ("ideal", "calibrated")
+# Greatest share of the roads' room for traffic: the car needs some, too.
+_MOST_ROOM = 0.5
+# The same for a car that follows others, because then all wait for each other.
+_FOLLOWED_ROOM = 0.25
+
+# A function that takes a drive, years, rates of change and a seed. It returns
+# folder and stage of the drive's map, aged by these years.
+Age = Callable[[Scenario, int, Any, int], tuple[str, str]]
+# A function that takes a drive and the number of a redraw. It returns folder
+# and stage of a map with another city along the same streets.
+Redraw = Callable[[Scenario, int], tuple[str, str]]
+
+
+class Ageing(NamedTuple):
+    """How the city of a drive ages: number of years, and rates of change."""
+
+    years: int
+    rates: Any
+
+
+class DriveChanger:
+    """Changes the drives of a map.
+
+    The fields of a drive are the fields of its scenario, and further fields
+    such as `viewpoint` or `missing`. This class turns the further fields into
+    fields of a scenario.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        last_stage: str,
+        *,
+        same_route: bool,
+        age: Age,
+        redraw: Redraw,
+        on_note: Callable[[str], None],
+    ) -> None:
+        """Prepares changes.
+
+        Args:
+            source: file of the experiment, for errors.
+            last_stage: the stage that ages, and that the word `last` means.
+            same_route: whether the drives of the database follow the query's
+                route, with LiDARs beside the LiDARs of the query.
+            age: function that returns an aged map.
+            redraw: function that returns a redrawn map.
+            on_note: is called with a note on everything that is left out.
+        """
+        self._source = source
+        self._last_stage = last_stage
+        self._same_route = same_route
+        self._age = age
+        self._redraw = redraw
+        self._on_note = on_note
+        # Worlds, with what they lack, that were loaded without an error.
+        self._loaded: set[tuple[Path, tuple[str, ...]]] = set()
+        # File of roads, length [m], seed -> a route that its map can drive;
+        # many drives of a fleet share one.
+        self._drawn: dict[tuple[Path, float, int], Route] = {}
+        self._networks: dict[Path, RoadNetwork] = {}
+
+    def changed(
+        self,
+        unchanged: Scenario,
+        place: str,
+        changes: Changes,
+        ageing: Ageing,
+        seed: int,
+    ) -> Scenario:
+        """Returns a drive with changes.
+
+        Args:
+            unchanged: the drive.
+            place: path of the drive in the experiment's file: `query`,
+                `database` or, for one of several drives, a path such as
+                `database.sessions.2`.
+            changes: fields of the drive.
+            ageing: how the city of the drive ages.
+            seed: seed of the random choices.
+
+        Raises:
+            MissingError: the map lacks a stage.
+            InputError: a field is unknown or not usable.
+        """
+        left = {n: one for n, one in changes.items() if n not in _UNUSED_FIELDS}
+        # Each step takes its own fields out of `left`.
+        drive = self._with_sensors(unchanged, place, left, seed)
+        drive = self._at_viewpoint(drive, place, left)
+        drive = self._at_stage(drive, place, left)
+        drive = self._in_aged_city(drive, place, left, ageing, seed)
+        drive = self._in_redrawn_city(drive, place, left)
+        drive = self._without_lost(drive, place, left, seed)
+        drive = self._on_drawn_route(drive, place, left)
+        for name in _SEEDED:
+            if isinstance(left.get(name), dict):
+                left[name] = {"seed": seed, **left[name]}
+        self._fit_traffic(drive, unchanged.folder, left)
+        return self._with_scenario_fields(drive, place, left)
+
+    def _with_sensors(
+        self, drive: Scenario, place: str, left: dict[str, Any], seed: int
+    ) -> Scenario:
+        """Returns a drive with another LiDAR, or another model of returns."""
+        if "lidar" in left:
+            with errors_at(f"{self._source}: {place}.lidar", "--lidar: "):
+                drive = drive.with_lidar_preset(left.pop("lidar"))
+        if "returns" not in left:
+            return drive
+        returns, weather = left.pop("returns"), left.pop("weather", None)
+        if returns not in _RETURNS:
+            raise InputError(
+                f"{self._source}: {place}.returns: {returns!r} is neither"
+                f" {' nor '.join(_RETURNS)}"
+            )
+        if weather is not None:
+            where = f"{self._source}: {place}.weather"
+            weather = validated(WeatherConfig, weather, where)
+            if returns != "calibrated" and weather != WeatherConfig():
+                raise InputError(f"{where}: no effect on {returns} returns")
+        left.setdefault("seed", seed)
+        return drive.with_returns(returns, weather)
+
+    def _at_viewpoint(
+        self, drive: Scenario, place: str, left: dict[str, Any]
+    ) -> Scenario:
+        lateral = left.pop("lateral", 0.0)
+        viewpoint = left.pop("viewpoint", None)
+        if lateral and viewpoint is not None:
+            raise InputError(
+                f"{self._source}: {place}.lateral: give it or a viewpoint"
+            )
+        if lateral:
+            viewpoint = (lateral, 0.0)
+        is_beside = place != "query" and self._same_route
+        if viewpoint is None:
+            if not is_beside:
+                return drive
+            viewpoint = "near"
+        offset = checked_viewpoint(
+            viewpoint, f"{self._source}: {place}.viewpoint"
+        )
+        if is_beside:
+            return with_lidars_beside(drive, *offset)
+        return with_lidars_moved(drive, 0.0, *offset)
+
+    def _at_stage(
+        self, drive: Scenario, place: str, left: dict[str, Any]
+    ) -> Scenario:
+        with errors_at(f"{self._source}: {place}.stage"):
+            stage = find_stage(left.pop("stage", OWN), drive, self._last_stage)
+        return drive if stage == drive.stage else drive.replaced(stage=stage)
+
+    def _in_aged_city(
+        self,
+        drive: Scenario,
+        place: str,
+        left: Changes,
+        ageing: Ageing,
+        seed: int,
+    ) -> Scenario:
+        if not ageing.years:
+            return drive
+        if drive.stage != self._last_stage:
+            raise InputError(
+                f"{self._source}: years: stage {LAST} ages, not the stage"
+                f" {drive.stage} of the {place}"
+            )
+        older = "database" if place == "query" else "query"
+        if "redraw" in left:
+            raise InputError(
+                f"{self._source}: {place}.redraw: a city drawn anew does not"
+                f" age by {older}.years; give one of them"
+            )
+        return self._moved(older, drive, self._age, *ageing, seed)
+
+    def _in_redrawn_city(
+        self, drive: Scenario, place: str, left: dict[str, Any]
+    ) -> Scenario:
+        if "redraw" not in left:
+            return drive
+        return self._moved(place, drive, self._redraw, left.pop("redraw"))
+
+    def _moved(
+        self,
+        place: str,
+        drive: Scenario,
+        make: Callable[..., tuple[str, str]],
+        *arguments: Any,
+    ) -> Scenario:
+        """Returns a drive moved to the map and stage that `make` returns."""
+        try:
+            folder, stage = make(drive, *arguments)
+        except InputError as error:
+            # The error begins with a field.
+            raise InputError(f"{self._source}: {place}.{error}") from None
+        return drive.replaced(map=folder, stage=stage)
+
+    def _without_lost(
+        self, drive: Scenario, place: str, left: dict[str, Any], seed: int
+    ) -> Scenario:
+        """Returns a drive through a city that has lost structures."""
+        lost = {n: left.pop(n) for n in Losses.model_fields if n in left}
+        if not lost:
+            return drive
+        where = f"{self._source}: {place}"
+        losses = validated(Losses, lost, where)
+        names = lost_structures(drive, losses, seed, where)
+        return drive.replaced(without=names)
+
+    def _on_drawn_route(
+        self, drive: Scenario, place: str, left: dict[str, Any]
+    ) -> Scenario:
+        if not isinstance(left.get("route"), Mapping):
+            return drive
+        where = f"{self._source}: {place}.route"
+        drawn = validated(DrawnRoute, left.pop("route"), where)
+        wanted = drive.folder.roads, drawn.length, drawn.seed
+        known = self._drawn.get(wanted)
+        route = known or self._draw_route(*wanted)
+        drive = drive.replaced(route=route, waypoints=None)
+        if known is None:
+            self._check_map(place, drive, {"route": route})
+            self._drawn[wanted] = route
+        return drive
+
+    def _draw_route(self, roads: Path, length: float, seed: int) -> Route:
+        if roads not in self._networks:
+            self._networks[roads] = load_road_network(roads)
+        rng = np.random.default_rng(seed)
+        return draw_route(self._networks[roads], length, rng)
+
+    def _fit_traffic(
+        self, drive: Scenario, folder: MapFolder, left: dict[str, Any]
+    ) -> None:
+        """Reduces traffic to what roads hold; drops impossible lane changes.
+
+        Args:
+            drive: the drive so far.
+            folder: the map of the unchanged drive, whose roads are the same.
+            left: fields of the drive, which are changed.
+        """
+        driver, traffic = (
+            one if isinstance(one := left.get(name), Mapping) else {}
+            for name in ("driver", "traffic")
+        )
+        if driver.get("lane_changes") and drive.waypoints:
+            self._on_note("waypoints have no lanes to change")
+            left["driver"] = {**driver, "lane_changes": 0.0}
+        if not traffic:
+            return
+        share = _FOLLOWED_ROOM if driver.get("follows") else _MOST_ROOM
+        most = int(share * room_for_vehicles(load_ways(folder).graph))
+        for name in ("vehicles", "walkers"):
+            if isinstance(given := traffic.get(name), int) and given > most:
+                self._on_note(
+                    f"{given} {name} do not fit the roads; {most} move"
+                )
+                traffic = left["traffic"] = {**traffic, name: most}
+
+    def _with_scenario_fields(
+        self, drive: Scenario, place: str, left: Changes
+    ) -> Scenario:
+        if left:
+            drive = drive.with_fields(left, f"{self._source}: {place}")
+            self._check_map(place, drive, left)
+        for name in set(_SEEDED) & set(left):
+            # Sections without random numbers get no seed, so that equal ones
+            # stay equal.
+            plain = type(getattr(drive, name))()
+            if getattr(drive, name).replaced(seed=plain.seed) == plain:
+                drive = drive.replaced(**{name: plain})
+        return drive
+
+    def _check_map(self, place: str, drive: Scenario, given: Changes) -> None:
+        """Checks that the given fields of a drive fit its map."""
+        where = f"{self._source}: {place}"
+        with errors_at(where, f"{drive.source}: "):
+            check_files(drive)
+            # Other sections seldom fail, and a plan takes time.
+            if set(given) - {*_SEEDED, "seed"}:
+                count_frames(drive, plan_drive(drive))
+        world = drive.world_file, drive.without
+        if "without" in given and world not in self._loaded:
+            with errors_at(f"{where}.without"):
+                load_world(world[0], without=drive.without)
+            self._loaded.add(world)

@@ -1,0 +1,1 @@
+"""Experiments: fields of their files, factors, conditions; shipped files."""

@@ -1,0 +1,279 @@
+"""Conditions: the combinations of an experiment's factors and cases."""
+
+from collections.abc import Iterable, Iterator, Mapping, Set
+from dataclasses import dataclass
+import itertools
+import math
+from typing import Any, NamedTuple
+
+from cns_drake.studies.experiments.experiment import SIDES, Case, Experiment
+from cns_drake.studies.experiments.factors import (
+    FactorValues,
+    leaves,
+    split_values,
+    table_value,
+)
+from cns_drake.studies.experiments.nested_fields import (
+    Changes,
+    merged,
+    nested,
+    set_field,
+)
+from evaluation.results.keys import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
+
+# Places in the file of an experiment where a list of values is a factor.
+_FACTORED = (*SIDES, "protocol")
+_MOST_CONDITIONS = 20_000
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One condition of an experiment: a value for each factor.
+
+    Attributes:
+        factors: name of each factor -> its value. Each factor is a column of
+            the tables.
+        changes: fields that the condition sets, under `database`, `query`,
+            `both` or `protocol`.
+        causes: the causes of change that are combined. Each cause is a list of
+            alternatives: the fields for the wanted level of change, followed by
+            the fields for each lower level. The first alternative that is
+            possible on a map is used.
+        is_baseline: whether all other conditions are compared with this
+            condition.
+    """
+
+    factors: Changes
+    changes: Mapping[str, Changes]
+    causes: tuple[tuple[Mapping[str, Changes], ...], ...] = ()
+    is_baseline: bool = False
+
+
+class _CaseLevel(NamedTuple):
+    """A case at one of its levels; `causes` as in `Condition`."""
+
+    name: str
+    level: int
+    causes: tuple[tuple[Case, ...], ...]
+
+
+def conditions(experiment: Experiment) -> list[Condition]:
+    """Returns the conditions of an experiment, the baseline first.
+
+    Raises:
+        ValueError: a factor has no values or the same value twice, the baseline
+            names an unknown factor or value, or there are too many conditions.
+    """
+    fixed, factors = _fields_and_factors(experiment)
+    baseline = _baseline_values(experiment.baseline, factors)
+    cases = list(_case_levels(experiment))
+    _check_paths_differ(factors, experiment.cases)
+    number = _num_cells(experiment.design, factors) * len(cases)
+    if number > _MOST_CONDITIONS:
+        raise ValueError(f"{number} conditions, more than {_MOST_CONDITIONS}")
+    cells = _cells(experiment.design, factors, baseline)
+    found = []
+    for cell, case in itertools.product(cells, cases):
+        changes: dict[str, Any] = fixed
+        for path, value in cell.items():
+            changes = merged(changes, nested(path, value))
+        named = (
+            {CAUSE: case.name, LEVEL: case.level} if experiment.cases else {}
+        )
+        # Each protocol has a baseline of its own.
+        is_baseline = case.name == NO_CAUSE and all(
+            value == baseline[path]
+            for path, value in cell.items()
+            if not path.startswith("protocol.")
+        )
+        found.append(
+            Condition(
+                {**named, **{n: table_value(one) for n, one in cell.items()}},
+                changes,
+                case.causes,
+                is_baseline,
+            )
+        )
+    return found
+
+
+def _fields_and_factors(
+    experiment: Experiment,
+) -> tuple[dict[str, Any], dict[str, list[Any]]]:
+    """Returns the fixed fields, and each factor's values by factor path."""
+    fixed: dict[str, Any] = {}
+    factors: dict[str, list[Any]] = {}
+    for side in _FACTORED:
+        single, varied = split_values(getattr(experiment, side), (side,))
+        for path, value in single.items():
+            if path != FROZEN_REDRAW:
+                set_field(fixed, path, value)
+        factors |= {n: some for n, some in varied.items() if n != FROZEN_REDRAW}
+    return fixed, factors
+
+
+def _baseline_values(
+    fields: Changes, factors: Mapping[str, list[Any]]
+) -> dict[str, Any]:
+    """Returns the baseline's value of each factor; `fields` gives some."""
+    given = dict(leaves(fields, ()))
+    found: dict[str, Any] = {}
+    for path, values in factors.items():
+        found[path] = given.pop(path, values[0])
+        if found[path] not in values:
+            raise ValueError(
+                f"baseline.{path}: {found[path]!r} is no value of it"
+            )
+    if given:
+        raise ValueError(f"baseline.{next(iter(given))}: this is no factor")
+    return found
+
+
+def _check_paths_differ(
+    factors: Mapping[str, list[Any]], cases: Mapping[str, Any]
+) -> None:
+    """Checks that no field is changed by two factors, or by factor and case."""
+    taken = _changed_paths("", factors.items(), set())
+    for name, case in cases.items():
+        if isinstance(case, dict):
+            _changed_paths(f"cases.{name}.", leaves(case, ()), taken)
+
+
+def _changed_paths(
+    place: str, fields: Iterable[tuple[str, Any]], taken: Set[str]
+) -> set[str]:
+    """Returns the taken paths, together with the paths that fields change.
+
+    Args:
+        place: the beginning of the fields' paths, for the error message.
+        fields: path and value or values of each field.
+        taken: paths that these fields must not change.
+
+    Raises:
+        ValueError: a path is taken.
+    """
+    found = set(taken)
+    for path, values in fields:
+        some = values if isinstance(values, list) else [values]
+        # A mapping as a value changes several fields.
+        paths = {leaf for one in some for leaf, _ in leaves({path: one}, ())}
+        if paths & found:
+            path = min(paths & found)
+            raise ValueError(f"{place}{path}: another factor changes it, too")
+        found |= paths
+    return found
+
+
+def _num_cells(design: str, factors: Mapping[str, list[Any]]) -> int:
+    """Returns the length of `_cells`, which can be too long to be made."""
+    if design == "product":
+        return math.prod(map(len, factors.values()))
+    return 1 + sum(len(values) - 1 for values in factors.values())
+
+
+def _cells(
+    design: str,
+    factors: Mapping[str, list[Any]],
+    baseline: Mapping[str, Any],
+) -> list[dict[str, Any]]:
+    """Returns the values of the factors in each condition without cases.
+
+    The baseline is the first.
+    """
+    if design == "product":
+        cells = [
+            dict(zip(factors, some, strict=True))
+            for some in itertools.product(*factors.values())
+        ]
+        return sorted(cells, key=lambda cell: cell != baseline)
+    return [
+        dict(baseline),
+        *(
+            {**baseline, path: one}
+            for path, values in factors.items()
+            for one in values
+            if one != baseline[path]
+        ),
+    ]
+
+
+def _case_levels(experiment: Experiment) -> Iterator[_CaseLevel]:
+    """Yields all cases at all levels to measure; the case `none` is first."""
+    yield _CaseLevel(NO_CAUSE, 0, ())
+    if experiment.levels and not experiment.cases:
+        raise ValueError("levels: there are no cases")
+    numbers = levels_by_case(experiment)
+    most = max(numbers.values(), default=0)
+    if experiment.levels and max(experiment.levels) > most:
+        raise ValueError(
+            f"levels: no case has level {max(experiment.levels)}; the greatest"
+            f" is {most}"
+        )
+    for name, most in numbers.items():
+        members = _member_fields(experiment, name)
+        lengths = [_levels_of_case(one, f"cases.{name}") for one in members]
+        wanted = experiment.levels or range(1, most + 1)
+        for level in sorted({min(level, most) for level in wanted}):
+            # Only a combined case can take a lower level of a member.
+            least = level if len(members) == 1 else 1
+            yield _CaseLevel(
+                name,
+                level,
+                tuple(
+                    tuple(
+                        _at_level(one, k)
+                        for k in range(level, least - 1, -1)
+                        if k <= length
+                    )
+                    for one, length in zip(members, lengths, strict=True)
+                ),
+            )
+
+
+def levels_by_case(experiment: Experiment) -> dict[str, int]:
+    """Returns the number of levels of each case, by the case's name.
+
+    Raises:
+        ValueError: a case has the name of the condition without a change, or
+            combines something that is not a case.
+    """
+    found = {}
+    for name in experiment.cases:
+        if name == NO_CAUSE:
+            raise ValueError(f"cases.{name}: the name of what has no cause")
+        members = _member_fields(experiment, name)
+        found[name] = max(
+            _levels_of_case(one, f"cases.{name}") for one in members
+        )
+    return found
+
+
+def _member_fields(experiment: Experiment, name: str) -> list[Case]:
+    """Returns the fields of a case, or of each case that it combines."""
+    case = experiment.cases[name]
+    found = []
+    for one in case if isinstance(case, tuple) else [name]:
+        member = experiment.cases.get(one)
+        if not isinstance(member, dict):
+            raise ValueError(f"cases.{name}: {one} is no case with fields")
+        found.append(member)
+    return found
+
+
+def _levels_of_case(case: Case, place: str) -> int:
+    values = (value for _, value in leaves(case, (place,)))
+    lists = (some for some in values if isinstance(some, FactorValues))
+    return max(map(len, lists), default=1)
+
+
+def _at_level(case: Case, level: int) -> Case:
+    """Returns the fields of a case at a level.
+
+    A field with fewer values than `level` has its last value.
+    """
+    fields: Any = {}
+    for path, value in leaves(case, ()):
+        if isinstance(value, FactorValues):
+            value = value[min(level, len(value)) - 1]
+        set_field(fields, path, value)
+    return fields

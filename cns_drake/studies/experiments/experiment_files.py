@@ -1,0 +1,159 @@
+"""Reads experiments from files, with changes to single fields."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from cns_drake.base.errors import (
+    InputError,
+    did_you_mean,
+    errors_at,
+    validated,
+    value_errors,
+)
+from cns_drake.base.yaml_files import parse_yaml, read_yaml
+from cns_drake.studies.experiments.conditions import conditions
+from cns_drake.studies.experiments.experiment import Experiment, in_long_form
+from cns_drake.studies.experiments.method_variants import method_variants
+from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
+from evaluation.results.keys import FROZEN_REDRAW
+
+_FOLDER = Path(__file__).parent
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """Returns name -> file of the experiments in this package."""
+    return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
+
+
+def load_experiment(
+    name_or_file: str | Path,
+    overrides: Iterable[str | tuple[str, Any]] = (),
+    *,
+    quick: bool = False,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Experiment:
+    """Reads an experiment.
+
+    Args:
+        name_or_file: a shipped experiment by name, or a file.
+        overrides: fields to change. Each is a text `FIELD=VALUE`, or a pair of
+            a top-level field and its value. In a text, VALUE is YAML and dots
+            separate nested fields, as in `database.years=[0, 5]`.
+        quick: whether the fields in the section `quick` of the experiment
+            replace its other fields.
+        on_note: is called with a note on each word of an earlier version.
+
+    Raises:
+        InputError: there is no such experiment, or a field is unknown or not
+            usable.
+    """
+    path = _experiment_file(name_or_file)
+    values = read_yaml(path)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a mapping of an experiment's fields")
+    values = in_long_form({"name": path.stem, **values})
+    if quick:
+        if not isinstance(values.get("quick"), dict):
+            raise InputError(
+                f"{path}: quick: missing, or no mapping; --quick needs this"
+                " section, with the fields to replace"
+            )
+        values = _chosen_anew(values, values["quick"])
+    for one in overrides:
+        values = _overridden(values, one)
+    values = _in_words_of_now(values, f"{path}: ", on_note)
+    experiment = validated(Experiment, values, path)
+    with value_errors(path):
+        conditions(experiment)
+        method_variants(experiment.methods or {})
+    if not quick and experiment.quick:
+        with errors_at(f"{path}: quick", f"{path}: "):
+            load_experiment(name_or_file, overrides, quick=True)
+    return experiment
+
+
+def _experiment_file(name_or_file: str | Path) -> Path:
+    shipped = shipped_experiments()
+    path = shipped.get(str(name_or_file), Path(name_or_file))
+    if not path.is_file():
+        raise InputError(
+            f"{name_or_file}: neither an experiment of this package "
+            f"({', '.join(shipped)}) nor a file"
+            f"{did_you_mean(name_or_file, shipped)}"
+        )
+    return path
+
+
+def _chosen_anew(values: Changes, changes: Changes) -> dict[str, Any]:
+    """Returns `merged` fields, with tasks and methods replaced as a whole."""
+    chosen = {n: changes[n] for n in ("tasks", "methods") if n in changes}
+    return {**merged(values, changes), **chosen}
+
+
+def _overridden(
+    values: Changes, override: str | tuple[str, Any]
+) -> dict[str, Any]:
+    """Returns fields of an experiment with an override."""
+    if not isinstance(override, str):
+        return {**values, **dict([override])}
+    fields = parse_override(override)
+    if "." not in override.partition("=")[0]:
+        return _chosen_anew(values, fields)
+    (first,) = fields
+    if first not in Experiment.model_fields:
+        return _with_method_setting(values, override)
+    return merged(values, fields)
+
+
+def parse_override(text: str) -> dict[str, Any]:
+    """Returns a text `FIELD=VALUE` as nested fields of an experiment.
+
+    Raises:
+        InputError: the text has another form, or VALUE is not YAML.
+    """
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InputError(f"--set: {text!r} is not FIELD=VALUE")
+    with value_errors(f"--set: {name}"):
+        parsed = parse_yaml(value)
+    return nested(name, parsed)
+
+
+def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
+    """Returns an experiment's fields, changed by METHOD.SETTING=VALUE.
+
+    If METHOD is not the name of a method, it becomes an unknown field.
+    """
+    from evaluation.methods import known_methods, shipped_methods
+
+    fields = parse_override(override)
+    methods = values.get("methods") or {one: {} for one in shipped_methods()}
+    name, _, value = override.partition("=")
+    method, _, setting = name.partition(".")
+    if method not in (*methods, *known_methods()):
+        return merged(values, fields)
+    if "," in value and not value.lstrip().startswith("["):
+        # One list, as on the command lines without factors.
+        fields = {method: nested(setting, [value.split(",")])}
+    return merged({**values, "methods": methods}, {"methods": fields})
+
+
+def _in_words_of_now(
+    values: dict[str, Any], place: str, on_note: Callable[[str], None]
+) -> dict[str, Any]:
+    """Returns fields in which words of earlier versions are replaced.
+
+    The field `both.fresh` is now `both.redraw.frozen`.
+    """
+    quick = values.get("quick")
+    if isinstance(quick, dict):
+        inner = _in_words_of_now(quick, f"{place}quick.", on_note)
+        values = {**values, "quick": inner}
+    both = values.get("both")
+    if not (isinstance(both, dict) and "fresh" in both):
+        return values
+    on_note(f"{place}both.fresh: this field is now {FROZEN_REDRAW}")
+    number = {"redraw": {"frozen": both["fresh"]}}
+    left = {name: one for name, one in both.items() if name != "fresh"}
+    return {**values, "both": merged(left, number)}

@@ -1,0 +1,1 @@
+"""Writes data sets of simulated drives, from which networks can learn."""

@@ -1,0 +1,1 @@
+"""Finds an experiment's maps, and makes aged, redrawn and imported maps."""

@@ -1,0 +1,203 @@
+"""Frozen redraws: redrawn cities that stay the same in all releases.
+
+A frozen redraw is a redraw of a shipped map. No method was developed with the
+help of a frozen redraw. A frozen redraw also has the map's stages, and the
+map's drives with realistic drivers. Some frozen redraws are rotated as a whole,
+so that their streets are not parallel to the axes of the world.
+`worlds/redraws.csv` contains the seeds and rotations, which were chosen at
+random before any method ran.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.city.generation.city_structures import make_city
+from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
+from cns_drake.scene.map_folder import MapFolder
+from cns_drake.studies.maps.map_step import make_maps
+from cns_drake.studies.maps.redrawing import (
+    RedrawCity,
+    marked_yaml,
+    redrawn_inputs,
+)
+from cns_drake.studies.maps.turned_inputs import turned_bounds, turned_content
+from evaluation.results.keys import FROZEN_REDRAW
+
+_COLUMNS = ("map", "number", "seed", "turn_deg")
+# The driver, frozen with the seeds.
+_DRIVER = {"wander": 0.35, "lane_changes": 6.0, "follows": True}
+
+
+@dataclass(frozen=True)
+class FrozenRedraw:
+    """A redraw of a shipped map that stays the same in all releases.
+
+    Attributes:
+        map_name: name of the shipped map.
+        number: number of the redraw, from 1.
+        seed: seed of the redraw's city.
+        turn_deg: angle by which the city is rotated about the world's origin
+            [deg].
+    """
+
+    map_name: str
+    number: int
+    seed: int
+    turn_deg: float
+
+
+def frozen_redraws() -> list[FrozenRedraw]:
+    """Returns the frozen redraws of shipped maps in `worlds/redraws.csv`."""
+    rows = read_records(worlds_folder() / "redraws.csv", _COLUMNS)
+    return [
+        FrozenRedraw(
+            row["map"],
+            int(row["number"]),
+            int(row["seed"]),
+            float(row["turn_deg"]),
+        )
+        for _, row in rows
+    ]
+
+
+def redraw_frozen(
+    maps: Sequence[str],
+    numbers: Sequence[int],
+    output: Path,
+    cluster: Cluster,
+    source: object,
+) -> list[Path]:
+    """Generates frozen redraws of shipped maps; returns their map folders.
+
+    A redraw has the streets of the map, in some cases rotated, but other
+    buildings, plants and objects.
+
+    Args:
+        maps: names of shipped maps; all shipped maps if empty.
+        numbers: numbers of the redraws; all redraws if empty.
+        output: folder for the maps, which are named `<map>_f<number>`.
+        cluster: runs the jobs.
+        source: file of the experiment, for errors.
+
+    Returns:
+        The folders, sorted by map, then by number.
+
+    Raises:
+        InputError: a redraw is unknown or could not be generated.
+    """
+    redraws = frozen_redraws()
+    for what, given, known in (
+        ("map", maps, [one.map_name for one in redraws]),
+        (FROZEN_REDRAW, numbers, [one.number for one in redraws]),
+    ):
+        for one in given:
+            if one not in known:
+                there = ", ".join(map(str, dict.fromkeys(known)))
+                raise InputError(
+                    f"{source}: {what}: no frozen redraw {one!r} (there are:"
+                    f" {there})"
+                )
+    steps = [
+        RedrawFrozen(
+            output.resolve() / f"{one.map_name}_f{one.number:02d}",
+            shipped_maps()[one.map_name],
+            max(MapFolder(shipped_maps()[one.map_name]).stages()),
+            one.seed,
+            one.turn_deg,
+        )
+        for one in redraws
+        if (not maps or one.map_name in maps)
+        and (not numbers or one.number in numbers)
+    ]
+    make_maps(steps, output, cluster)
+    return [step.folder for step in steps]
+
+
+@dataclass(frozen=True)
+class RedrawFrozen(RedrawCity):
+    """A job step that makes a frozen redraw of a map, with its drives.
+
+    Attributes:
+        turn_deg: angle by which the city is rotated about the world's origin
+            [deg].
+    """
+
+    turn_deg: float = 0.0
+
+    def inputs(self) -> dict[str, bytes]:
+        """Returns the new city's input files, without `stages.yaml`.
+
+        The result maps file names to contents. The scenarios of the map's
+        drives are included; in these scenarios, a realistic driver replaces the
+        original driver.
+        """
+        source = MapFolder(self.map_folder)
+        contents = redrawn_inputs(self.map_folder, self.stage, self.seed)
+        del contents[source.stage_plan.name]
+        plan = read_yaml(source.plan) | {"seed": self.seed}
+        if self.turn_deg:
+            roads = turned_content(read_yaml(source.roads), self.turn_deg)
+            contents[source.roads.name] = marked_yaml(
+                "the map's roads, turned", roads
+            )
+            plan = turned_content(plan, self.turn_deg)
+            plan["bounds"] = turned_bounds(plan["bounds"], self.turn_deg)
+            contents[source.plan.name] = marked_yaml(
+                "the map's plan, turned", plan
+            )
+        for path in source.drives():
+            values = read_yaml(path) | {"map": ".", "driver": _DRIVER}
+            contents[path.name] = marked_yaml(
+                "the map's drive, by another driver", values
+            )
+        return contents
+
+    def finish_inputs(self, draft: Path) -> None:
+        source = MapFolder(self.map_folder)
+        names = [one.name for one in make_city(draft).structures]
+        stages = kept_names(read_yaml(source.stage_plan), names)
+        text = marked_yaml("the map's stages", stages)
+        (draft / source.stage_plan.name).write_bytes(text)
+
+    def sources(self) -> dict[str, object]:
+        stages = MapFolder(self.map_folder).stage_plan
+        return {**super().sources(), "stages": stages.read_text("utf-8")}
+
+
+def kept_names(stages: Any, names: Sequence[str]) -> Any:
+    """Returns `stages.yaml` with only the structures that a new city has.
+
+    The file was written for the original city. A row of houses can have fewer
+    houses in a redrawn city than in the original city. Groups that lose all
+    their structures are left out.
+
+    Args:
+        stages: the content of the file.
+        names: names of the structures of the new city.
+    """
+    if isinstance(stages, list):
+        return [
+            one
+            for one in stages
+            if any(fnmatchcase(name, one) for name in names)
+        ]
+    if not isinstance(stages, Mapping):
+        return stages
+    kept = {name: kept_names(one, names) for name, one in stages.items()}
+    return {
+        name: one
+        for name, one in kept.items()
+        if one != [] and not (isinstance(one, dict) and _is_empty(one))
+    }
+
+
+def _is_empty(group: Mapping[str, Any]) -> bool:
+    """Returns whether a group with a height has lost all its structures."""
+    return "height" in group and "structures" not in group

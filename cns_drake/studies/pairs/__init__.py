@@ -1,0 +1,1 @@
+"""The pairs of drives that a study measures, in each condition."""

@@ -1,0 +1,433 @@
+"""Makes the two drives of each condition of an experiment."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+import math
+from typing import Any, NamedTuple
+
+from cns_drake.base.errors import InputError, errors_at
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.listing import natural_key
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.studies.drives.changed_drives import (
+    Age,
+    Ageing,
+    DriveChanger,
+    Redraw,
+)
+from cns_drake.studies.drives.control_drives import with_fixed_driver
+from cns_drake.studies.drives.named_stages import MissingError, find_stage
+from cns_drake.studies.drives.session_fields import (
+    session_factors,
+    session_fields,
+    years_aged,
+)
+from cns_drake.studies.drives.side_fields import (
+    QUERY_FIELDS,
+    check_side,
+    checked_maintainer,
+)
+from cns_drake.studies.drives.unique_names import UniqueNames
+from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
+from cns_drake.studies.experiments.conditions import Condition
+from cns_drake.studies.experiments.experiment import SESSIONS
+from cns_drake.studies.experiments.nested_fields import Changes, merged
+from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
+from evaluation.map_update.upkeep import NOT_MAINTAINED
+from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.results.keys import CAUSE, OWN
+from evaluation.study.tasks.pair import USUAL_LENGTH
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The drives of the database and the query drive of one condition.
+
+    Attributes:
+        database: the drive of the database; the oldest drive if there are
+            several.
+        query: the drive of the queries.
+        protocol: protocol of the queries.
+        distractors: number of places of other cities that are added to the
+            database, to make recognition harder.
+        asked: field -> value, for the fields of the protocol with which the
+            condition gives the queries a random yaw, a tilt or an occluded
+            sector.
+        beside: further drives of the database, from older to newer.
+        keep: which places of the database are kept, see
+            `evaluation.recognition.kept_places.kept_places`.
+        maintain: what updates the maps of older drives by newer drives, see
+            `evaluation.map_update.upkeep`.
+        ages: the years by which the city has aged at the time of each of
+            `drives`; empty if the city does not age.
+        lengths: approximate length of each of `drives` [m].
+    """
+
+    database: Scenario
+    query: Scenario
+    protocol: RetrievalProtocol
+    distractors: int = 0
+    asked: Changes = field(default_factory=dict)
+    beside: tuple[Scenario, ...] = ()
+    keep: str | int = KEEP_ALL
+    maintain: str = NOT_MAINTAINED
+    ages: tuple[int, ...] = ()
+    lengths: tuple[float, ...] = ()
+
+    @property
+    def drives(self) -> tuple[Scenario, ...]:
+        """The drives of the database, from older to newer, and the query."""
+        return self.database, *self.beside, self.query
+
+    def fingerprint(self) -> str:
+        """Returns a hash of the drives of the database and the query drive.
+
+        Drives that differ only in their names have different hashes.
+        """
+        several = {
+            "beside": [one.model_dump(mode="json") for one in self.beside],
+            "keep": self.keep,
+            "maintain": self.maintain,
+        }
+        is_one = not self.beside and self.keep == KEEP_ALL
+        return fingerprint(
+            {
+                "database": self.database.model_dump(mode="json"),
+                "query": self.query.model_dump(mode="json"),
+                "distractors": self.distractors,
+                **({} if is_one else several),
+                **self.asked,
+            }
+        )
+
+
+class _DatedDrive(NamedTuple):
+    """A drive of a database.
+
+    Attributes:
+        years: the years by which its city has aged.
+        length: its approximate length [m].
+        drive: the drive.
+    """
+
+    years: int
+    length: float
+    drive: Scenario
+
+
+@dataclass
+class PairMaker:
+    """Changes two drives of a map as the conditions of an experiment say.
+
+    Attributes:
+        database: the drive that makes the database, without any change.
+        query: the drive that makes the queries, without any change.
+        same_route: whether the database drive follows the query's route, with
+            its LiDAR at another viewpoint.
+        source: file of the experiment, for errors.
+        age: function that returns an aged map.
+        redraw: function that returns a redrawn map.
+        on_note: is called with a note on everything that is left out.
+    """
+
+    database: Scenario
+    query: Scenario
+    same_route: bool
+    source: str
+    age: Age
+    redraw: Redraw
+    on_note: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        # The names of drives change, but not their drivers.
+        self._unchanged = {
+            "database": with_fixed_driver(self.database),
+            "query": with_fixed_driver(self.query),
+        }
+        self._last_stage = max(
+            (str(one.stage) for one in (self.database, self.query)),
+            key=natural_key,
+        )
+        self._changer = DriveChanger(
+            self.source,
+            self._last_stage,
+            same_route=self.same_route,
+            age=self.age,
+            redraw=self.redraw,
+            on_note=self.on_note,
+        )
+        plain = dict(self._unchanged)
+        if self.same_route:
+            plain["database"] = with_lidars_beside(
+                plain["database"], *VIEWPOINTS["near"]
+            )
+        self._names = {
+            side: UniqueNames(side, drive, with_controls=not self.same_route)
+            for side, drive in plain.items()
+        }
+
+    def build(self, condition: Condition, seed: int) -> Compared:
+        """Returns the database drive and the query drive under a condition.
+
+        Args:
+            condition: the changes to make to the two drives.
+            seed: seed of the random choices of these changes.
+
+        Raises:
+            MissingError: the map lacks what the condition needs.
+            InputError: a field is unknown or not usable.
+        """
+        fields = self._fields(condition)
+        both = fields.get("both", {})
+        database = merged(both, fields.get("database", {}))
+        query = merged(both, fields.get("query", {}))
+        sessions = session_fields(database, seed, self.source)
+        if CAUSE not in condition.factors:
+            # Years of cases may need the rates of all conditions.
+            self._check_rates(fields, sessions, query)
+        for place, changes in sessions.items():
+            check_side(place, changes, self.source)
+        if SESSIONS in database:
+            check_side("database", database, self.source)
+        check_side("query", query, self.source)
+        drives = self._database_drives(
+            sessions, database, query, condition, seed
+        )
+        years = years_aged(database, sessions)
+        ageing = Ageing(years, database.get("rates", 1.0))
+        query_drive = self._names["query"].named(
+            self._changer.changed(
+                self._unchanged["query"], "query", query, ageing, seed
+            ),
+            condition.factors,
+            seed,
+        )
+        asked = self._asked(query, seed)
+        protocol = self._protocol(
+            {**fields.get("protocol", {}), **asked}, database
+        )
+        where = f"{self.source}: database"
+        keep = checked_keep(database.get("keep", KEEP_ALL), f"{where}.keep")
+        maintainer = checked_maintainer(
+            database.get("maintain", NOT_MAINTAINED),
+            len(drives),
+            f"{where}.maintain",
+        )
+        oldest, *beside = drives
+        return Compared(
+            oldest.drive,
+            query_drive,
+            protocol,
+            database.get("distractors", 0),
+            asked,
+            tuple(one.drive for one in beside),
+            keep,
+            maintainer,
+            (*(one.years for one in drives), years) if years else (),
+            (*(one.length for one in drives), _drive_length(query)),
+        )
+
+    def _fields(self, condition: Condition) -> dict[str, Any]:
+        """Returns the fields of a condition and of its causes, by section.
+
+        Each cause has the first level that is possible on the map.
+
+        Raises:
+            MissingError: the condition has causes, and none is possible.
+        """
+        chosen: list[Mapping[str, Changes]] = [condition.changes]
+        missing = None
+        for levels in condition.causes:
+            for at_level in levels:
+                try:
+                    chosen.append(self._possible_fields(at_level))
+                    break
+                except MissingError as error:
+                    fault = error
+            else:
+                missing = fault
+        if missing and len(chosen) == 1:
+            raise missing
+        if missing:
+            self.on_note(str(missing))
+        fields: dict[str, Any] = {}
+        for one in chosen:
+            for section, values in one.items():
+                fields[section] = merged(fields.get(section, {}), values)
+        return fields
+
+    def _possible_fields(
+        self, fields: Mapping[str, Changes]
+    ) -> dict[str, Changes]:
+        """Returns those fields of a case that are possible on the map.
+
+        Raises:
+            MissingError: none of the fields is possible.
+        """
+        missing: MissingError | None = None
+        found: dict[str, Changes] = {}
+        for side, changes in fields.items():
+            left = dict(changes)
+            try:
+                if (stage := left.get("stage")) is not None:
+                    self._find_stage(side, "database", stage)
+            except MissingError as error:
+                missing = error
+                del left["stage"]
+            try:
+                self._check_roads(left.get("traffic"))
+            except MissingError as error:
+                missing = error
+                del left["traffic"]
+            if left:
+                found[side] = left
+        if missing and not found:
+            raise missing
+        if missing:
+            self.on_note(str(missing))
+        return found
+
+    def _find_stage(self, place: str, side: str, wanted: Any) -> str:
+        """Returns the stage that a drive's field `stage` = `wanted` means."""
+        with errors_at(f"{self.source}: {place}.stage"):
+            return find_stage(wanted, self._unchanged[side], self._last_stage)
+
+    def _check_roads(self, traffic: Any) -> None:
+        """Checks that the map has roads for its traffic."""
+        folder = self.query.folder
+        has_roads = folder.roads.is_file() or folder.lanes.is_file()
+        if has_roads or not isinstance(traffic, Mapping):
+            return
+        if any(traffic.get(n) for n in ("vehicles", "walkers", "queues")):
+            raise MissingError(
+                f"neither {folder.roads.name} nor {folder.lanes.name}: no"
+                " traffic"
+            )
+
+    def _check_rates(
+        self,
+        fields: Mapping[str, Changes],
+        sessions: Mapping[str, Changes],
+        query: Changes,
+    ) -> None:
+        """Checks that rates of change are given only where a city ages.
+
+        Args:
+            fields: the fields of a condition, by section.
+            sessions: maps the path of each database drive in the experiment's
+                file to the fields of the drive.
+            query: fields of the query drive.
+        """
+        drives = {
+            "both": [*sessions.values(), query],
+            "database": [*sessions.values()],
+            "query": [query],
+        }
+        for section, values in fields.items():
+            if "rates" in values and not any(
+                "years" in one for one in drives.get(section, drives["both"])
+            ):
+                raise InputError(
+                    f"{self.source}: {section}.rates: those of no years"
+                )
+
+    def _database_drives(
+        self,
+        sessions: Mapping[str, Changes],
+        database: Changes,
+        query: Changes,
+        condition: Condition,
+        seed: int,
+    ) -> list[_DatedDrive]:
+        """Returns the drives of a database, from older to newer.
+
+        The field `years` of a drive says how many years before the other side
+        the drive takes place. So the city of the oldest drive is aged by the
+        years of the query, which are 0 in most experiments. The city of each
+        other drive is aged by further years, by which this drive is newer than
+        the oldest drive.
+
+        Args:
+            sessions: maps the path of each database drive in the experiment's
+                file to the fields of the drive.
+            database: fields of the database.
+            query: fields of the query drive.
+            condition: the condition.
+            seed: seed of the random choices.
+        """
+        since = query.get("years", 0)
+        oldest = years_aged(database, sessions)
+        rates = query.get("rates", 1.0)
+        if any(one.get("years", 0) != oldest for one in sessions.values()):
+            rates = database.get("rates", rates)
+        stages = list(self.query.folder.stages())
+        stage = self._find_stage("query", "query", query.get("stage", OWN))
+        last = stages.index(stage) if stage in stages else len(stages)
+        found: list[tuple[tuple[Any, ...], str, Scenario]] = []
+        for place, changes in sessions.items():
+            years = since + oldest - changes.get("years", 0)
+            stage = self._find_stage(
+                place, "database", changes.get("stage", OWN)
+            )
+            is_later = stages.index(stage) > last if stage in stages else False
+            if place != "database" and (years > oldest or is_later):
+                raise InputError(
+                    f"{self.source}: {place}: this drive is later than the"
+                    " query"
+                )
+            drive = self._names["database"].named(
+                self._changer.changed(
+                    self._unchanged["database"],
+                    place,
+                    changes,
+                    Ageing(years, rates),
+                    seed,
+                ),
+                session_factors(place, condition.factors),
+                seed,
+            )
+            found.append(((years, natural_key(stage)), place, drive))
+        # While maps are only requested, drives of all ages and redraws are in
+        # one map.
+        known: dict[object, str] = {}
+        for time, place, drive in found:
+            city = time, sessions[place].get("redraw")
+            before = known.setdefault((city, drive.name), place)
+            if before != place:
+                raise InputError(
+                    f"{self.source}: {place}: the same drive as {before}"
+                )
+        found.sort(key=lambda one: one[0])
+        return [
+            _DatedDrive(time[0], _drive_length(sessions[place]), drive)
+            for time, place, drive in found
+        ]
+
+    def _asked(self, query: Changes, seed: int) -> dict[str, Any]:
+        """Returns the fields of the protocol that change the queries' scans."""
+        found = {name: query[name] for name in QUERY_FIELDS if name in query}
+        if found:
+            found["seed"] = seed
+            protocol_from_fields(found, self.source, "query")
+        return found
+
+    def _protocol(
+        self, fields: Changes, database: Changes
+    ) -> RetrievalProtocol:
+        """Returns the protocol of the queries, with fields of the condition."""
+        protocol = protocol_from_fields(fields, self.source)
+        if lateral := database.get("lateral"):
+            # On a straight road, the number of matches does not depend on the
+            # offset.
+            radius = math.hypot(protocol.radius, lateral)
+            protocol = replace(protocol, radius=radius)
+        return protocol
+
+
+def _drive_length(changes: Changes) -> float:
+    """Returns the approximate length of a drive with changes [m]."""
+    route = changes.get("route")
+    if isinstance(route, Mapping):
+        return float(route["length"])
+    return USUAL_LENGTH

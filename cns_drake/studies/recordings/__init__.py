@@ -1,0 +1,1 @@
+"""Records the drives of maps as jobs, and reports on the recordings."""

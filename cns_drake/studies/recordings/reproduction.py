@@ -1,0 +1,205 @@
+"""Records the drives of maps, evaluates them and writes a report."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cns_drake.base.drives.drive_scenario import driven_way
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.forecast import Space, forecast
+from cns_drake.base.jobs.running import run_jobs
+from cns_drake.base.listing import natural_key
+from cns_drake.base.progress import doing
+from cns_drake.scenarios import scenario_files
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.shipped import recordable_map, recordable_maps
+from cns_drake.scene.map_folder import MapFolder
+from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.studies.drives.control_drives import control_drive
+from cns_drake.studies.recordings.map_pictures import plan_pictures
+from cns_drake.studies.recordings.recording import (
+    is_recorded,
+    plan_recordings,
+    usual_frames,
+)
+from evaluation.paper import reference_for
+from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.map_drives import RecordingInfo
+from evaluation.study.stages_report import StagesReport
+
+# Mean size of a page.
+_PAGE_BYTES = 18e6
+# Mean size of a frame in a recording.
+_RECORDED_BYTES = 170e3
+# Mean size of a frame in the report's folder, in the end.
+_KEPT_BYTES = 18e3
+# Mean size of a frame in the report's folder while the report is made.
+_SPENT_BYTES = 50e3
+
+
+def reproduce_maps(
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    *,
+    with_pages: bool = True,
+    with_recordings: bool = True,
+    protocol: RetrievalProtocol = FAIR_PROTOCOL,
+    methods: Sequence[str] = (),
+    settings: Sequence[str] = (),
+    with_costs: bool = False,
+    with_tables: bool = False,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Records the drives of maps, evaluates them and reports.
+
+    The recordings are in `<output>/<name>/`, and a web page of each drive is in
+    `<output>/pages/<name>.html`. `<output>/pictures` shows the routes of each
+    map from above, and a street in its first and last stage. `<output>/report`
+    contains the tables and figures. Finished work is not repeated. The function
+    returns the path of the report's page.
+
+    Without recordings, only the report is made. Drives that are not recorded
+    yet are evaluated while they are simulated, at the same frames as a
+    recording.
+
+    Args:
+        maps: names or folders of maps; all shipped maps if None.
+        output: folder for all results.
+        cluster: runs the jobs.
+        with_pages: whether drives get web pages.
+        with_recordings: whether drives are recorded.
+        protocol: protocol of place recognition.
+        methods: names or Python files of methods; by default the standard
+            methods.
+        settings: settings of methods, each `METHOD.NAME=VALUE`.
+        with_costs: whether times are measured.
+        with_tables: whether the report has wide tables, too.
+        on_note: is called with each note for the user. The first note says how
+            long the jobs take on this machine, and how much space they need.
+
+    Raises:
+        InputError: a map is unknown, the folder cannot be made, or a step
+            failed.
+    """
+    chosen = choose_methods(methods, settings)
+    folders = [recordable_map(name) for name in maps or recordable_maps()]
+    drives, controls, pictures = [], [], []
+    for folder in folders:
+        of_map = _recordable_drives(folder)
+        drives += of_map
+        controls += control_drives(of_map)
+        if with_recordings:
+            pictures += plan_pictures(folder, output / "pictures")
+    pages = {s.name: output / "pages" / f"{s.name}.html" for s in drives}
+    jobs = []
+    if with_recordings:
+        jobs = plan_recordings(
+            [*drives, *controls], output, pages=pages if with_pages else {}
+        )
+    make_folder(output)
+    study = StagesReport(
+        _recordings(
+            [*drives, *controls], output, with_recordings=with_recordings
+        ),
+        output / "report",
+        chosen,
+        protocol,
+        with_costs,
+        reference_for(folder.name for folder in folders),
+    )
+    doing("planning the jobs")
+    planned = [*jobs, *study.jobs(), *pictures]
+    space = _expected_space(
+        usual_frames([*drives, *controls]),
+        len(drives) if with_pages and with_recordings else 0,
+        output,
+        with_recordings=with_recordings,
+    )
+    told = forecast(planned, cluster, space)
+    if told is not None:
+        on_note(told)
+    run_jobs(planned, cluster)
+    addresses = {
+        name: f"../pages/{page.name}"
+        for name, page in pages.items()
+        if page.is_file()
+    }
+    return study.assemble(addresses, on_note, with_tables=with_tables)
+
+
+def _recordings(
+    scenarios: Sequence[Scenario], output: Path, *, with_recordings: bool
+) -> list[RecordingInfo]:
+    """Returns the recordings to evaluate, in the order of `cns-eval report`."""
+    found = []
+    for scenario in scenarios:
+        is_waiting = not is_recorded(scenario, output)
+        info = recording_info(scenario, output, is_waiting and with_recordings)
+        if is_waiting and not with_recordings:
+            info = replace(info, made_by=SimulationSource(scenario))
+        found.append(info)
+    return sorted(found, key=lambda recording: recording.name)
+
+
+def _expected_space(
+    num_frames: int, num_pages: int, output: Path, *, with_recordings: bool
+) -> Space:
+    """Returns how much space all files need, during the jobs and afterwards."""
+    of_frame = _KEPT_BYTES + (_RECORDED_BYTES if with_recordings else 0.0)
+    kept = num_pages * _PAGE_BYTES + num_frames * of_frame
+    return Space(output, kept + num_frames * _SPENT_BYTES, kept)
+
+
+def _recordable_drives(folder: Path) -> list[Scenario]:
+    drives = [
+        scenario_files.load_scenario(path)
+        for path in MapFolder(folder).recordable_drives()
+    ]
+    for drive in drives:
+        if drive.map is None:
+            raise InputError(
+                f"{drive.source}: map: missing, and needed to compare stages"
+            )
+    return drives
+
+
+def control_drives(drives: Sequence[Scenario]) -> list[Scenario]:
+    """Returns the control drives of a map's drives.
+
+    The last drive is the drive in the last stage. Each other drive has a
+    control drive, which follows the same route, but through the last stage. The
+    control drive and the last drive see the same city, so a comparison of these
+    two drives shows only the effect of the route.
+    """
+    last = max(drives, key=lambda drive: natural_key(drive.stage or ""))
+    return [
+        control_drive(drive, str(last.stage))
+        for drive in drives
+        if drive is not last
+    ]
+
+
+def recording_info(
+    scenario: Scenario, output: Path, is_waiting: bool
+) -> RecordingInfo:
+    """Returns the description of a recording, which need not exist yet.
+
+    Args:
+        scenario: scenario of the recording.
+        output: folder of the recordings.
+        is_waiting: whether the recording does not exist yet, and a job with the
+            name of the scenario will make it.
+    """
+    assert scenario.stage is not None  # It has a map.
+    return RecordingInfo(
+        name=scenario.name,
+        path=output.absolute() / scenario.name,
+        map_name=scenario.folder.name,
+        stage=scenario.stage,
+        way=driven_way(scenario_files.describe_scenario(scenario)),
+        needs=(scenario.name,) if is_waiting else (),
+    )

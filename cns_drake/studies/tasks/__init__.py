@@ -1,0 +1,1 @@
+"""The tasks of a study that need the simulator: `map` and `seen`."""

@@ -1,0 +1,269 @@
+"""The task `seen`: which changes of a city the drives of a database see."""
+
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cns_drake.ageing.aged_map import HISTORY_NAME
+from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.files import is_there
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.number_text import whole_number
+from cns_drake.base.progress import track
+from cns_drake.simulation.simulated_drive import (
+    SimulatedDrive,
+    SimulationSource,
+)
+from cns_drake.studies.pairs.map_upkeep import UpkeptSource
+from evaluation.drives.sampling import sample_frames
+from evaluation.recognition.result_number import Number
+from evaluation.study.sources import DriveSource
+from evaluation.study.tasks.jobs import OPENING_COST, SCAN_COST, Jobs
+from evaluation.study.tasks.pair import Pair, Result
+from evaluation.study.tasks.task import Task, check_positive
+
+# Events in which a structure appears under its own name; in all others, the
+# successor appears.
+_APPEARS = ("built", PUT_UP)
+# Events in which a structure disappears.
+_DISAPPEARS = (
+    "demolished",
+    "felled",
+    "furniture",
+    "removed",
+    "replaced",
+    TAKEN_DOWN,
+)
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The structures from which a drive gets returns, by name.
+
+    Attributes:
+        present: structures that stand in the drive's own world.
+        returned: structures from which the drive gets returns.
+        before: structures from which the drive would get returns in the city of
+            the database's first drive.
+    """
+
+    present: list[str]
+    returned: list[str]
+    before: list[str]
+
+
+@dataclass(frozen=True)
+class Noticed:
+    """Structures that changed; whether and when drives notice each change.
+
+    Attributes:
+        names: the S structures that changed, in order.
+        is_noticed: (S,) bool, whether a drive notices the change.
+        delay: (S,) years from the change to the first drive that notices it;
+            NaN for a change that no drive notices, or whose year is unknown.
+    """
+
+    names: list[str]
+    is_noticed: np.ndarray
+    delay: np.ndarray
+
+
+def noticed_changes(
+    drives: Sequence[tuple[int, Sighting]],
+    query: Sighting,
+    came: Mapping[str, int],
+    went: Mapping[str, int],
+) -> Noticed:
+    """Returns which changes between the first drive and the query are noticed.
+
+    If a structure appeared, the change is noticed by the first drive that gets
+    returns from the structure. If a structure disappeared, the change is
+    noticed by the first later drive that would have got returns from the
+    structure in the city of the first drive.
+
+    Args:
+        drives: year and sighting of each drive, from older to newer.
+        query: sighting of the query.
+        came: structure -> year in which it appeared.
+        went: structure -> year in which it disappeared.
+    """
+    first = set(drives[0][1].present)
+    last = set(query.present)
+    names = sorted(first ^ last)
+    delay = np.full(len(names), math.nan)
+    is_noticed = np.zeros(len(names), bool)
+    sets = [
+        (year, set(o.present), set(o.returned), set(o.before))
+        for year, o in drives
+    ]
+    for k, name in enumerate(names):
+        if name in last:
+            years = [year for year, _, seen, _ in sets if name in seen]
+            changed = came.get(name, math.nan)
+        else:
+            years = [
+                year
+                for year, present, _, seen in sets
+                if name in seen and name not in present
+            ]
+            changed = went.get(name, math.nan)
+        if years:
+            is_noticed[k] = True
+            delay[k] = min(years) - changed
+    return Noticed(names, is_noticed, delay)
+
+
+class SeenTask(Task):
+    """Measures which changes of a city the drives of a database notice.
+
+    The changes are the structures that came or went between the oldest drive of
+    the database and the query. Metrics whose names end in `_here` count only
+    structures whose change the query drive notices, too.
+    """
+
+    name = "seen"
+    defaults: ClassVar[Mapping[str, Any]] = {"spacing": 5.0}
+
+    def check(self, name: str, value: Any, where: str) -> None:
+        check_positive(value, where)
+
+    def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
+        if not pair.ages:
+            return ()
+        drives = (pair.database, *pair.beside, pair.query)
+        sources = [plain_source(one.source) for one in drives]
+        first = sources[0]
+        parts: list[Result] = []
+        for drive, source in zip(drives, sources, strict=True):
+            arguments = source, first, float(self.settings["spacing"])
+            digest = fingerprint(
+                {
+                    "first": first.scenario.name,
+                    "spacing": arguments[2],
+                    "query": drive is pair.query,
+                }
+            )[:8]
+            part = jobs.files.part("seen", drive.name, digest)
+            # The drive is simulated in two cities.
+            scans = drive.length / arguments[2]
+            cost = 2.0 * (OPENING_COST + SCAN_COST * scans)
+            parts.append(jobs.add(part, sight_structures, arguments, (), cost))
+        part = jobs.files.part("changes", pair.key)
+        parts.append(jobs.add(part, changes_until, (sources[-1],), (), 1.0))
+        return tuple(parts)
+
+    def found(self, pair: Pair) -> Any:
+        *sightings, years = [part.read() for part in pair.parts[self.name]]
+        *drives, query = zip(pair.ages, sightings, strict=True)
+        return [
+            noticed_changes(some, query[1], *years)
+            for some in (drives, [drives[0], query])
+        ]
+
+    def numbers(
+        self, found: Sequence[Noticed], before: Any | None
+    ) -> Iterator[Number]:
+        drives, query = found
+        everywhere = np.ones(len(drives.names), bool)
+        for end, chosen in (("", everywhere), ("_here", query.is_noticed)):
+            number = int(chosen.sum())
+            delays = drives.delay[chosen]
+            delays = delays[~np.isnan(delays)]
+            values = {"changed": (float(number), number)}
+            if number:
+                share = float(drives.is_noticed[chosen].mean())
+                values["seen"] = share, number
+            if len(delays):
+                late = float(np.percentile(delays, 95.0))
+                values["delay_median"] = (
+                    float(np.median(delays)),
+                    len(delays),
+                )
+                values["delay_95"] = late, len(delays)
+            for name, (value, n) in values.items():
+                yield Number("", False, f"{name}{end}", value, n=n)
+
+
+def plain_source(source: DriveSource) -> SimulationSource:
+    """Returns the source of a simulated drive, whatever updates its map."""
+    if isinstance(source, UpkeptSource):
+        source = source.sources[source.number]
+    assert isinstance(source, SimulationSource)
+    return source
+
+
+def sight_structures(
+    reporter: Reporter,
+    source: SimulationSource,
+    first: SimulationSource,
+    spacing: float,
+) -> Sighting:
+    """Returns the structures from which a drive gets returns.
+
+    Args:
+        reporter: unused.
+        source: the drive.
+        first: the oldest drive of the database. The city of this drive is the
+            city before all changes.
+        spacing: distance driven between two scans that count [m].
+    """
+    drive = source()
+    city = {name: getattr(first.scenario, name) for name in ("map", "stage")}
+    back = SimulationSource(source.scenario.replaced(**city))
+    returned = _seen_names(drive, spacing)
+    before = returned
+    if back.scenario != source.scenario:
+        before = _seen_names(back(), spacing)
+    return Sighting(sorted(drive.structures), sorted(returned), sorted(before))
+
+
+def _seen_names(drive: SimulatedDrive, spacing: float) -> Set[str]:
+    """Returns the names of the structures from which a drive gets returns."""
+    frames = sample_frames(drive.X_WS[:, :3, 3], spacing).tolist()
+    numbers: set[int] = set()
+    for frame in track(
+        frames, f"looking from {drive.name}", len(frames), "scans"
+    ):
+        numbers |= set(np.unique(drive.scan(frame)["instance"]).tolist())
+    known = drive.instances
+    names = {str(known[k]["name"]) for k in numbers if k in known}
+    return names & set(drive.structures)
+
+
+def changes_until(
+    reporter: Reporter, query: SimulationSource
+) -> tuple[dict[str, int], dict[str, int]]:
+    """Returns when structures of an aged city appeared and disappeared.
+
+    Args:
+        reporter: unused.
+        query: the query, in the aged city.
+
+    Returns:
+        Structure -> the first year in which the structure appears; structure ->
+        the first year in which the structure disappears. Both mappings are
+        empty without a history.
+
+    Raises:
+        InputError: the history cannot be read.
+    """
+    came: dict[str, int] = {}
+    went: dict[str, int] = {}
+    path = query.scenario.folder.path / HISTORY_NAME
+    if not is_there(path):
+        return came, went
+    columns = ("year", "event", "structure", "successor")
+    for line, row in read_records(path, columns):
+        year = whole_number(row["year"], f"{path}: line {line}: year")
+        if row["successor"]:
+            came.setdefault(row["successor"], year)
+        elif row["event"] in _APPEARS:
+            came.setdefault(row["structure"], year)
+        if row["event"] in _DISAPPEARS:
+            went.setdefault(row["structure"], year)
+    return came, went

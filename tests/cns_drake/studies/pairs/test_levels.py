@@ -1,0 +1,115 @@
+"""The frozen levels: their drives are those that were frozen."""
+
+import csv
+import itertools
+
+from helpers.small_map import scenario_values, write_small_map
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.scenarios.scenario_files import make_scenario
+from cns_drake.scenarios.shipped import worlds_folder
+from cns_drake.studies.experiments.experiment_files import load_experiment
+from cns_drake.studies.pairs.comparisons import Compared
+from cns_drake.studies.pairs.frozen_drives import (
+    check_frozen,
+    drives_fingerprint,
+    frozen_drives,
+)
+from cns_drake.studies.study import Study
+from evaluation.recognition.protocol import RECORDED_PROTOCOL
+
+TABLE = "levels.csv"
+
+
+def planned(output, *overrides):
+    study = Study(
+        load_experiment("levels", ["methods=[solid]", *overrides]),
+        output,
+        "levels",
+        Cluster(),
+    )
+    drives = list(study._maps.pairs(()))
+    study._plan(drives)
+    return study, drives
+
+
+@pytest.mark.slow
+@pytest.mark.night
+def test_the_levels_are_as_they_were_frozen(tmp_path):
+    with (worlds_folder() / TABLE).open() as stream:
+        frozen = {
+            (row["map"], int(row["level"])): row["drives"]
+            for row in csv.DictReader(stream)
+        }
+    assert {level for _, level in frozen} == {0, 1, 2, 3, 4}
+    assert frozen_drives(TABLE) == frozen
+    found = {}
+    study, maps = planned(tmp_path)
+    worlds = {}
+    for one, compared in itertools.chain(*map(study._simulated.pairs, maps)):
+        key = one.map_name, one.factors["level"]
+        found.setdefault(key, []).append(drives_fingerprint(compared, worlds))
+    assert frozen == {
+        key: fingerprint({"drives": prints}) for key, prints in found.items()
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "change",
+    [
+        "seeds=[4709]",
+        "cases.all.database.viewpoint=[[2.0, 0], [2.4, 0], [2.7, 0], [3.1, 0]]",
+        "query.frames=100",
+        "levels=[3, 4]",
+    ],
+)
+def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
+    if change.startswith("levels"):
+        # Fewer levels are still those that were frozen.
+        planned(tmp_path, change, "maps=[suburbia]")
+        return
+    with pytest.raises(InputError, match=rf"{TABLE}: level \d of suburbia: "):
+        planned(tmp_path, change, "maps=[suburbia]")
+    planned(tmp_path, change, "maps=[suburbia]", "frozen=null")
+
+
+def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
+    values = scenario_values(write_small_map(tmp_path / "small"))
+    drive = make_scenario(values, "test")
+    compared = Compared(drive, drive, RECORDED_PROTOCOL)
+    before = drives_fingerprint(compared, {})
+    assert drives_fingerprint(compared, {}) == before
+    known = compared.fingerprint()
+    world = drive.world_file
+    world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
+    assert drives_fingerprint(compared, {}) != before
+    # The drives alone do not show it.
+    assert compared.fingerprint() == known
+    # Neither does the city of another session hide behind the first one's.
+    former = drive.replaced(stage="01" if drive.stage != "01" else "04")
+    several = Compared(drive, drive, RECORDED_PROTOCOL, beside=(former,))
+    before = drives_fingerprint(several, {})
+    world = former.world_file
+    assert world != drive.world_file
+    world.write_text(world.read_text().replace("<world", "<!-- new --><world"))
+    assert drives_fingerprint(several, {}) != before
+
+
+def test_maps_of_ones_own_are_not_frozen():
+    known = {("town", 1): ["any"], ("suburbia", 9): ["any"]}
+    check_frozen(TABLE, known)
+    with pytest.raises(InputError, match="level 1 of suburbia"):
+        check_frozen(TABLE, known | {("suburbia", 1): ["any"]})
+    with pytest.raises(InputError, match=r"nothing\.csv"):
+        check_frozen("nothing.csv", known)
+
+
+def test_levels_of_a_table_are_numbers(tmp_path):
+    table = tmp_path / "frozen.csv"
+    table.write_text("map,level,drives\ntown,1,a\ntown,high,b\n")
+    with pytest.raises(InputError, match=f"^{table}: line 3: level: 'high' is"):
+        frozen_drives(str(table))
