@@ -44,8 +44,8 @@ from evaluation.study.chosen_methods import (
 )
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.extraction_jobs import ExtractionJobs
-from evaluation.study.map_drives import MapDrives
-from evaluation.study.recorded_pairs import recorded_pairs
+from evaluation.study.recordings.map_drives import MapDrives
+from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import LocaliseTask

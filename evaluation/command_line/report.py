@@ -42,7 +42,7 @@ def report(
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.command_line.suggestions import suggest_comparison
     from evaluation.paper import reference_for
-    from evaluation.study import stages_report
+    from evaluation.study.report_jobs import stages_report
 
     cluster = choose_cluster(jobs, scheduler)
     path = stages_report.report_on_recordings(

@@ -182,7 +182,7 @@ def _first_to_last(
     Args:
         changes: (map, earlier stage, TCR_sym) of pairs whose later stage is the
             map's last, as in the paper's Table I and in
-            `evaluation.study.map_drives.MapDrives.change_pairs`.
+            `evaluation.study.recordings.map_drives.MapDrives.change_pairs`.
     """
     found: dict[str, tuple[str, float]] = {}
     for name, stage, value in changes:

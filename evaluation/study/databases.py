@@ -10,7 +10,7 @@ import numpy as np
 from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
 from evaluation.recognition.kept_places import KEEP_ALL, kept_places
 from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 
 class Searched(NamedTuple):

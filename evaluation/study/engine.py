@@ -31,7 +31,7 @@ from evaluation.study.removed_descriptors import (
     remove_descriptors,
     renew_removed_descriptors,
 )
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair
 from evaluation.study.tasks.task import Task

@@ -8,7 +8,7 @@ from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.feature_extraction import FeatureExtraction, Further
 from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.study_files import FeatureFiles
+from evaluation.study.storage.study_files import FeatureFiles
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 

@@ -27,8 +27,8 @@ from evaluation.recognition.retrieval import (
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.databases import Searched, searched_database
 from evaluation.study.feature_extraction import describe_recording
-from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
+from evaluation.study.storage.parts import Part
 
 # The source of a drive, or the parts of its scans and of its descriptors by
 # each method.

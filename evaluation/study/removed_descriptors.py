@@ -11,7 +11,7 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Steps
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.parts import MakePart, Part
+from evaluation.study.storage.parts import MakePart, Part
 
 
 def remove_descriptors(jobs: Iterable[Job]) -> None:

@@ -15,8 +15,8 @@ from cns_drake.pictures.stage_scene import StageScene
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.recording_search import find_recordings
-from evaluation.study.stages_report import StagesReport
+from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study.report_jobs.stages_report import StagesReport
 
 
 def do(jobs):

@@ -35,7 +35,7 @@ from evaluation.drives.scan_clouds import cloud_at
 from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.overlap_truth import compared_frames, write_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.study.parts import MakePart, Part
+from evaluation.study.storage.parts import MakePart, Part
 
 Format = Literal["pointnetvlad", "overlap"]
 

@@ -21,8 +21,8 @@ from cns_drake.studies.maps.frozen_redraws import redraw_frozen
 from cns_drake.studies.maps.made_maps import made_map_step
 from cns_drake.studies.maps.map_step import make_maps
 from evaluation.results.keys import FROZEN_REDRAW
-from evaluation.study.map_drives import MapDrives, drives_by_map
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.map_drives import MapDrives, drives_by_map
+from evaluation.study.recordings.recording_search import find_recordings
 
 
 @dataclass(frozen=True)

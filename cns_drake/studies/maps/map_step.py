@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 # The file in its folder with the fingerprint of a map.
 _PART = "drawn.data"

@@ -21,8 +21,8 @@ from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair, write_session
 from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptMap
 from evaluation.map_update.upkept_drive import UpkeptDrive
-from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
+from evaluation.study.storage.parts import Part
 
 # Distance driven between two scans of a map, as in the task `map` [m].
 _SPACING = 5.0

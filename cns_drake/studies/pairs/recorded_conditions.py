@@ -8,8 +8,11 @@ from cns_drake.studies.experiments.experiment import SESSIONS, SIDES
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
 from evaluation.results.keys import CAUSE, LAST, OWN, STAGE
-from evaluation.study.map_drives import MapDrives, RecordingInfo
-from evaluation.study.recorded_pairs import RecordedCondition, chosen_sessions
+from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
+from evaluation.study.recordings.recorded_pairs import (
+    RecordedCondition,
+    chosen_sessions,
+)
 
 # Fields of a database of several recordings.
 _OF_RECORDINGS = (f"database.{SESSIONS}", "database.keep")

@@ -20,9 +20,9 @@ from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recordings.recording import is_recorded
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.results.keys import CAUSE
-from evaluation.study.parts import MakePart
 from evaluation.study.sources import RecordingSource
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.storage.parts import MakePart
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.jobs import OPENING_COST, job_name
 from evaluation.study.tasks.pair import NamedDrive, Pair
 

@@ -12,7 +12,7 @@ from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.map_folder import MapFolder
-from evaluation.study.parts import MakePart, Part
+from evaluation.study.storage.parts import MakePart, Part
 
 # Expected time to draw a stage [s].
 _STAGE_COST = 10.0

@@ -23,7 +23,7 @@ from cns_drake.scenarios.provenance import (
 )
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.simulation import simulate
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 # Expected time to load a stage [s].
 _LOADING = 8.0

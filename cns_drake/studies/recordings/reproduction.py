@@ -27,8 +27,8 @@ from cns_drake.studies.recordings.recording import (
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.map_drives import RecordingInfo
-from evaluation.study.stages_report import StagesReport
+from evaluation.study.recordings.map_drives import RecordingInfo
+from evaluation.study.report_jobs.stages_report import StagesReport
 
 # Mean size of a page.
 _PAGE_BYTES = 18e6

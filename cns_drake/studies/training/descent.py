@@ -17,7 +17,7 @@ from cns_drake.studies.training.network import (
     start_parameters,
 )
 from evaluation.methods.learned import WEIGHTS_VERSION
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 # Divides the similarities before the softmax of the loss.
 _TEMPERATURE = 0.05

@@ -23,7 +23,7 @@ from cns_drake.studies.training.descent import train
 from cns_drake.studies.training.network import import_jax
 from cns_drake.studies.training.sampled_city import DRAWN_STREETS, SampledCity
 from evaluation.methods.learned import SEEN_SHARES, WEIGHTS_VERSION
-from evaluation.study.parts import MakePart, Part
+from evaluation.study.storage.parts import MakePart, Part
 
 # The streets of the cities, in turn. Metropolis is kept for tests.
 MAPS = ("riverside", "suburbia", "downtown")

@@ -10,9 +10,9 @@ from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction, map_source
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.pair import NamedDrive, Pair, Result
 
 # Expected time to start a job and to open a drive [s].

@@ -15,12 +15,12 @@ from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.result_number import Number
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.databases import searched_database
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import (
     measure_method,
     measure_places,
     shown_overlaps,
 )
+from evaluation.study.storage.parts import MakePart, Part
 from evaluation.study.tasks.jobs import Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task

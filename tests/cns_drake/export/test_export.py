@@ -21,8 +21,8 @@ from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.base.progress import Listener, heard_by
 from cns_drake.export.exporting import export_drive
 from evaluation import drives
-from evaluation.study.map_drives import drives_by_map
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.map_drives import drives_by_map
+from evaluation.study.recordings.recording_search import find_recordings
 
 
 @pytest.fixture(scope="module")

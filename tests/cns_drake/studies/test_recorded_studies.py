@@ -20,7 +20,7 @@ from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.table import Results
 from evaluation.study import engine
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, make_block_scene, run
 import pytest
 
-from evaluation.study import stages_report
+from evaluation.study.report_jobs import stages_report
 
 
 @pytest.fixture(scope="module")

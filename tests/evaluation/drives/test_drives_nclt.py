@@ -8,7 +8,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.drives import open_drive
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.recording_search import find_recordings
 
 T0_US = 1_326_030_975_726_043
 STEP_US = 200_000

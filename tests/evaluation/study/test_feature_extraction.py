@@ -21,10 +21,10 @@ from evaluation.study.feature_extraction import (
     FeatureExtraction,
     extract_features,
 )
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import measure_method
 from evaluation.study.sources import RecordingSource
-from evaluation.study.study_files import FeatureFiles
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import FeatureFiles
 
 pytestmark = pytest.mark.slow
 

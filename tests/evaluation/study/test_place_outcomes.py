@@ -15,10 +15,10 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import place_measurements
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.parts import MakePart, Part
 from evaluation.study.place_measurements import measure_places
 from evaluation.study.sources import RecordingSource
-from evaluation.study.study_files import FeatureFiles
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import FeatureFiles
 
 METHODS = (
     MethodChoice("solid"),

@@ -10,9 +10,9 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.parts import Part
-from evaluation.study.recording_search import find_recordings
-from evaluation.study.stages_report import StagesReport
+from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study.report_jobs.stages_report import StagesReport
+from evaluation.study.storage.parts import Part
 
 pytestmark = pytest.mark.slow
 

@@ -24,8 +24,8 @@ from cns_drake.studies.recordings.reproduction import (
 )
 from evaluation.methods import registry
 from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study.map_drives import drives_by_map
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.map_drives import drives_by_map
+from evaluation.study.recordings.recording_search import find_recordings
 
 pytestmark = pytest.mark.slow
 

@@ -25,9 +25,12 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.study import chosen_methods
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.map_drives import drives_by_map
-from evaluation.study.recording_search import find_recordings
-from evaluation.study.stages_report import StagesReport, report_on_recordings
+from evaluation.study.recordings.map_drives import drives_by_map
+from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study.report_jobs.stages_report import (
+    StagesReport,
+    report_on_recordings,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.paper import reference_for
-from evaluation.study.map_drives import RecordingInfo, drives_by_map
-from evaluation.study.stages_report import StagesReport
+from evaluation.study.recordings.map_drives import RecordingInfo, drives_by_map
+from evaluation.study.report_jobs.stages_report import StagesReport
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):

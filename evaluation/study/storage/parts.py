@@ -2,9 +2,9 @@
 
 A part is the file of one intermediate result. The first line of the file names
 the format, and the second line contains the inputs as JSON. The result follows
-(see `evaluation.study.value_encoding`), compressed by zstd at its fastest
-level. Compression halves the size of maps. Spectra hardly shrink; compressing
-50 MB of spectra takes a tenth of a second.
+(see `evaluation.study.storage.value_encoding`), compressed by zstd at its
+fastest level. Compression halves the size of maps. Spectra hardly shrink;
+compressing 50 MB of spectra takes a tenth of a second.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,7 +21,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, make_folder, user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.jobs.step import Reporter, Step
-from evaluation.study.value_encoding import (
+from evaluation.study.storage.value_encoding import (
     DECODING_ERRORS,
     annotations,
     decode,

@@ -10,8 +10,8 @@ import pytest
 from cns_drake.base.file_names import file_name
 from evaluation.results.table_forms import Table
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.figures import change_stems
-from evaluation.study.map_drives import MapDrives, RecordingInfo
+from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
+from evaluation.study.report_jobs.figures import change_stems
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
 MAP = "..|[x](y)_$"

@@ -16,9 +16,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
-from evaluation.study import parts
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.value_encoding import decode, encode
+from evaluation.study.storage import parts
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.value_encoding import decode, encode
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 

@@ -19,7 +19,7 @@ from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.report.tables.faults import fault_numbers, fault_table
-from evaluation.study.fault_evidence import find_evidence
+from evaluation.study.report_jobs.fault_evidence import find_evidence
 
 HEIGHT = 1.6
 TABLE = {

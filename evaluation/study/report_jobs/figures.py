@@ -21,10 +21,10 @@ from evaluation.report.page_data import PageDrive, make_page_drive
 from evaluation.results.figure_files import PIXELS
 from evaluation.study.extraction_jobs import ExtractionJobs
 from evaluation.study.features import DriveSummary
-from evaluation.study.map_drives import MapDrives, Recordings
-from evaluation.study.parts import MakePart, Part
+from evaluation.study.recordings.map_drives import MapDrives, Recordings
 from evaluation.study.sources import DriveSource, RecordingSource
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.jobs import job_name
 
 # Format of pictures on the page.

@@ -13,7 +13,7 @@ from cns_drake.base.listing import listed, natural_key
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns
 from evaluation.drives.kitti import holds_kitti
-from evaluation.study.map_drives import RecordingInfo
+from evaluation.study.recordings.map_drives import RecordingInfo
 from evaluation.study.sources import RecordingSource
 
 # Names of drives that state map and stage. The first form ends in a date, as in

@@ -11,7 +11,7 @@ from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import described_key
 from evaluation.study.place_measurements import DescribedSource
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import NamedDrive, Pair
 

@@ -4,8 +4,8 @@ from helpers.small_towns import ROUTES, drive
 import pytest
 
 from cns_drake.base.drives.drive_scenario import driven_way
-from evaluation.study.map_drives import drives_by_map
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.map_drives import drives_by_map
+from evaluation.study.recordings.recording_search import find_recordings
 
 LEGS = ROUTES["a"]
 

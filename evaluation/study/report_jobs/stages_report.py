@@ -19,23 +19,23 @@ from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.tables.differences import method_differences
 from evaluation.results.table import Results
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
-from evaluation.study.city_report import CityReport
 from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.map_drives import (
+from evaluation.study.recordings.map_drives import (
     MapDrives,
     RecordingInfo,
     Recordings,
     drives_by_map,
     nothing_to_compare,
 )
-from evaluation.study.method_costs import measure_method_costs
-from evaluation.study.parts import MakePart
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings.recording_search import find_recordings
 from evaluation.study.removed_descriptors import (
     remove_descriptors,
     renew_removed_descriptors,
 )
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.report_jobs.city_report import CityReport
+from evaluation.study.report_jobs.method_costs import measure_method_costs
+from evaluation.study.storage.parts import MakePart
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.place import PlaceTask, PoseTask
 from evaluation.study.tasks.task import Task

@@ -8,8 +8,8 @@ from evaluation.drives.scan_clouds import cloud_at
 from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.parts import Part
 from evaluation.study.sources import DriveSource
+from evaluation.study.storage.parts import Part
 from evaluation.study.tasks.place import measure_costs
 
 

@@ -15,17 +15,20 @@ from evaluation.report.curve_figures import draw_pr_curves
 from evaluation.report.reference import Reference
 from evaluation.report.tables.queries import DriveTrack
 from evaluation.results.keys import LAST, OWN, STAGE
-from evaluation.study import figures
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine
 from evaluation.study.extraction_jobs import ExtractionJobs
-from evaluation.study.fault_evidence import explain_faults
 from evaluation.study.feature_extraction import Further
-from evaluation.study.map_drives import MapDrives, Recordings
-from evaluation.study.parts import MakePart, Part
-from evaluation.study.recorded_pairs import RecordedCondition, recorded_pairs
-from evaluation.study.repeats import Repeat, repeats_of
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.recordings.map_drives import MapDrives, Recordings
+from evaluation.study.recordings.recorded_pairs import (
+    RecordedCondition,
+    recorded_pairs,
+)
+from evaluation.study.report_jobs import figures
+from evaluation.study.report_jobs.fault_evidence import explain_faults
+from evaluation.study.report_jobs.repeats import Repeat, repeats_of
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import StudyFiles
 from evaluation.study.tasks.pair import Pair, Result
 
 # Expected time to compare two drives by a method [s].

@@ -3,8 +3,8 @@
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.study import recording_search
-from evaluation.study.recording_search import find_recordings
+from evaluation.study.recordings import recording_search
+from evaluation.study.recordings.recording_search import find_recordings
 
 
 def write_cns(folder, stage):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.file_names import file_name
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 
 @dataclass(frozen=True)

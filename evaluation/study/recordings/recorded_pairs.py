@@ -11,7 +11,7 @@ from cns_drake.base.repetitions import repeated
 from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import OWN
-from evaluation.study.map_drives import MapDrives, RecordingInfo
+from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.tasks.pair import Pair
 
 # Clocks of recordings that begin at 0 say nothing about their order: the first

@@ -9,9 +9,9 @@ import pytest
 
 from evaluation.methods import shipped_methods
 from evaluation.recognition import costs, search
-from evaluation.study.recording_search import find_recordings
-from evaluation.study.stages_report import StagesReport
-from evaluation.study.study_files import StudyFiles
+from evaluation.study.recordings.recording_search import find_recordings
+from evaluation.study.report_jobs.stages_report import StagesReport
+from evaluation.study.storage.study_files import StudyFiles
 
 pytestmark = pytest.mark.slow
 

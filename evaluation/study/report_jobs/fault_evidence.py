@@ -28,7 +28,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import SeenSurfaces
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import KeptScans
-from evaluation.study.parts import Part
+from evaluation.study.storage.parts import Part
 
 # Points at least this high above the ground are non-ground points [m].
 _LEAST_HEIGHT = 0.5

@@ -1,0 +1,1 @@
+"""Finds recordings, sorts them by map and stage, and forms their pairs."""

@@ -1,0 +1,1 @@
+"""The jobs of a report on recordings, and the figures that they draw."""

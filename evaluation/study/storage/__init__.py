@@ -1,0 +1,1 @@
+"""The files that keep the results of jobs, with the inputs they are made of."""
