@@ -306,7 +306,7 @@ def maps(path: Path, file: str, middle: Sequence[float]) -> None:
     colours[[Label.KEPT, Label.GONE, Label.NEW]] = (120, 126, 134), GONE, NEW
     figure = Figure(figsize=(WIDTH, 2.7), layout="constrained")
     words = "older map: gone is red", "newer map: new is blue"
-    view = point_rendering.View(-60.0, 28.0, 12.0)
+    view = point_rendering.OrthographicView(-60.0, 28.0, 12.0)
     for axes, side, text in zip(
         figure.subplots(1, 2), "AB", words, strict=True
     ):

@@ -22,7 +22,7 @@ _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
 
 
 @dataclass(frozen=True)
-class Plot:
+class TimePlot:
     """A curve over the time of the drive, as the page's template draws it.
 
     Attributes:
@@ -41,7 +41,7 @@ class Plot:
     ticks: Sequence[tuple[str, float]]
 
     @classmethod
-    def of(cls, name: str, unit: str, values: np.ndarray) -> Plot:
+    def of(cls, name: str, unit: str, values: np.ndarray) -> TimePlot:
         """Returns the plot of values over the time of a drive.
 
         Args:
@@ -96,7 +96,7 @@ def time_scale(duration: float) -> list[tuple[str, float]]:
     ]
 
 
-def motion_plots(drive: DriveRecord) -> list[Plot]:
+def motion_plots(drive: DriveRecord) -> list[TimePlot]:
     """Returns the plots of the speed and the IMU.
 
     A drive with fewer than two frames has no plots.
@@ -106,8 +106,8 @@ def motion_plots(drive: DriveRecord) -> list[Plot]:
     forces = np.array(drive.specific_forces_I)
     turns = np.rad2deg(drive.angular_velocities_I)
     return [
-        Plot.of("Speed", "km/h", 3.6 * np.array(drive.speeds)),
-        Plot.of("IMU, forward", "m/s²", forces[:, 0]),
-        Plot.of("IMU, left", "m/s²", forces[:, 1]),
-        Plot.of("IMU, turn", "deg/s", turns[:, 2]),
+        TimePlot.of("Speed", "km/h", 3.6 * np.array(drive.speeds)),
+        TimePlot.of("IMU, forward", "m/s²", forces[:, 0]),
+        TimePlot.of("IMU, left", "m/s²", forces[:, 1]),
+        TimePlot.of("IMU, turn", "deg/s", turns[:, 2]),
     ]

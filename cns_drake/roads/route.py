@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.roads.lane_path import DENSE_SPACING, LanePath, sample_lane_path
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
-from cns_drake.roads.u_turn import find_loop
+from cns_drake.roads.u_turn import find_u_turn
 
 # Length of a lane change where the road has room for it [m].
 LANE_CHANGE_LENGTH = 50.0
@@ -316,13 +316,13 @@ def _turning_loop(
         farthest = road.length + beyond
         nearest = max(start, road.length - _TURNING_LENGTH)
         centres = np.arange(farthest, nearest, -_TURNING_STEP)
-    loop = find_loop(lanes_at, centres, network.areas.lane_area)
-    x, y, heading = lanes_at(loop.begin)[0]
-    ahead = (loop.points[:, 0] - x) * math.cos(heading)
-    ahead += (loop.points[:, 1] - y) * math.sin(heading)
-    z = road.height(_stations_of(road, leg, loop.begin + ahead))
-    points = np.column_stack([loop.points, z])[1:-1]
-    return points, loop.begin
+    u_turn = find_u_turn(lanes_at, centres, network.areas.lane_area)
+    x, y, heading = lanes_at(u_turn.begin)[0]
+    ahead = (u_turn.points[:, 0] - x) * math.cos(heading)
+    ahead += (u_turn.points[:, 1] - y) * math.sin(heading)
+    z = road.height(_stations_of(road, leg, u_turn.begin + ahead))
+    points = np.column_stack([u_turn.points, z])[1:-1]
+    return points, u_turn.begin
 
 
 def _offsets_moved_right(

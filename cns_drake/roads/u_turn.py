@@ -81,7 +81,7 @@ def loop_corners(
     return np.concatenate(corners)
 
 
-class Loop(NamedTuple):
+class UTurn(NamedTuple):
     """A car's U-turn into the opposite lane.
 
     Attributes:
@@ -94,11 +94,11 @@ class Loop(NamedTuple):
     points: np.ndarray
 
 
-def find_loop(
+def find_u_turn(
     lanes_at: Callable[[float], tuple[np.ndarray, float]],
     centres: np.ndarray,
     area: BaseGeometry,
-) -> Loop:
+) -> UTurn:
     """Returns a U-turn into the opposite lane that fits into an area.
 
     Several places along the lane are tried, and the first place with enough
@@ -124,7 +124,7 @@ def find_loop(
         points = _loop_points(np.array([x, y]), heading, width)
         swept = swept_area(points)
         if area.covers(swept):
-            return Loop(begin, points)
+            return UTurn(begin, points)
         middle = _loop_centre(np.array([x, y]), heading, width)
         left = np.array([-math.sin(heading), math.cos(heading)])
         sideways = (shapely.get_coordinates(swept) - middle) @ left

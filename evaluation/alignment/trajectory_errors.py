@@ -31,7 +31,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.drives.mcap_messages import checked_poses
 from cns_drake.base.errors import InputError
 from evaluation.drives.sampling import travelled
-from evaluation.drives.trajectories import Trajectory
+from evaluation.drives.trajectories import StampedPoses
 
 Frame = Literal["lidar", "base_link"]
 # Length of the parts over which an odometry drifts [m].
@@ -126,7 +126,7 @@ class TrajectoryErrors:
 
 def trajectory_errors(
     drive: Drive,
-    estimate: Trajectory,
+    estimate: StampedPoses,
     frame: Frame = "lidar",
     time_offset: float = 0.0,
 ) -> TrajectoryErrors:
@@ -220,10 +220,10 @@ def segment_errors(
     return starts, ends, poses.inverse(motion(Y)) @ motion(X)
 
 
-def _true_poses(drive: Drive, frame: Frame) -> Trajectory:
+def _true_poses(drive: Drive, frame: Frame) -> StampedPoses:
     source = Path(drive.name)
     if frame == "lidar":
-        return Trajectory(source, drive.stamps_ns, drive.X_WS)
+        return StampedPoses(source, drive.stamps_ns, drive.X_WS)
     rows = drive.odometry
     if rows is None:
         raise InputError(
@@ -233,7 +233,7 @@ def _true_poses(drive: Drive, frame: Frame) -> Trajectory:
     stamps_ns, order = np.unique(rows["stamp_ns"], return_index=True)
     rows = rows[order]
     X_WB = checked_poses(rows["position"], rows["quat_xyzw"], drive.name)
-    return Trajectory(source, stamps_ns, X_WB)
+    return StampedPoses(source, stamps_ns, X_WB)
 
 
 def _seconds_text(stamps_ns: np.ndarray) -> str:

@@ -25,7 +25,7 @@ _COLUMNS = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class StampedPoses:
     """Poses at increasing times.
 
     Attributes:
@@ -121,7 +121,7 @@ class Trajectory:
         return self.X_WB[nearest]
 
 
-def read_matrices(path: Path, separator: str | None) -> Trajectory:
+def read_matrices(path: Path, separator: str | None) -> StampedPoses:
     """Returns the trajectory in a table of times and poses.
 
     Each row of the table is a time and 12 numbers: the upper three rows of the
@@ -136,14 +136,14 @@ def read_matrices(path: Path, separator: str | None) -> Trajectory:
             a pose is no rotation, or the poses are not in order of time.
     """
     stamps_ns, values = read_stamped_rows(path, 12, separator)
-    return _increasing_trajectory(path, stamps_ns, pose_matrices(path, values))
+    return _increasing_poses(path, stamps_ns, pose_matrices(path, values))
 
 
 def read_quaternions(
     path: Path,
     separator: str | None,
     parse: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> Trajectory:
+) -> StampedPoses:
     """Reads a trajectory: rows with a time, x y z [m] and quaternion x y z w.
 
     Args:
@@ -167,14 +167,12 @@ def read_quaternions(
         )
     R = poses.rotation_from_quaternion(values[:, 3:])
     _check_positions(path, values[:, :3])
-    return _increasing_trajectory(
-        path, stamps_ns, poses.make_pose(R, values[:, :3])
-    )
+    return _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
 def read_angles(
     path: Path, num_velocities: int = 0
-) -> tuple[Trajectory, tuple[str, ...]]:
+) -> tuple[StampedPoses, tuple[str, ...]]:
     """Reads a trajectory: rows with a time, a position and three angles.
 
     Times are in microseconds; roll, pitch and yaw are in radians.
@@ -209,9 +207,7 @@ def read_angles(
     num_unknown = len(rows) - len(known)
     note = f"{path}: {num_unknown} rows with NaN are left out"
     return (
-        _increasing_trajectory(
-            path, stamps_ns, poses.make_pose(R, values[:, :3])
-        ),
+        _increasing_poses(path, stamps_ns, poses.make_pose(R, values[:, :3])),
         (note,) if num_unknown else (),
     )
 
@@ -270,11 +266,11 @@ def _check_positions(path: Path, positions: np.ndarray) -> None:
         )
 
 
-def _increasing_trajectory(
+def _increasing_poses(
     path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
-) -> Trajectory:
+) -> StampedPoses:
     # Loggers may repeat lines; equal rows are harmless.
     news = np.append(True, np.diff(stamps_ns) != 0)
     news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))
     check_increasing(path, stamps_ns[news], "pose")
-    return Trajectory(path, stamps_ns[news], X_WB[news])
+    return StampedPoses(path, stamps_ns[news], X_WB[news])

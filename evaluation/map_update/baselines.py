@@ -21,7 +21,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
 from evaluation.map_update.free_space import by_free_space
-from evaluation.map_update.labels import SIDES, Labels
+from evaluation.map_update.labels import SIDES, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair, Session
 
@@ -39,7 +39,7 @@ _LEAST_CHANGE = 0.1
 _CHUNK = 50_000
 
 
-def run_baseline(name: str, pair: Pair) -> Labels:
+def run_baseline(name: str, pair: Pair) -> PairLabels:
     """Returns the labels of both maps by a shipped change detector.
 
     Args:
@@ -51,7 +51,7 @@ def run_baseline(name: str, pair: Pair) -> Labels:
             package is not installed.
     """
     label = BASELINES[name]
-    return Labels(
+    return PairLabels(
         *(label(mine, theirs) for mine, theirs in (pair, (pair.B, pair.A)))
     )
 

@@ -34,7 +34,7 @@ SIDES = {
 }
 
 
-class Labels(NamedTuple):
+class PairLabels(NamedTuple):
     """Labels of the points of both maps.
 
     Attributes:

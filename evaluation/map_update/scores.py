@@ -33,7 +33,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
-from evaluation.map_update.labels import SIDES, Label, Labels
+from evaluation.map_update.labels import SIDES, Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair
 from evaluation.map_update.structures import verdicts
@@ -51,7 +51,10 @@ _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
 
 
 def score(
-    pair: Pair, truth: Labels, predicted: Labels, names: Mapping[int, str]
+    pair: Pair,
+    truth: PairLabels,
+    predicted: PairLabels,
+    names: Mapping[int, str],
 ) -> dict:
     """Returns all scores of predicted labels, ready for JSON.
 
@@ -96,8 +99,8 @@ class _Labelled(NamedTuple):
     """Both maps with their labels, and masks of the points that count."""
 
     pair: Pair
-    truth: Labels
-    predicted: Labels
+    truth: PairLabels
+    predicted: PairLabels
     counted: list[np.ndarray]
 
     def only(self, kept: list[np.ndarray]) -> _Labelled:

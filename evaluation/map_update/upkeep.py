@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.map_update.baselines import BASELINES
-from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.map_builder import CELL
 from evaluation.map_update.sessions import Pair, Session, scan_path
 from evaluation.maps.grid_cells import cell_keys
@@ -33,7 +33,7 @@ _CUBE = 0.4
 
 # A change detector: labels the points of the map so far and of the next drive's
 # map.
-Detect = Callable[[Pair], Labels]
+Detect = Callable[[Pair], PairLabels]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from evaluation.change.drive_change import ChangeResult
 from evaluation.change.tcr import judge_points
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.report.point_rendering import (
+    OrthographicView,
     Picture,
-    View,
     colour_by_height,
     render,
     shade_by_height,
@@ -57,9 +57,13 @@ _SCALE_BAR = 50.0
 _ROUTE_POINTS = 400
 _PANEL_INCHES = 4.2
 
-_OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
+_OBLIQUE = OrthographicView(
+    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0
+)
 _SMALL_OBLIQUE = replace(_OBLIQUE, pixels_per_metre=1.8)
-_FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
+_FROM_ABOVE = OrthographicView(
+    azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5
+)
 
 
 def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
@@ -193,7 +197,9 @@ def _draw_sets(
     )
 
 
-def _render_shaded(points: np.ndarray, rgb: np.ndarray, view: View) -> Picture:
+def _render_shaded(
+    points: np.ndarray, rgb: np.ndarray, view: OrthographicView
+) -> Picture:
     return render(
         points, shade_by_height(rgb, points[:, 2], darkest=0.85), view
     )

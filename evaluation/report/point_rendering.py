@@ -19,7 +19,7 @@ _STEP_LIMIT = 4.0
 
 
 @dataclass(frozen=True)
-class View:
+class OrthographicView:
     """An orthographic camera that looks at the ground.
 
     Attributes:
@@ -62,7 +62,7 @@ class Picture:
 
     image: np.ndarray
     origin: np.ndarray
-    view: View
+    view: OrthographicView
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -81,7 +81,10 @@ class Picture:
 
 
 def render(
-    points: np.ndarray, rgb: np.ndarray, view: View, size_px: int = 3
+    points: np.ndarray,
+    rgb: np.ndarray,
+    view: OrthographicView,
+    size_px: int = 3,
 ) -> Picture:
     """Draws a cloud as an orthographic picture, with edges darkened.
 

@@ -16,7 +16,7 @@ from cns_drake.studies.ground_truth.labelled_drive import (
     labelled_drive,
 )
 from evaluation.map_update.baselines import run_baseline
-from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import Pair, write_session
 from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptMap
@@ -97,7 +97,7 @@ def _on_still_surfaces(
 
 def _exact_labels(
     pair: Pair, *, drive: LabelledDrive, frames: np.ndarray
-) -> Labels:
+) -> PairLabels:
     """Returns the exact labels of the map so far and of the next drive's map.
 
     Args:
@@ -108,4 +108,4 @@ def _exact_labels(
     gone = label_points(pair.A, drive, frames)
     far = nearest_distances(pair.B.points, pair.A.points, _KNOWN_WITHIN)
     new = np.where(np.isinf(far), Label.NEW, Label.KEPT)
-    return Labels(gone, new.astype(np.uint8))
+    return PairLabels(gone, new.astype(np.uint8))

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from evaluation.map_update.baselines import BASELINES, run_baseline
-from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_labels, read_pair, read_truth
 from evaluation.map_update.structures import class_names
@@ -47,7 +47,7 @@ class MapScores(NamedTuple):
     scores: dict[str, Any]
     gone: int
     new: int
-    labels: Labels
+    labels: PairLabels
 
 
 class MapTask(Task):
@@ -124,7 +124,7 @@ def score_methods(
         InputError: the folder cannot be read, or a detector cannot run.
     """
     pair = read_pair(maps)
-    truth = Labels(*read_truth(pair))
+    truth = PairLabels(*read_truth(pair))
     number = {
         "gone": int((truth.A == Label.GONE).sum()),
         "new": int((truth.B == Label.NEW).sum()),
@@ -132,7 +132,7 @@ def score_methods(
     found = {}
     for method in (*methods, *((GIVEN,) if given else ())):
         if method == GIVEN:
-            labels = Labels(
+            labels = PairLabels(
                 *(
                     read_labels(path, session, truth=False)
                     for path, session in zip(given, pair, strict=True)

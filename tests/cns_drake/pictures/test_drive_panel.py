@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.pictures.drive_record import DriveRecord
-from cns_drake.pictures.motion_plots import Plot, motion_plots
+from cns_drake.pictures.motion_plots import TimePlot, motion_plots
 from cns_drake.pictures.page_panel import ShownStages, make_panel
 
 
@@ -17,19 +17,19 @@ def points(plot):
 
 
 def test_curve_goes_from_left_to_right_and_up():
-    plot = Plot.of("Speed", "km/h", np.array([0, 20, 10]))
+    plot = TimePlot.of("Speed", "km/h", np.array([0, 20, 10]))
     # Zero is at the bottom, the greatest value at the top.
     np.testing.assert_allclose(points(plot), [[0, 20], [200, 0], [400, 10]])
     assert plot.values == "0.0,20.0,10.0"
 
 
 def test_curve_has_a_scale():
-    plot = Plot.of("Speed", "km/h", np.array([0, 20, 10]))
+    plot = TimePlot.of("Speed", "km/h", np.array([0, 20, 10]))
     assert plot.ticks == [("0", 1.0), ("20", 0.0)]
 
 
 def test_curve_of_both_signs_has_its_zero_line():
-    plot = Plot.of("IMU, left", "m/s²", np.array([-3.0, 0.0, 1.0]))
+    plot = TimePlot.of("IMU, left", "m/s²", np.array([-3.0, 0.0, 1.0]))
     np.testing.assert_allclose(points(plot)[:, 1], [20.0, 5.0, 0.0])
     assert ("0", 0.25) in plot.ticks
 
@@ -38,7 +38,7 @@ def test_curve_of_both_signs_has_its_zero_line():
 @pytest.mark.parametrize("sign", [1, -1])
 def test_scale_has_at_least_two_round_values(scale, sign):
     for unit in ("km/h", "m/s²", "deg/s"):
-        ticks = Plot.of("a", unit, np.array([0.0, sign * scale])).ticks
+        ticks = TimePlot.of("a", unit, np.array([0.0, sign * scale])).ticks
         assert 2 <= len(ticks) <= 3
         assert all(0.0 <= share <= 1.0 for _, share in ticks)
 
@@ -71,14 +71,14 @@ def test_page_says_which_points_it_shows():
 
 @pytest.mark.parametrize("value", [0.0, 1e-9, -1e-9])
 def test_noise_is_not_stretched(value):
-    plot = Plot.of("IMU, turn", "deg/s", np.array([0.0, value]))
+    plot = TimePlot.of("IMU, turn", "deg/s", np.array([0.0, value]))
     y = points(plot)[:, 1]
     assert abs(y[0] - y[1]) < 0.1
     assert plot.values == "0.0,0.0"
 
 
 def test_long_drive_has_few_samples_from_first_to_last():
-    plot = Plot.of("Speed", "km/h", np.arange(3001.0))
+    plot = TimePlot.of("Speed", "km/h", np.arange(3001.0))
     said = plot.values.split(",")
     assert len(said) == len(points(plot)) == 400
     assert (said[0], said[-1]) == ("0.0", "3000.0")

@@ -13,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import main
 from evaluation.map_update.baselines import by_distance
 from evaluation.map_update.free_space import by_free_space
-from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.map_builder import CELL, MapBuilder
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
@@ -51,7 +51,7 @@ def clouds(folder, seed=3, size=400):
         chosen = rng.choice(labels, size).astype(np.uint8)
         write_labels(folder / side / "truth.npy", chosen)
         truth.append(chosen)
-    return read_pair(folder), Labels(*truth)
+    return read_pair(folder), PairLabels(*truth)
 
 
 def test_the_truth_scores_one(tmp_path):
@@ -69,7 +69,7 @@ def test_a_class_that_the_truth_lacks_is_left_out_of_the_mean(tmp_path):
     truth.A[truth.A == Label.GONE] = Label.KEPT
     guess = truth.A.copy()
     guess[np.flatnonzero(guess == Label.KEPT)[:5]] = Label.GONE
-    found = score(pair, truth, Labels(guess, truth.B), {})
+    found = score(pair, truth, PairLabels(guess, truth.B), {})
     kept = sum(int((labels == Label.KEPT).sum()) for labels in truth)
     assert found["iou_gone"] == 0.0
     assert found["iou_kept"] == (kept - 5) / kept
@@ -124,7 +124,7 @@ def test_each_mean_leaves_out_what_its_own_part_lacks(tmp_path):
 def test_all_kept_scores_what_counting_says(tmp_path):
     pair, truth = clouds(tmp_path)
     all_kept = np.full(400, Label.KEPT, np.uint8)
-    found = score(pair, truth, Labels(all_kept, all_kept), {})
+    found = score(pair, truth, PairLabels(all_kept, all_kept), {})
     kept = sum(int((labels == 1).sum()) for labels in truth)
     assert found["iou_kept"] == kept / 800
     for name in ("gone", "new", "unobserved"):
@@ -185,7 +185,7 @@ def test_what_is_called_changed_is_counted(tmp_path):
 
 def test_points_are_left_out(tmp_path):
     pair, truth = clouds(tmp_path)
-    guess = Labels(*(labels.copy() for labels in truth))
+    guess = PairLabels(*(labels.copy() for labels in truth))
     guess.A[:100] = np.where(truth.A[:100] == 1, 2, 1)
     assert score(pair, truth, guess, {})["miou"] < 1.0
     truth.A[:100] = Label.IGNORED

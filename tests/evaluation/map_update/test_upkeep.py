@@ -5,7 +5,7 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.drives.drive_views import DriveView
-from evaluation.map_update.labels import Label, Labels
+from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.sessions import write_session
 from evaluation.map_update.upkeep import UpkeptMap
 from evaluation.map_update.upkept_drive import UpkeptDrive, visible_points
@@ -66,7 +66,7 @@ def exact(pair):
     ):
         there = [tuple(one) in other for one in own.points.round(6)]
         found.append(np.where(there, Label.KEPT, changed).astype(np.uint8))
-    return Labels(*found)
+    return PairLabels(*found)
 
 
 def test_a_wall_that_is_gone_leaves_the_scans_of_older_drives(keeper):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from evaluation.report.point_rendering import (
-    View,
+    OrthographicView,
     colour_by_height,
     render,
     shade_by_height,
@@ -15,11 +15,11 @@ GREEN = (0, 200, 0)
 def test_axes_of_the_camera():
     # With the camera above and turned to the north, east is right and north is
     # up.
-    above = View(azimuth_deg=-90.0, elevation_deg=90.0).axes()
+    above = OrthographicView(azimuth_deg=-90.0, elevation_deg=90.0).axes()
     np.testing.assert_allclose(
         above, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], atol=1e-12
     )
-    axes = View(azimuth_deg=20.0, elevation_deg=35.0).axes()
+    axes = OrthographicView(azimuth_deg=20.0, elevation_deg=35.0).axes()
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
     # Higher points are drawn higher.
@@ -28,7 +28,9 @@ def test_axes_of_the_camera():
 
 
 def test_the_nearer_point_hides_the_farther():
-    view = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=1.0)
+    view = OrthographicView(
+        azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=1.0
+    )
     # Points above each other in both orders, and two more to span an image.
     points = np.array(
         [[2.3, 2.3, 5.0], [2.3, 2.3, 0.0], [0, 0, 0], [4.3, 4.3, 0]]
@@ -45,7 +47,9 @@ def test_the_nearer_point_hides_the_farther():
 
 
 def test_points_cover_squares_and_steps_darken():
-    view = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=1.0)
+    view = OrthographicView(
+        azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=1.0
+    )
     points = np.array([[0.0, 0.0, 0.0], [3.3, 0.0, 0.0]])
     colours = np.array([RED, RED], dtype=np.uint8)
     flat = render(points, colours, view, size_px=3).image
@@ -59,7 +63,9 @@ def test_points_cover_squares_and_steps_darken():
 
 
 def test_pixels_and_coordinates_agree():
-    view = View(azimuth_deg=-50.0, elevation_deg=40.0, pixels_per_metre=2.0)
+    view = OrthographicView(
+        azimuth_deg=-50.0, elevation_deg=40.0, pixels_per_metre=2.0
+    )
     rng = np.random.default_rng(0)
     points = rng.uniform(-20, 20, (40, 3))
     colours = np.zeros((40, 3), dtype=np.uint8)
