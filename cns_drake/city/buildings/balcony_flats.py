@@ -14,6 +14,7 @@ from cns_drake.city.facades import (
     Relief,
     Site,
     WallFrame,
+    around,
     balconies,
     bays,
     equip_roof,
@@ -44,18 +45,18 @@ class BalconyFlats(Building):
         )
         self.storey = self.uniform(2.8, 3.1)
         self.pitch = max(self.uniform(2.8, 3.6), site.width / 16)
-        self.window_width = self.uniform(1.3, 2.0, 2)
-        self.recess = self.uniform(0.12, 0.22, 2)
-        self.balcony_width = self.uniform(2.8, 3.8, 2)
-        self.balcony_reach = self.uniform(1.1, 1.5, 2)
+        self.window_width = self.uniform(1.3, 2.0, digits=2)
+        self.recess = self.uniform(0.12, 0.22, digits=2)
+        self.balcony_width = self.uniform(2.8, 3.8, digits=2)
+        self.balcony_reach = self.uniform(1.1, 1.5, digits=2)
         # `stacks` (one above the other), `ribbons` (all along the front) or
         # `checks` (every other one left out).
         self.balconies = self.pick(("stacks", "ribbons", "checks"))
-        self.rail = self.uniform(0.9, 1.1, 2)
+        self.rail = self.uniform(0.9, 1.1, digits=2)
         # `slit` (a strip of glass) or `tower` (stands out in front).
         self.stair = self.pick(("slit", "tower"))
         self.roof_items = self.draw_roof_items(
-            "stair_house tank mast vents dish", 1, 6
+            "stair_house tank mast vents dish", low=1, high=6
         )
 
     def build(self) -> None:
@@ -72,10 +73,12 @@ class BalconyFlats(Building):
         ground = _storey_walls(self, storey, walls, ground=True)
         top = tiers.add_ground(self, plan, ground)
         count, per_group, exact = tiers.storey_groups(
-            (storeys - 1 - lower) * storey, storey, 5
+            (storeys - 1 - lower) * storey, storey=storey, most=5
         )
         facade = _storey_walls(self, exact, walls)
-        top = tiers.add_storeys(self, plan, facade, top, count, per_group)
+        top = tiers.add_storeys(
+            self, plan, facade, z0=top, groups=count, per_group=per_group
+        )
         common = count * per_group
         _add_balconies(
             self,
@@ -87,16 +90,37 @@ class BalconyFlats(Building):
             part = f"section_{k}"
             high = top
             if lower and k % 2 == 0:
-                rows = bays.rhythm(self.pitch, [_window(self, exact)], 0.5)
-                attic = Facade(exact, (), rows, (self.recess,))
-                high = tiers.add_storeys(
-                    self, section, attic, top, 1, lower, part=f"{part}_storey"
+                rows = bays.rhythm(
+                    self.pitch, [_window(self, exact)], margin=0.5
                 )
-            rim = Facade(0.9, (Band(0.0, 0.15, -0.08), Band(0.75, 0.9, -0.08)))
+                attic = Facade(
+                    exact, bands=(), layout=rows, glass=(self.recess,)
+                )
+                high = tiers.add_storeys(
+                    self,
+                    section,
+                    attic,
+                    z0=top,
+                    groups=1,
+                    per_group=lower,
+                    part=f"{part}_storey",
+                )
+            rim = Facade(
+                0.9,
+                bands=(
+                    Band(z0=0.0, z1=0.15, depth=-0.08),
+                    Band(z0=0.75, z1=0.9, depth=-0.08),
+                ),
+            )
             roof = tiers.add_crown(
-                self, section, rim, high, 0.6, part=f"{part}_crown",
+                self,
+                section,
+                rim,
+                z0=high,
+                parapet=0.6,
+                part=f"{part}_crown",
                 thickness=0.25,
-            )  # fmt: skip
+            )
             items = self.roof_items[k :: self.sections]
             equip_roof(self, section, roof, items, prefix=f"{part}_")
         high = ground.height + common * exact
@@ -106,31 +130,47 @@ class BalconyFlats(Building):
         self.add("stairs", *stairs, finish=self.colours["rail"])
 
 
-def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
+def _sections(flats: BalconyFlats, site: Site) -> list[np.ndarray]:
     """Returns the outlines of the rectangular sections, left to right."""
     x0, y0, x1, _ = site.bounds
-    bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
-    fronts = [y0 + _FRONT_M + p.stagger * (k % 2) for k in range(p.sections)]
+    bounds = np.round(np.linspace(x0, x1, flats.sections + 1), 2).tolist()
+    fronts = [
+        y0 + _FRONT_M + flats.stagger * (k % 2) for k in range(flats.sections)
+    ]
     return [
-        outlines.rectangle(a, round(y, 2), b, round(y + p.depth, 2))
+        outlines.rectangle(a, round(y, 2), b, round(y + flats.depth, 2))
         for (a, b), y in zip(itertools.pairwise(bounds), fronts, strict=True)
     ]
 
 
-def _window(p: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
-    return bays.window(p.window_width, sill, storey - 0.45, p.recess)
+def _window(flats: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
+    return bays.window(
+        width=flats.window_width,
+        sill=sill,
+        head=storey - 0.45,
+        depth=flats.recess,
+    )
 
 
 def _storey_walls(
-    p: BalconyFlats, storey: float, walls: list[_Front], *, ground: bool = False
+    flats: BalconyFlats,
+    storey: float,
+    walls: list[_Front],
+    *,
+    ground: bool = False,
 ) -> Facade:
     """Returns the walls of a storey, with doors and a plinth if `ground`."""
-    window, french = _window(p, storey), _window(p, storey, 0.12)
-    slit = bays.window(1.3, 0.3, storey, p.recess)
-    door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)
+    window, french = _window(flats, storey), _window(flats, storey, 0.12)
+    slit = bays.window(width=1.3, sill=0.3, head=storey, depth=flats.recess)
+    door = bays.window(
+        width=1.6, sill=0.0, head=2.3, depth=flats.recess, mullions=1
+    )
     by_front = {front.edge: front for front in walls}
-    blank = bays.alone(bays.window(1.0, 1.0, storey - 0.5, p.recess), 2.0)
-    rows = bays.rhythm(p.pitch, [window], 0.5)
+    blank = bays.alone(
+        bays.window(width=1.0, sill=1.0, head=storey - 0.5, depth=flats.recess),
+        width=2.0,
+    )
+    rows = bays.rhythm(flats.pitch, [window], margin=0.5)
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
         if edge not in by_front:
@@ -141,19 +181,25 @@ def _storey_walls(
             if k == front.middle:
                 if ground:
                     relief += door(a, b)
-                elif p.stair == "slit":
+                elif flats.stair == "slit":
                     relief += slit(a, b)
             else:
                 has_balcony = k in front.spots and not ground
                 relief += (french if has_balcony else window)(a, b)
         return relief
 
-    band = Band(0.0, 0.35, -0.06) if ground else Band(0.0, 0.12, -0.04)
-    return Facade(round(storey, 3), (band,), layout, (p.recess,))
+    band = (
+        Band(z0=0.0, z1=0.35, depth=-0.06)
+        if ground
+        else Band(z0=0.0, z1=0.12, depth=-0.04)
+    )
+    return Facade(
+        round(storey, 3), bands=(band,), layout=layout, glass=(flats.recess,)
+    )
 
 
 def _add_balconies(
-    p: BalconyFlats,
+    flats: BalconyFlats,
     walls: list[_Front],
     z0: float,
     stack: tiers.StoreyGroups,
@@ -161,47 +207,63 @@ def _add_balconies(
     """Adds the balconies of several storeys, one above another."""
     groups, per_group, storey = stack
     pieces: list[Mesh] = []
-    joined = p.balconies == "ribbons"
+    joined = flats.balconies == "ribbons"
     for front in walls:
         for a, b in _balcony_stretches(front.cells, front.spots, joined):
             width = b - a - 0.3
             if not joined:
-                width = min(width, p.balcony_width)
+                width = min(width, flats.balcony_width)
             x = (a + b) / 2
             ends = round(x - width / 2, 2), round(x + width / 2, 2)
-            balcony = balconies.balcony(*ends, p.balcony_reach, 0.0, p.rail)
+            balcony = balconies.balcony(
+                *ends, flats.balcony_reach, 0.0, flats.rail
+            )
             pieces += [
                 front.wall.place(balcony, k * storey) for k in range(per_group)
             ]
     if pieces:
         mesh = merge_meshes(*pieces)
         step = per_group * storey
-        p.stack("balconies", mesh, z0, step, groups, finish=p.colours["rail"])
+        flats.stack(
+            "balconies",
+            mesh,
+            z0=z0,
+            step=step,
+            count=groups,
+            finish=flats.colours["rail"],
+        )
 
 
 def _stair(
-    p: BalconyFlats, front: _Front, top: float, highest: bool
+    flats: BalconyFlats, front: _Front, top: float, highest: bool
 ) -> list[Mesh]:
     """Returns a canopy over the door, and the visible part of the stair.
 
-    If `p.stair` is `tower`, this part is a stair tower in front of the wall.
-    Otherwise it is a small house on the roof of the highest section.
+    If `flats.stair` is `tower`, this part is a stair tower in front of the
+    wall. Otherwise it is a small house on the roof of the highest section.
     """
     x, wall = front.stair, front.wall
     pieces = [
-        wall.box(x - 1.5, x + 1.5, -0.05, 1.4, 2.55, 2.75),
-        wall.standing(x - 1.4, x - 1.25, 1.1, 1.25, 2.6),
-        wall.standing(x + 1.25, x + 1.4, 1.1, 1.25, 2.6),
+        wall.box(x=around(x, 1.5), y=(-0.05, 1.4), z=(2.55, 2.75)),
+        wall.standing(x=(x - 1.4, x - 1.25), y=(1.1, 1.25), z1=2.6),
+        wall.standing(x=(x + 1.25, x + 1.4), y=(1.1, 1.25), z1=2.6),
     ]
-    if p.stair == "tower":
-        high = p.height if highest else top + 1.6
-        pieces.append(wall.box(x - 1.5, x + 1.5, -2.5, 0.9, 2.7, high))
-        for k in range(int((high - 4.2) / p.storey)):
-            z = 3.7 + k * p.storey
-            pieces.append(wall.box(x - 0.55, x + 0.55, 0.85, 0.98, z, z + 1.1))
+    if flats.stair == "tower":
+        high = flats.height if highest else top + 1.6
+        pieces.append(wall.box(x=around(x, 1.5), y=(-2.5, 0.9), z=(2.7, high)))
+        for k in range(int((high - 4.2) / flats.storey)):
+            z = 3.7 + k * flats.storey
+            pieces.append(
+                wall.box(x=around(x, 0.55), y=(0.85, 0.98), z=(z, z + 1.1))
+            )
     elif highest:
-        spot = (x - 2.2, x + 2.2, -5.0, -1.5)
-        pieces.append(wall.box(*spot, top - 0.1, p.height))
+        pieces.append(
+            wall.box(
+                x=around(x, 2.2),
+                y=(-5.0, -1.5),
+                z=(top - 0.1, flats.height),
+            )
+        )
     return pieces
 
 
@@ -224,15 +286,19 @@ def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
 class _Front:
     """The front wall of a section, with the bays of stair and balconies."""
 
-    def __init__(self, p: BalconyFlats, plan: np.ndarray, edge: int) -> None:
+    def __init__(
+        self, flats: BalconyFlats, plan: np.ndarray, edge: int
+    ) -> None:
         self.edge = edge
         self.wall = WallFrame(plan, edge)
-        self.cells = bays.stretches(self.wall.length, p.pitch, 0.5)
+        self.cells = bays.stretches(
+            self.wall.length, pitch=flats.pitch, margin=0.5
+        )
         self.middle = len(self.cells) // 2
         free = [k for k in range(len(self.cells)) if k != self.middle]
-        if p.balconies == "ribbons":
+        if flats.balconies == "ribbons":
             self.spots = free
-        elif p.balconies == "checks":
+        elif flats.balconies == "checks":
             self.spots = free[::2]
         else:
             last = len(self.cells) - 1

@@ -35,17 +35,17 @@ class BandedTower(Building):
         self.stacks = min(max(round(self.height / self.uniform(24, 40)), 1), 3)
         # Distance by which every other stack is smaller.
         self.taper = self.uniform(0.03, 0.08) * side
-        self.lobby = self.uniform(5.0, 7.5, 2)
+        self.lobby = self.uniform(5.0, 7.5, digits=2)
         self.storey = self.uniform(3.5, 4.0)
         # Height of the bands between the glass.
-        self.spandrel = self.uniform(0.9, 1.3, 2)
+        self.spandrel = self.uniform(0.9, 1.3, digits=2)
         # How far a sunshade above the glass sticks out.
         self.ledge = self.pick((0.15, 0.5, 0.8))
-        self.recess = self.uniform(0.2, 0.4, 2)
+        self.recess = self.uniform(0.2, 0.4, digits=2)
         # Distance between upright fins; 0 for none.
         self.fins = self.pick((0.0, 5.0, 7.0))
         self.roof_items = self.draw_roof_items(
-            "lift_house cooling_tower air_handler ac_unit mast", 2, 6
+            "lift_house cooling_tower air_handler ac_unit mast", low=2, high=6
         )
 
     def build(self) -> None:
@@ -58,7 +58,7 @@ class BandedTower(Building):
         step = max(2.8, 0.5 * self.radius)
         outer = np.round(
             outlines.rounded(
-                base, dict.fromkeys(self.corners, self.radius), step
+                base, dict.fromkeys(self.corners, self.radius), step=step
             ),
             3,
         )
@@ -68,7 +68,9 @@ class BandedTower(Building):
         z = _add_lobby(self, inner)
         gap = 3.4
         room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
-        counts = tiers.storey_groups(room, self.storey, 12 // self.stacks)
+        counts = tiers.storey_groups(
+            room, storey=self.storey, most=12 // self.stacks
+        )
         plans = {"wide": outer, "slim": inner}
         shapes = [
             (plan, _stack_adder(self, plan, counts, name))
@@ -80,31 +82,41 @@ class BandedTower(Building):
             if k + 1 < self.stacks:
                 z = _add_garden_floor(self, plan, inner, z, gap, k)
         rim = round(self.height - z, 3)
-        crown = Facade(rim, (Band(rim - 0.4, rim, -min(0.3, self.ledge)),))
+        crown = Facade(
+            rim,
+            bands=(Band(z0=rim - 0.4, z1=rim, depth=-min(0.3, self.ledge)),),
+        )
         parapet = min(0.9, rim - 0.1)
-        tiers.add_crown(self, plan, crown, z, parapet, items=self.roof_items)
+        tiers.add_crown(
+            self, plan, crown, z0=z, parapet=parapet, items=self.roof_items
+        )
 
 
-def _add_lobby(p: BandedTower, plan: np.ndarray) -> float:
+def _add_lobby(tower: BandedTower, plan: np.ndarray) -> float:
     """Adds the glazed ground floor with its entrance; returns its top [m]."""
-    h = p.lobby
-    pane = bays.ribbon(0.2, h - 0.9, 0.3, 0.16)
+    h = tower.lobby
+    pane = bays.ribbon(sill=0.2, head=h - 0.9, depth=0.3, post=0.16)
     # Long walls may meet at right angles, where their recesses must not touch.
-    short, long = (bays.rhythm(3.2, [pane], m) for m in (0.1, 0.45))
+    short, long = (bays.rhythm(3.2, [pane], margin=m) for m in (0.1, 0.45))
 
     def glazing(edge: int, length: float) -> Sequence[Relief]:
         return (short if length < 4.5 else long)(edge, length)
 
-    door = bays.entrance(3.4, 3.0, 1.2, surround=0.1)
-    layout = bays.with_door(glazing, door, 5.2)
-    facade = Facade(h, (Band(h - 0.6, h, -0.15),), layout, (0.3,))
+    door = bays.entrance(width=3.4, height=3.0, depth=1.2, surround=0.1)
+    layout = bays.with_door(glazing, door, width=5.2)
+    facade = Facade(
+        h,
+        bands=(Band(z0=h - 0.6, z1=h, depth=-0.15),),
+        layout=layout,
+        glass=(0.3,),
+    )
     half = min(3.5, max(1.2, WallFrame(plan, 0).length / 2 - 0.5))
-    lid = canopies.front_canopy(plan, half, 2.0, 3.5)
-    return tiers.add_ground(p, plan, facade, [lid])
+    lid = canopies.front_canopy(plan, half=half, reach=2.0, z=3.5)
+    return tiers.add_ground(tower, plan, facade, extras=[lid])
 
 
 def _add_garden_floor(
-    p: BandedTower,
+    tower: BandedTower,
     plan: np.ndarray,
     inner: np.ndarray,
     z0: float,
@@ -119,7 +131,7 @@ def _add_garden_floor(
     limit = outlines.inset_limit(inner)
     core = outlines.inset(inner, min(2.8, 0.6 * limit))
     walls = tiers.lidded_walls(
-        core, Facade(height, (Band(0.4, 2.9, 0.15),)), z0
+        core, Facade(height, bands=(Band(z0=0.4, z1=2.9, depth=0.15),)), z0
     )
     ring = outlines.inset(inner, min(0.8, 0.2 * limit))
     columns = []
@@ -128,16 +140,16 @@ def _add_garden_floor(
         count = max(1, round(wall.length / 7.0))
         for k in range(count):
             spot = wall.point((k + 0.5) * wall.length / count, 0.0)
-            shaft = outlines.regular_polygon(0.3, 8, spot)
-            columns.append(solids.skirt(shaft, shaft, z0, z0 + height))
-    floor = solids.roof_pan(plan, z0, z0 + 1.0, 0.2)
-    rim = solids.skirt(plan, plan, z0, z0 + 1.0)
-    p.add(f"garden_{number}", walls, floor, rim, *columns)
+            shaft = outlines.regular_polygon(radius=0.3, count=8, center=spot)
+            columns.append(solids.skirt(shaft, shaft, z0=z0, z1=z0 + height))
+    floor = solids.roof_pan(plan, z_floor=z0, z_top=z0 + 1.0, thickness=0.2)
+    rim = solids.skirt(plan, plan, z0=z0, z1=z0 + 1.0)
+    tower.add(f"garden_{number}", walls, floor, rim, *columns)
     return round(z0 + height, 3)
 
 
 def _stack_adder(
-    p: BandedTower, plan: np.ndarray, counts: tiers.StoreyGroups, name: str
+    tower: BandedTower, plan: np.ndarray, counts: tiers.StoreyGroups, name: str
 ) -> Callable[[float, int], float]:
     """Returns a function that adds a stack of storeys with one outline.
 
@@ -147,37 +159,47 @@ def _stack_adder(
     groups, per_group, storey = counts
     step = per_group * storey
     bands = (
-        Band(0.0, p.spandrel, 0.0),
-        Band(p.spandrel, storey, p.recess),
-        Band(storey - 0.2, storey, -p.ledge),
+        Band(z0=0.0, z1=tower.spandrel, depth=0.0),
+        Band(z0=tower.spandrel, z1=storey, depth=tower.recess),
+        Band(z0=storey - 0.2, z1=storey, depth=-tower.ledge),
     )
-    facade = Facade(storey, bands, glass=(p.recess,)).stacked(per_group)
+    facade = Facade(storey, bands=bands, glass=(tower.recess,)).stacked(
+        per_group
+    )
     pieces = [facade_mesh(plan, facade)]
-    if p.fins > 0:
+    if tower.fins > 0:
         # The piers cross the sunshades and join the piers above and below.
-        pieces.append(piers.wall_piers(
-            plan, p.fins, 0.18, p.ledge + 0.1, 0.0, step,
-            depth=p.recess + 0.05, margin=0.8,
-        ))  # fmt: skip
+        pieces.append(
+            piers.wall_piers(
+                plan,
+                pitch=tower.fins,
+                width=0.18,
+                reach=tower.ledge + 0.1,
+                z0=0.0,
+                z1=step,
+                depth=tower.recess + 0.05,
+                margin=0.8,
+            )
+        )
     height = round(groups * step, 3)
-    pane = outlines.inset(plan, p.recess - 0.004)
+    pane = outlines.inset(plan, tower.recess - 0.004)
     meshes = {
         name: merge_meshes(*pieces),
-        f"{name}_glass": solids.skirt(pane, pane, 0.0, height),
+        f"{name}_glass": solids.skirt(pane, pane, z0=0.0, z1=height),
         f"{name}_soffit": solids.flat(plan, 0.0, up=False),
     }
     walls, glass, soffit = (
-        MeshShape(p.define(part, mesh)) for part, mesh in meshes.items()
+        MeshShape(tower.define(part, mesh)) for part, mesh in meshes.items()
     )
 
     def place(z0: float, number: int) -> float:
         at = (0.0, 0.0, z0)
         part = f"stack_{number}"
-        p.place(f"{part}_glass", glass, at, finish=p.glass)
-        p.place(f"{part}_soffit", soffit, at)
+        tower.place(f"{part}_glass", glass, at, finish=tower.glass)
+        tower.place(f"{part}_soffit", soffit, at)
         for k in range(groups):
             z = z0 + k * step
-            p.place(f"{part}_storey_{k:02d}", walls, (0.0, 0.0, z))
+            tower.place(f"{part}_storey_{k:02d}", walls, (0.0, 0.0, z))
         return round(z0 + height, 3)
 
     return place

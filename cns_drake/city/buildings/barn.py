@@ -7,6 +7,7 @@ from cns_drake.city.facades import (
     Openings,
     Roof,
     Wing,
+    around,
     bays,
     boards,
     free_stretches,
@@ -35,8 +36,8 @@ class Barn(Building):
         self.wall = self.uniform(0.42, 0.58)
         # Depth of the jetty in front of a boat house; 0 for a barn.
         self.deck = self.pick((0.0, 0.0, 2.0)) if site.depth > 10.0 else 0.0
-        self.door_width = self.uniform(2.6, 4.4, 2)
-        self.door_height = self.uniform(2.4, 3.4, 2)
+        self.door_width = self.uniform(2.6, 4.4, digits=2)
+        self.door_height = self.uniform(2.4, 3.4, digits=2)
         # Width of the lean-to on one side; 0 for none.
         self.aisle = aisle if self.chance(0.6) and width > 9.0 else 0.0
         self.aisle_left = self.chance(0.5)
@@ -68,8 +69,10 @@ class Barn(Building):
             # A vault is at most half a circle.
             eaves = 0.0
             wall_top = max(wall_top, top - 0.8 * half)
-        roof = Roof(self.roof, along_y, eaves, 0.35, 0.18)
-        main = Wing.at((a, low, b, high), wall_top, top, roof)
+        roof = Roof(
+            self.roof, along_y=along_y, eaves=eaves, verge=0.35, thickness=0.18
+        )
+        main = Wing.at((a, low, b, high), wall_top=wall_top, top=top, roof=roof)
         boxes = [main]
         if self.aisle > 1.5:
             boxes.append(_lean_to(self, main, (left, right, back)))
@@ -80,52 +83,71 @@ class Barn(Building):
             _add_jetty(self, (left, right), y0, front)
 
 
-def _add_box(p: Barn, wing: Wing, boxes: list[Wing]) -> None:
+def _add_box(barn: Barn, wing: Wing, boxes: list[Wing]) -> None:
     """Adds one box of the barn: the main box with doors, or the lean-to."""
-    openings = Openings(p, wing, boxes)
+    openings = Openings(barn, wing, boxes)
     head = round(min(2.0, wing.wall_top - 0.3), 2)
-    window = bays.window(0.9, 1.1, head, _RECESS_M)
-    openings.add_bays(range(4), 1.0, 3.2, [window], 0.8)
+    window = bays.window(width=0.9, sill=1.1, head=head, depth=_RECESS_M)
+    openings.add_bays(range(4), z=1.0, pitch=3.2, choices=[window], margin=0.8)
     if wing is boxes[0]:
         for edge in (0,) if wing.roof.along_y else (3, 0):
-            _add_doors(p, wing, openings, edge)
+            _add_doors(barn, wing, openings, edge)
     low = wing.wall_top + 0.5
-    attic = wing_roofs.attic_window(1.0, low, low + 1.3, _RECESS_M)
-    openings.enclose((_RECESS_M,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    attic = wing_roofs.attic_window(
+        width=1.0, z0=low, z1=low + 1.3, depth=_RECESS_M
+    )
+    openings.enclose(
+        (_RECESS_M,), bands=(Band(z0=0.0, z1=0.3, depth=-0.06),), attic=attic
+    )
     for edge in range(4):
-        _add_battens(p, wing, boxes, openings, edge)
+        _add_battens(barn, wing, boxes, openings, edge)
 
 
-def _lean_to(p: Barn, main: Wing, limits: tuple[float, float, float]) -> Wing:
+def _lean_to(
+    barn: Barn, main: Wing, limits: tuple[float, float, float]
+) -> Wing:
     """Returns the lean-to against the long side of the barn."""
     left, right, back = limits
     along_y = main.roof.along_y
     high = main.wall_top + 0.1
-    low = max(1.9, high - 0.3 * p.aisle)
+    low = max(1.9, high - 0.3 * barn.aisle)
     high = max(high, low + 0.25)
     # The lean-to stands behind or beside the barn: the side to which its roof
     # falls.
     area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
     if along_y:
         a, b = main.x1 - 0.05, right
-        if p.aisle_left:
+        if barn.aisle_left:
             a, b = left, main.x0 + 0.05
         area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
-    falling = not (along_y and p.aisle_left)
-    roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=falling)
-    return Wing.at(area, low, high, roof)
+    falling = not (along_y and barn.aisle_left)
+    roof = Roof(
+        "shed",
+        along_y=along_y,
+        eaves=0.3,
+        verge=0.25,
+        thickness=0.15,
+        falling=falling,
+    )
+    return Wing.at(area, wall_top=low, top=high, roof=roof)
 
 
-def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
+def _add_doors(barn: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     """Adds a pair of braced doors that slide along the wall."""
     wall = wing.wall(edge)
-    width = min(p.door_width, 0.5 * wall.length)
-    height = min(p.door_height, wing.wall_top - 0.35)
+    width = min(barn.door_width, 0.5 * wall.length)
+    height = min(barn.door_height, wing.wall_top - 0.35)
     x = wall.length / 2
-    openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
-    if p.deck > 0 and edge == 0:
-        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
-        openings.replace_by_bay(edge, x, width + 0.4, lambda a, b: [gap])
+    openings.clear(
+        edge, x0=x - width - 0.2, x1=x + width + 0.2, z0=0.0, z1=height + 0.4
+    )
+    if barn.deck > 0 and edge == 0:
+        gap = Patch(
+            x0=x - width / 2, x1=x + width / 2, z0=0.0, z1=height, depth=2.0
+        )
+        openings.replace_by_bay(
+            edge, x=x, width=width + 0.4, bay=lambda a, b: [gap]
+        )
         spots = (x - width, x + width / 2 + 0.05)
         half = width / 2 - 0.05
     else:
@@ -135,54 +157,66 @@ def _add_doors(p: Barn, wing: Wing, openings: Openings, edge: int) -> None:
         b = a + half
         brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
         frame = [
-            boards.board(a, a + 0.18, 0.08, height, 0.15),
-            boards.board(b - 0.18, b, 0.08, height, 0.15),
-            boards.board(a, b, height - 0.18, height, 0.15),
-            boards.board(a, b, 0.08, 0.26, 0.15),
+            boards.board(x0=a, x1=a + 0.18, z0=0.08, z1=height, reach=0.15),
+            boards.board(x0=b - 0.18, x1=b, z0=0.08, z1=height, reach=0.15),
+            boards.board(x0=a, x1=b, z0=height - 0.18, z1=height, reach=0.15),
+            boards.board(x0=a, x1=b, z0=0.08, z1=0.26, reach=0.15),
             solids.beam(*brace, 0.1),
         ]
-        leaf = boards.board(a, b, 0.08, height, 0.1)
-        p.add_to("doors", wall.place(leaf))
-        p.add_to("trim", *(wall.place(m) for m in frame))
-    rail = (x - width - 0.1, x + width + 0.1, 0.0, 0.18)
-    p.add_to("trim", wall.box(*rail, height + 0.05, height + 0.18))
+        leaf = boards.board(x0=a, x1=b, z0=0.08, z1=height, reach=0.1)
+        barn.add_to("doors", wall.place(leaf))
+        barn.add_to("trim", *(wall.place(m) for m in frame))
+    barn.add_to(
+        "trim",
+        wall.box(
+            x=(x - width - 0.1, x + width + 0.1),
+            y=(0.0, 0.18),
+            z=(height + 0.05, height + 0.18),
+        ),
+    )
 
 
 def _add_battens(
-    p: Barn, wing: Wing, boxes: list[Wing], openings: Openings, edge: int
+    barn: Barn, wing: Wing, boxes: list[Wing], openings: Openings, edge: int
 ) -> None:
     """Adds upright battens on the free parts of a wall between openings."""
     wall = wing.wall(edge)
     reliefs = openings.layout(edge, wall.length)
-    for a, b in free_stretches(wing, edge, boxes, 0.5):
-        for x, _ in bays.stretches(b - a, p.batten, 0.12):
+    for a, b in free_stretches(wing, edge, boxes, z=0.5):
+        for x, _ in bays.stretches(b - a, pitch=barn.batten, margin=0.12):
             u = a + x
             if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
                 continue
-            strip = boards.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
-            p.add_to("walls", wall.place(strip))
+            strip = boards.board(
+                x0=u - 0.05, x1=u + 0.05, z0=0.3, z1=wing.wall_top, reach=0.05
+            )
+            barn.add_to("walls", wall.place(strip))
 
 
-def _add_ventilators(p: Barn, main: Wing) -> None:
+def _add_ventilators(barn: Barn, main: Wing) -> None:
     """Adds louvred ventilators on the ridge."""
     z = main.top
-    for k in range(p.ventilators):
-        share = (k + 0.5) / p.ventilators - 0.5
+    for k in range(barn.ventilators):
+        share = (k + 0.5) / barn.ventilators - 0.5
         x, y = main.center
         if main.roof.along_y:
             y += 0.8 * share * main.depth
         else:
             x += 0.8 * share * main.width
-        p.add_to("walls", solids.post(x, y, 0.45, z + 0.3, z - 0.6))
-        eaves = outlines.square(x, y, 0.65)
-        p.add_to("roof", solids.tent(eaves, (x, y), z + 0.3, z + 0.7))
+        barn.add_to(
+            "walls", solids.post(x, y, half=0.45, z1=z + 0.3, z0=z - 0.6)
+        )
+        eaves = outlines.square(x, y, half=0.65)
+        barn.add_to("roof", solids.tent(eaves, (x, y), z0=z + 0.3, z1=z + 0.7))
 
 
-def _add_jetty(p: Barn, xs: bays.Span, y0: float, front: float) -> None:
+def _add_jetty(barn: Barn, xs: bays.Span, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
     a, b = xs
     y = y0 + 0.1
-    p.add_to("doors", solids.box(a, b, y, front, 0.05, 0.3))
+    barn.add_to("doors", solids.box(x=(a, b), y=(y, front), z=(0.05, 0.3)))
     for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
-        spot = (x - 0.12, x + 0.12, y + 0.02, y + 0.26)
-        p.add_to("doors", solids.standing(*spot, 1.1))
+        barn.add_to(
+            "doors",
+            solids.standing(x=around(x, 0.12), y=(y + 0.02, y + 0.26), z1=1.1),
+        )

@@ -38,18 +38,18 @@ class CornerBuilding(Building):
         side = min(site.width, site.depth, 24.0)
         self.corner = self.pick(site.free_corners or [FRONT_LEFT, FRONT_RIGHT])
         self.radius = round(self.uniform(0.3, 0.42) * side, 1)
-        self.ground_height = self.uniform(4.6, 5.4, 2)
-        self.first_height = self.uniform(4.2, 4.8, 2)
+        self.ground_height = self.uniform(4.6, 5.4, digits=2)
+        self.first_height = self.uniform(4.2, 4.8, digits=2)
         self.storey_height = self.uniform(3.3, 3.8)
         self.pitch = max(self.uniform(2.5, 3.2), site.open_length / 36)
-        self.window_width = self.uniform(1.1, 1.5, 2)
-        self.recess = self.uniform(0.22, 0.4, 2)
+        self.window_width = self.uniform(1.1, 1.5, digits=2)
+        self.recess = self.uniform(0.22, 0.4, digits=2)
         self.hood = 0.1 if self.chance(0.4) else 0.0
         self.pilasters = self.chance(0.6)
         self.balcony = self.chance(0.7)
         self.dome = self.pick(("dome", "cone", "lantern"))
         self.dome_height = round(self.uniform(0.17, 0.24) * self.height, 1)
-        self.cornice_reach = self.uniform(0.5, 0.9, 2)
+        self.cornice_reach = self.uniform(0.5, 0.9, digits=2)
 
     def build(self) -> None:
         """Adds all parts of the corner house.
@@ -60,29 +60,51 @@ class CornerBuilding(Building):
         if self.corner not in site.free_corners:
             site = site.detached(self.kind.overhang)
         rectangle = site.outline
-        plan = outlines.rounded(rectangle, {self.corner: self.radius}, 2.8)
+        plan = outlines.rounded(rectangle, {self.corner: self.radius}, step=2.8)
         blind = outlines.edges_on(plan, rectangle, site.blind_edges)
         bottom = _add_shops(self, plan, blind)
         top = _add_first_floor(self, plan, blind, bottom)
         room = self.height - self.dome_height - 2.2 - top
         groups, per_group, storey = tiers.storey_groups(
-            room, self.storey_height
+            room, storey=self.storey_height
         )
         window = bays.window(
-            self.window_width, 0.8, storey - 0.7, self.recess, hood=self.hood
+            width=self.window_width,
+            sill=0.8,
+            head=storey - 0.7,
+            depth=self.recess,
+            hood=self.hood,
         )
-        rows = bays.rhythm(self.pitch, [window], 0.3)
+        rows = bays.rhythm(self.pitch, [window], margin=0.3)
         walls = Facade(
-            storey, (Band(0.6, 0.8, -0.1),), rows, (self.recess,), blind
+            storey,
+            bands=(Band(z0=0.6, z1=0.8, depth=-0.1),),
+            layout=rows,
+            glass=(self.recess,),
+            plain=blind,
         )
-        top = tiers.add_storeys(self, plan, walls, top, groups, per_group)
+        top = tiers.add_storeys(
+            self, plan, walls, z0=top, groups=groups, per_group=per_group
+        )
         if self.pilasters:
             strips = piers.pilasters(
-                plan, self.pitch, 0.3, 2, 0.5, 0.16, bottom, top, blind
+                plan,
+                pitch=self.pitch,
+                margin=0.3,
+                every=2,
+                width=0.5,
+                reach=0.16,
+                z0=bottom,
+                z1=top,
+                skip=blind,
             )
             self.add("pilasters", strips)
-        eaves = Facade(2.2, tiers.cornice(1.4, self.cornice_reach), plain=blind)
-        roof = tiers.add_crown(self, plan, eaves, top, 0.8)
+        eaves = Facade(
+            2.2,
+            bands=tiers.cornice(height=1.4, reach=self.cornice_reach),
+            plain=blind,
+        )
+        roof = tiers.add_crown(self, plan, eaves, z0=top, parapet=0.8)
         self.add("dome", *_dome(self, plan, roof), finish=self.colours["roof"])
         x0, y0, x1, y1 = site.bounds
         if y1 - y0 - 2 * self.radius > 5.0:
@@ -91,18 +113,21 @@ class CornerBuilding(Building):
 
 
 def _add_shops(
-    p: CornerBuilding, plan: np.ndarray, blind: frozenset[int]
+    building: CornerBuilding, plan: np.ndarray, blind: frozenset[int]
 ) -> float:
-    h = p.ground_height
+    h = building.ground_height
     choices = [
-        bays.shop_front(h - 1.2, 0.4, pier=0.25, door=d) for d in (True, False)
+        bays.shop_front(head=h - 1.2, depth=0.4, pier=0.25, door=d)
+        for d in (True, False)
     ]
-    shops = bays.rhythm(2 * p.pitch, choices, margin=0.35)
-    pane = bays.shop_front(h - 1.2, 0.4, door=False, pier=0.15)
-    glazed = bays.rhythm(3.0, [pane], 0.1)
-    window = bays.window(1.4, 1.5, h - 1.2, 0.4)
-    service = bays.rhythm(2.5 * p.pitch, [window], 1.0)
-    service = bays.with_middle(service, bays.gate(2.6, 2.9, 0.4), 3.4)
+    shops = bays.rhythm(2 * building.pitch, choices, margin=0.35)
+    pane = bays.shop_front(head=h - 1.2, depth=0.4, door=False, pier=0.15)
+    glazed = bays.rhythm(3.0, [pane], margin=0.1)
+    window = bays.window(width=1.4, sill=1.5, head=h - 1.2, depth=0.4)
+    service = bays.rhythm(2.5 * building.pitch, [window], margin=1.0)
+    service = bays.with_middle(
+        service, bays.gate(width=2.6, height=2.9, depth=0.4), width=3.4
+    )
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
         if length < 3.0:
@@ -110,79 +135,129 @@ def _add_shops(
         along = plan[(edge + 1) % len(plan)] - plan[edge]
         return (service if along[0] < -0.1 else shops)(edge, length)
 
-    bands = (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15))
+    bands = (
+        Band(z0=0.0, z1=0.3, depth=-0.06),
+        Band(z0=h - 1.0, z1=h - 0.2, depth=-0.15),
+    )
     front = WallFrame(plan, 0)
-    cells = bays.stretches(front.length, 2 * p.pitch, 0.35)
-    shape = canopies.AwningShape(0.3, 1.3, 2.7, h - 1.2)
-    canopies.add_awnings(p, canopies.awnings(front, cells, p.rng, 0.5, shape))
-    return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.4,), blind))
+    cells = bays.stretches(front.length, pitch=2 * building.pitch, margin=0.35)
+    shape = canopies.AwningShape(narrower=0.3, reach=1.3, z0=2.7, z1=h - 1.2)
+    canopies.add_awnings(
+        building,
+        canopies.awnings(front, cells, building.rng, share=0.5, shape=shape),
+    )
+    return tiers.add_ground(
+        building,
+        plan,
+        Facade(h, bands=bands, layout=layout, glass=(0.4,), plain=blind),
+    )
 
 
 def _add_first_floor(
-    p: CornerBuilding, plan: np.ndarray, blind: frozenset[int], z0: float
+    building: CornerBuilding, plan: np.ndarray, blind: frozenset[int], z0: float
 ) -> float:
     """Adds the tall main floor with arched windows; returns its top [m]."""
-    h = p.first_height
-    arched = bays.arched(p.window_width, 0.5, h - 1.6, p.recess)
-    plain = bays.window(p.window_width, 0.5, h - 0.9, p.recess)
+    h = building.first_height
+    arched = bays.arched(
+        width=building.window_width,
+        bottom=0.5,
+        spring=h - 1.6,
+        depth=building.recess,
+    )
+    plain = bays.window(
+        width=building.window_width,
+        sill=0.5,
+        head=h - 0.9,
+        depth=building.recess,
+    )
     fronts = {
-        edge: bays.rhythm(p.pitch, [arched], 0.3)
+        edge: bays.rhythm(building.pitch, [arched], margin=0.3)
         for edge in range(len(plan))
         if _is_front(plan, edge)
     }
-    layout = bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3))
-    floor = Facade(h, (Band(h - 0.4, h, -0.18),), layout, (p.recess,), blind)
+    layout = bays.by_edge(
+        fronts, bays.rhythm(building.pitch, [plain], margin=0.3)
+    )
+    floor = Facade(
+        h,
+        bands=(Band(z0=h - 0.4, z1=h, depth=-0.18),),
+        layout=layout,
+        glass=(building.recess,),
+        plain=blind,
+    )
     rails: list[Mesh] = []
-    for edge in fronts if p.balcony else ():
+    for edge in fronts if building.balcony else ():
         wall = WallFrame(plan, edge)
-        cells = bays.stretches(wall.length, p.pitch, 0.3)
+        cells = bays.stretches(wall.length, pitch=building.pitch, margin=0.3)
         for a, b in cells[len(cells) // 3 :: 3] if edge not in blind else ():
             x = round((a + b) / 2, 2)
-            rail = balconies.balcony(x - 0.9, x + 0.9, 0.8, 0.25, 0.9)
+            rail = balconies.balcony(
+                x0=x - 0.9, x1=x + 0.9, reach=0.8, z=0.25, rail=0.9
+            )
             rails.append(wall.place(rail))
-    return tiers.add_storeys(p, plan, floor, z0, 1, 1, rails, part="main_floor")
+    return tiers.add_storeys(
+        building,
+        plan,
+        floor,
+        z0=z0,
+        groups=1,
+        per_group=1,
+        extras=rails,
+        part="main_floor",
+    )
 
 
-def _corner_centre(p: CornerBuilding, plan: np.ndarray) -> np.ndarray:
+def _corner_centre(building: CornerBuilding, plan: np.ndarray) -> np.ndarray:
     """Returns the middle of the rounded corner's circle."""
     low, high = plan.min(axis=0), plan.max(axis=0)
-    x = low[0] + p.radius if p.corner == FRONT_LEFT else high[0] - p.radius
-    return np.array([x, low[1] + p.radius])
+    x = (
+        low[0] + building.radius
+        if building.corner == FRONT_LEFT
+        else high[0] - building.radius
+    )
+    return np.array([x, low[1] + building.radius])
 
 
-def _dome(p: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
+def _dome(building: CornerBuilding, plan: np.ndarray, z0: float) -> list[Mesh]:
     """Returns a drum over the corner with a dome, cone or open lantern."""
-    center = _corner_centre(p, plan)
-    r = 0.62 * p.radius
-    top = p.height
-    height = p.height - z0
+    center = _corner_centre(building, plan)
+    r = 0.62 * building.radius
+    top = building.height
+    height = building.height - z0
     drum_top = round(z0 + 0.4 * height, 2)
 
     def ring(radius: float) -> np.ndarray:
-        return outlines.regular_polygon(radius, 12, center)
+        return outlines.regular_polygon(radius=radius, count=12, center=center)
 
     wall = drum_top - z0
-    bands = (Band(0.9, wall - 0.7, 0.25), Band(wall - 0.35, wall, -0.3))
-    posts = bays.rhythm(4.0, [bays.bar(0.4, 0.9, wall - 0.7, 0.0)], 0.1)
-    pieces = [tiers.lidded_walls(ring(r), Facade(wall, bands, posts), z0)]
+    bands = (
+        Band(z0=0.9, z1=wall - 0.7, depth=0.25),
+        Band(z0=wall - 0.35, z1=wall, depth=-0.3),
+    )
+    posts = bays.rhythm(
+        4.0, [bays.bar(width=0.4, z0=0.9, z1=wall - 0.7, depth=0.0)], margin=0.1
+    )
+    pieces = [
+        tiers.lidded_walls(ring(r), Facade(wall, bands=bands, layout=posts), z0)
+    ]
     rise = top - drum_top
-    if p.dome == "cone":
-        return [*pieces, solids.spire(ring(r), center, drum_top, top)]
-    share = 0.85 if p.dome == "dome" else 0.6
+    if building.dome == "cone":
+        return [*pieces, solids.spire(ring(r), center, z0=drum_top, z1=top)]
+    share = 0.85 if building.dome == "dome" else 0.6
     angles = np.linspace(0.0, 0.4 * np.pi, 5)
     radii = r * np.cos(angles)
     heights = drum_top + share * rise * np.sin(angles)
     profile = list(zip(radii, heights, strict=True))
-    pieces.append(solids.revolved(profile, 12, center))
+    pieces.append(solids.revolved(profile, 12, center=center))
     lid = heights[-1]
     tip = ring(radii[-1])
-    if p.dome == "lantern":
+    if building.dome == "lantern":
         core = ring(0.6 * radii[-1])
         middle = lid + 0.55 * (top - lid)
-        pieces.append(solids.prism(core, lid, middle))
+        pieces.append(solids.prism(core, z0=lid, z1=middle))
         pieces.append(solids.flat(tip, middle, up=False))
         lid = middle
-    return [*pieces, solids.spire(tip, center, lid, top)]
+    return [*pieces, solids.spire(tip, center, z0=lid, z1=top)]
 
 
 def _is_front(plan: np.ndarray, edge: int) -> bool:

@@ -7,6 +7,7 @@ from cns_drake.city.facades import (
     Building,
     Facade,
     WallFrame,
+    around,
     bays,
     canopies,
     equip_roof,
@@ -24,7 +25,7 @@ class CornerStore(Building):
         """Samples sizes and style."""
         site = self.site
         # Rise of the parapet above the corner.
-        self.raised = self.uniform(0.3, 0.9, 2)
+        self.raised = self.uniform(0.3, 0.9, digits=2)
         self.ground = round(
             min(self.uniform(3.5, 4.1), self.height - self.raised - 0.7), 2
         )
@@ -33,14 +34,14 @@ class CornerStore(Building):
         self.cut = round(min(self.uniform(2.0, 3.0), 0.3 * site.depth), 2)
         self.storey = self.uniform(2.9, 3.3)
         self.pitch = max(self.uniform(2.2, 3.0), (site.width + site.depth) / 20)
-        self.window_width = self.uniform(1.0, 1.5, 2)
-        self.recess = self.uniform(0.12, 0.25, 2)
+        self.window_width = self.uniform(1.0, 1.5, digits=2)
+        self.recess = self.uniform(0.12, 0.25, digits=2)
         self.ledge = self.pick((0.0, 0.1))
-        self.cornice = self.uniform(0.15, 0.4, 2)
+        self.cornice = self.uniform(0.15, 0.4, digits=2)
         # Share of the shop windows with an awning.
         self.awnings = self.uniform(0.2, 0.9)
         self.roof_items = self.draw_roof_items(
-            "stair_house ac_unit vents", 1, 4
+            "stair_house ac_unit vents", low=1, high=4
         )
 
     def build(self) -> None:
@@ -60,22 +61,30 @@ class CornerStore(Building):
         room = self.height - (self.raised + 0.6) - top
         if room > 2.4:
             groups, per_group, storey = tiers.storey_groups(
-                room, self.storey, 4
+                room, storey=self.storey, most=4
             )
             head = min(2.3, storey - 0.35)
             window = bays.window(
-                self.window_width, 0.85, head, self.recess, ledge=self.ledge
+                width=self.window_width,
+                sill=0.85,
+                head=head,
+                depth=self.recess,
+                ledge=self.ledge,
             )
-            rows = bays.rhythm(self.pitch, [window], 0.5)
-            walls = Facade(storey, (), rows, (self.recess,), blind)
-            top = tiers.add_storeys(self, plan, walls, top, groups, per_group)
+            rows = bays.rhythm(self.pitch, [window], margin=0.5)
+            walls = Facade(
+                storey, bands=(), layout=rows, glass=(self.recess,), plain=blind
+            )
+            top = tiers.add_storeys(
+                self, plan, walls, z0=top, groups=groups, per_group=per_group
+            )
         _add_parapet(self, plan, front, top, blind)
         wall = WallFrame(plan, front)
         self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
 
 
 def _cut_rectangle(
-    p: CornerStore, rectangle: np.ndarray
+    store: CornerStore, rectangle: np.ndarray
 ) -> tuple[np.ndarray, int]:
     """Cuts one front corner off a rectangle.
 
@@ -84,8 +93,8 @@ def _cut_rectangle(
         that replaces the corner.
     """
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
-    c = p.cut
-    if p.corner == FRONT_RIGHT:
+    c = store.cut
+    if store.corner == FRONT_RIGHT:
         points = [(x0, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1), (x0, y1)]
         return np.array(points), 1
     points = [(x0 + c, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0 + c)]
@@ -93,61 +102,94 @@ def _cut_rectangle(
 
 
 def _add_shop(
-    p: CornerStore,
+    store: CornerStore,
     plan: np.ndarray,
     streets: tuple[int, int, int],
     blind: frozenset[int],
 ) -> float:
-    h = p.ground
-    pitch = 2 * p.pitch
+    h = store.ground
+    pitch = 2 * store.pitch
     head = round(h - 1.0, 2)
     front = streets[1]
-    shop = bays.shop_front(head, 0.3, door=False)
+    shop = bays.shop_front(head=head, depth=0.3, door=False)
     glazed = bays.rhythm(pitch, [shop], margin=0.5)
-    entry = bays.alone(bays.entrance(1.6, 2.4, 0.7, surround=0.1), p.cut)
-    back = [bays.window(1.2, 1.3, 2.3, 0.3), bays.gate(1.8, 2.2)]
+    entry = bays.alone(
+        bays.entrance(width=1.6, height=2.4, depth=0.7, surround=0.1),
+        width=store.cut,
+    )
+    back = [
+        bays.window(width=1.2, sill=1.3, head=2.3, depth=0.3),
+        bays.gate(width=1.8, height=2.2),
+    ]
     layouts = dict.fromkeys(streets, glazed) | {front: entry}
-    layout = bays.by_edge(layouts, bays.rhythm(4.0, back, 0.7))
-    bands = (Band(0.0, 0.3, -0.05), Band(h - 0.25, h, -0.12))
+    layout = bays.by_edge(layouts, bays.rhythm(4.0, back, margin=0.7))
+    bands = (
+        Band(z0=0.0, z1=0.3, depth=-0.05),
+        Band(z0=h - 0.25, z1=h, depth=-0.12),
+    )
     shades, boards = [], []
     for edge in streets:
         wall = WallFrame(plan, edge)
         if edge == front or edge in blind:
             continue
-        cells = bays.stretches(wall.length, pitch, 0.5)
+        cells = bays.stretches(wall.length, pitch=pitch, margin=0.5)
         for a, b in cells:
-            spot = (a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7)
-            boards.append(wall.box(*spot))
-        shape = canopies.AwningShape(0.2, 0.95, 2.4, head + 0.05)
-        shades += canopies.awnings(wall, cells, p.rng, p.awnings, shape)
-    canopies.add_awnings(p, shades)
-    p.add("boards", *boards, finish=p.colours["sign"])
-    return tiers.add_ground(p, plan, Facade(h, bands, layout, (0.3,), blind))
+            boards.append(
+                wall.box(
+                    x=(a + 0.3, b - 0.3),
+                    y=(-0.02, 0.1),
+                    z=(head + 0.1, head + 0.7),
+                )
+            )
+        shape = canopies.AwningShape(
+            narrower=0.2, reach=0.95, z0=2.4, z1=head + 0.05
+        )
+        shades += canopies.awnings(
+            wall, cells, store.rng, share=store.awnings, shape=shape
+        )
+    canopies.add_awnings(store, shades)
+    store.add("boards", *boards, finish=store.colours["sign"])
+    return tiers.add_ground(
+        store,
+        plan,
+        Facade(h, bands=bands, layout=layout, glass=(0.3,), plain=blind),
+    )
 
 
 def _add_parapet(
-    p: CornerStore,
+    store: CornerStore,
     plan: np.ndarray,
     front: int,
     z0: float,
     blind: frozenset[int],
 ) -> None:
     """Adds the cornice and the roof; the parapet is higher at the corner."""
-    rim = round(p.height - p.raised - z0, 3)
-    bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
-    crown = Facade(rim, bands, plain=blind)
-    roof = tiers.add_crown(p, plan, crown, z0, 0.5, thickness=0.25)
+    rim = round(store.height - store.raised - z0, 3)
+    bands = tiers.cornice(
+        height=rim - 0.1, reach=store.cornice, thickness=0.45, steps=2
+    )
+    crown = Facade(rim, bands=bands, plain=blind)
+    roof = tiers.add_crown(
+        store, plan, crown, z0=z0, parapet=0.5, thickness=0.25
+    )
     wall = WallFrame(plan, front)
-    piece = (0.1, wall.length - 0.1, -0.25, 0.04, z0 + rim - 0.3, p.height)
-    p.add("pediment", wall.box(*piece))
-    equip_roof(p, plan, roof, p.roof_items)
+    store.add(
+        "pediment",
+        wall.box(
+            x=(0.1, wall.length - 0.1),
+            y=(-0.25, 0.04),
+            z=(z0 + rim - 0.3, store.height),
+        ),
+    )
+    equip_roof(store, plan, roof, store.roof_items)
 
 
-def _corner_sign(p: CornerStore, wall: WallFrame) -> list[Mesh]:
+def _corner_sign(store: CornerStore, wall: WallFrame) -> list[Mesh]:
     """Returns a canopy above the door and an upright sign over it."""
-    middle, z = wall.length / 2, p.ground - 0.55
+    middle, z = wall.length / 2, store.ground - 0.55
     half = 0.5 * wall.length - 0.25
-    lid = (middle - half, middle + half, -0.05, 0.9, z - 0.25, z)
-    top = min(p.height - 0.4, z + 2.6)
-    blade = (middle - 0.1, middle + 0.1, -0.05, 0.75, z - 0.05, top)
-    return [wall.box(*lid), wall.box(*blade)]
+    top = min(store.height - 0.4, z + 2.6)
+    return [
+        wall.box(x=around(middle, half), y=(-0.05, 0.9), z=(z - 0.25, z)),
+        wall.box(x=around(middle, 0.1), y=(-0.05, 0.75), z=(z - 0.05, top)),
+    ]

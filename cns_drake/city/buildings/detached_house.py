@@ -59,14 +59,14 @@ class DetachedHouse(FamilyHouse):
         # Width of a wing, as a share of the width of the main wing.
         self.wing_share = self.uniform(0.36, 0.46)
         self.low_wing = self.chance(0.35)
-        self.floor = self.uniform(0.2, 0.6, 2)
+        self.floor = self.uniform(0.2, 0.6, digits=2)
         self.window_pitch = self.uniform(2.6, 3.4)
-        self.window_width = self.uniform(0.95, 1.3, 2)
+        self.window_width = self.uniform(0.95, 1.3, digits=2)
         self.casing = self.pick(("frame", "sill", "sill", "shutters"))
         self.porch = self.pick(("shed", "gable", "full", "flat"))
-        self.porch_reach = self.uniform(1.5, 2.2, 2)
+        self.porch_reach = self.uniform(1.5, 2.2, digits=2)
         self.garage = self.pick(("flat", "gable", "shed", "none"))
-        self.garage_width = self.uniform(3.2, 5.8, 1)
+        self.garage_width = self.uniform(3.2, 5.8, digits=1)
         self.chimney = self.pick(("ridge", "breast", "ridge", "none"))
         self.chimney_at = self.uniform(0.2, 0.8)
         self.dormers = self.whole(0, 3)
@@ -109,12 +109,14 @@ class DetachedHouse(FamilyHouse):
         slope = 2 * (self.height - wall_top - ROOF_M) / deep
         roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
         area = (left, front, split, main_back)
-        boxes = [Wing.at(area, wall_top, self.height, roof)]
+        boxes = [Wing.at(area, wall_top=wall_top, top=self.height, roof=roof)]
         wide = max(3.2, self.wing_share * (split - left))
         drop = STOREY_M * (n > 1 and self.low_wing)
         top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
         kind = "hip" if self.roof == "hip" else "gable"
-        shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
+        shape = Roof(
+            kind, along_y=True, eaves=0.35, verge=0.3, thickness=ROOF_M
+        )
         middle = (front + main_back) / 2
         for end in _WING_ENDS[self.plan]:
             if end == "front":
@@ -124,12 +126,25 @@ class DetachedHouse(FamilyHouse):
                 a = left + 0.4 * (split - left - wide)
                 area = (a, middle, a + wide, min(back, main_back + 3.0))
             if end == "front" or back - main_back > 1.0:
-                boxes.append(Wing.at(area, wall_top - drop, top - drop, shape))
+                boxes.append(
+                    Wing.at(
+                        area,
+                        wall_top=wall_top - drop,
+                        top=top - drop,
+                        roof=shape,
+                    )
+                )
         if has_garage:
-            boxes.append(garage_wing(
-                self.garage, split - 0.06, right, front + 0.6,
-                main_back - 0.4, self.height,
-            ))  # fmt: skip
+            boxes.append(
+                garage_wing(
+                    self.garage,
+                    split - 0.06,
+                    right,
+                    front + 0.6,
+                    main_back - 0.4,
+                    self.height,
+                )
+            )
         taken = left + wide if "front" in _WING_ENDS[self.plan] else left
         self.free = (taken, split)
         self.storeys = n
@@ -142,68 +157,101 @@ class DetachedHouse(FamilyHouse):
         self.wings = boxes[1 : -1 if has_garage else None]
 
 
-def _add_main(p: DetachedHouse) -> None:
-    openings = window_rows(p, p.main, p.storeys)
-    a, b = (x - p.main.x0 for x in p.free)
+def _add_main(house: DetachedHouse) -> None:
+    openings = window_rows(house, house.main, house.storeys)
+    a, b = (x - house.main.x0 for x in house.free)
     door = a + 0.5 * (b - a)
-    wing_openings.add_door(openings, 0, door, p.floor, lights=0.3)
-    _add_porch(p, (a, b))
-    add_walls_and_roof(p, p.main, openings)
-    if p.roof in ("gable", "gambrel"):
-        wing_roofs.add_dormers(p, p.main, a, b, p.dormers, p.dormer, 3.0)
+    wing_openings.add_door(openings, 0, x=door, floor=house.floor, lights=0.3)
+    _add_porch(house, (a, b))
+    add_walls_and_roof(house, house.main, openings)
+    if house.roof in ("gable", "gambrel"):
+        wing_roofs.add_dormers(
+            house,
+            house.main,
+            start=a,
+            end=b,
+            count=house.dormers,
+            roof=house.dormer,
+            pitch=3.0,
+        )
 
 
-def _add_porch(p: DetachedHouse, free: bays.Span) -> None:
+def _add_porch(house: DetachedHouse, free: bays.Span) -> None:
     """Adds a roof over the door; a `full` porch runs along the free front."""
-    wall = p.main.wall(0)
+    wall = house.main.wall(0)
     a, b = free
     door = (a + b) / 2
-    reach = min(p.porch_reach, p.ahead - 0.3)
-    eaves = p.floor + 2.3
-    top = eaves + (0.9 if p.porch == "gable" else 0.45)
-    if p.storeys == 1:
-        top = min(top, p.main.wall_top + 0.1)
-    full = p.porch == "full" and b - a > 3.5
+    reach = min(house.porch_reach, house.ahead - 0.3)
+    eaves = house.floor + 2.3
+    top = eaves + (0.9 if house.porch == "gable" else 0.45)
+    if house.storeys == 1:
+        top = min(top, house.main.wall_top + 0.1)
+    full = house.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
     porches.add_porch(
-        p, wall, x0, x1, reach, p.floor, eaves, top,
-        roof="shed" if p.porch == "full" else p.porch,
+        house,
+        wall,
+        x0=x0,
+        x1=x1,
+        reach=reach,
+        deck=house.floor,
+        eaves=eaves,
+        top=top,
+        roof="shed" if house.porch == "full" else house.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
-    )  # fmt: skip
-    room = p.ahead - reach - 0.02
-    porches.add_steps(p, wall, door - 0.7, door + 0.7, reach, p.floor, room)
-    if full and p.floor > 0.3:
+    )
+    room = house.ahead - reach - 0.02
+    porches.add_steps(
+        house,
+        wall,
+        x0=door - 0.7,
+        x1=door + 0.7,
+        start=reach,
+        rise=house.floor,
+        room=room,
+    )
+    if full and house.floor > 0.3:
         y = reach - 0.15
-        trim = p.colours["trim"]
+        trim = house.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (a, b) in enumerate(runs):
             part = f"railing_{k}"
-            balconies.add_railing(p, part, wall, (a, y), (b, y), p.floor, trim)
+            balconies.add_railing(
+                house,
+                part,
+                wall,
+                start=(a, y),
+                end=(b, y),
+                z=house.floor,
+                finish=trim,
+            )
 
 
-def _add_wing(p: DetachedHouse, wing: Wing) -> None:
-    count = max(1, round((wing.wall_top - p.floor) / STOREY_M))
-    openings = window_rows(p, wing, count)
-    add_walls_and_roof(p, wing, openings)
-    is_front = wing.y0 < p.main.y0
-    if p.bay_window and is_front and wing.width > 3.0:
-        size = (wing.width / 2, 2.2, 0.4, 0.0, p.floor + 2.3)
-        bay_windows.add_bay_window(p, wing.wall(0), *size)
+def _add_wing(house: DetachedHouse, wing: Wing) -> None:
+    count = max(1, round((wing.wall_top - house.floor) / STOREY_M))
+    openings = window_rows(house, wing, count)
+    add_walls_and_roof(house, wing, openings)
+    is_front = wing.y0 < house.main.y0
+    if house.bay_window and is_front and wing.width > 3.0:
+        size = (wing.width / 2, 2.2, 0.4, 0.0, house.floor + 2.3)
+        bay_windows.add_bay_window(house, wing.wall(0), *size)
 
 
-def _add_chimney(p: DetachedHouse) -> None:
-    main = p.main
-    if p.chimney == "breast":
-        wall = main.wall(1 if p.mirrored else 3)
+def _add_chimney(house: DetachedHouse) -> None:
+    main = house.main
+    if house.chimney == "breast":
+        wall = main.wall(1 if house.mirrored else 3)
         x = wall.length / 2
         breast = _chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
-        p.add_to("base", breast)
+        house.add_to("base", breast)
         spot = (*wall.point(x, 0.18), main.top - 0.9)
-        add_chimney(p, "chimney", spot, p.colours["base"], yaw=np.pi / 2)
-    elif p.chimney == "ridge":
-        x = main.x0 + p.chimney_at * main.width
+        add_chimney(
+            house, "chimney", spot, house.colours["base"], yaw=np.pi / 2
+        )
+    elif house.chimney == "ridge":
+        x = main.x0 + house.chimney_at * main.width
         spot = (x, main.center[1], main.top - 1.2)
-        add_chimney(p, "chimney", spot, p.kind.choices["bricks"][0])
+        add_chimney(house, "chimney", spot, house.kind.choices["bricks"][0])
 
 
 def _chimney_breast(
@@ -223,11 +271,14 @@ def _chimney_breast(
     shoulder = 0.5 * top
     low = outlines.rectangle(a, -0.05, b, reach)
     high = outlines.rectangle(x - neck, -0.05, x + neck, reach)
-    head = (x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06)
     breast = merge_meshes(
-        solids.skirt(low, low, -solids.FOUNDATION_M, shoulder),
-        solids.skirt(low, high, shoulder, shoulder + 0.6),
-        solids.prism(high, shoulder + 0.6, top),
-        solids.box(*head, top - 0.35, top - 0.15),
+        solids.skirt(low, low, z0=-solids.FOUNDATION_M, z1=shoulder),
+        solids.skirt(low, high, z0=shoulder, z1=shoulder + 0.6),
+        solids.prism(high, z0=shoulder + 0.6, z1=top),
+        solids.box(
+            x=(x - neck - 0.08, x + neck + 0.08),
+            y=(-0.05, reach + 0.06),
+            z=(top - 0.35, top - 0.15),
+        ),
     )
     return wall.place(breast)

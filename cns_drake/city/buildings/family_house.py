@@ -38,33 +38,45 @@ class FamilyHouse(Building):
     casing: str
 
 
-def window_rows(p: FamilyHouse, wing: Wing, storeys: int) -> Openings:
+def window_rows(house: FamilyHouse, wing: Wing, storeys: int) -> Openings:
     """Returns openings of a wing with the windows of all storeys.
 
     Args:
-        p: the building.
+        house: the building.
         wing: the wing.
         storeys: number of storeys.
     """
-    openings = Openings(p, wing, p.boxes)
-    width = p.window_width
-    for edges, step in (((0, 2), p.window_pitch), ((1, 3), _SIDE_PITCH_M)):
+    openings = Openings(house, wing, house.boxes)
+    width = house.window_width
+    for edges, step in (((0, 2), house.window_pitch), ((1, 3), _SIDE_PITCH_M)):
         wing_openings.add_window_storeys(
-            openings, edges, p.floor, STOREY_M, storeys, step, width
+            openings,
+            edges,
+            floor=house.floor,
+            storey=STOREY_M,
+            count=storeys,
+            pitch=step,
+            width=width,
         )
     return openings
 
 
-def add_walls_and_roof(p: FamilyHouse, wing: Wing, openings: Openings) -> None:
+def add_walls_and_roof(
+    house: FamilyHouse, wing: Wing, openings: Openings
+) -> None:
     """Adds the walls of a wing around its openings, and its roof.
 
     The windows of the front get casings, and each gable gets a window.
     """
-    wing_openings.add_casings(openings, (0,), p.casing)
-    bands = (Band(0.0, p.floor, -0.04),) if p.floor > 0 else ()
+    wing_openings.add_casings(openings, (0,), house.casing)
+    bands = (
+        (Band(z0=0.0, z1=house.floor, depth=-0.04),) if house.floor > 0 else ()
+    )
     low = wing.wall_top + 0.4
-    attic = wing_roofs.attic_window(0.9, low, low + 1.0, wing_openings.GLASS_M)
-    openings.enclose((wing_openings.GLASS_M,), bands, attic=attic)
+    attic = wing_roofs.attic_window(
+        width=0.9, z0=low, z1=low + 1.0, depth=wing_openings.GLASS_M
+    )
+    openings.enclose((wing_openings.GLASS_M,), bands=bands, attic=attic)
 
 
 def garage_wing(
@@ -82,21 +94,30 @@ def garage_wing(
     """
     wall_top = 2.65
     span = x1 - x0
-    rise = {"flat": 0.5, "gable": 0.3 * span, "shed": 0.2 * span,
-            "hip": 0.25 * span}[kind]  # fmt: skip
-    shape = Roof(kind, True, 0.3, 0.25, ROOF_M)
+    rise = {
+        "flat": 0.5,
+        "gable": 0.3 * span,
+        "shed": 0.2 * span,
+        "hip": 0.25 * span,
+    }[kind]
+    shape = Roof(kind, along_y=True, eaves=0.3, verge=0.25, thickness=ROOF_M)
     top = min(wall_top + ROOF_M + rise, most)
-    return Wing.at((x0, y0, x1, min(y1, y0 + 6.5)), wall_top, top, shape)
+    return Wing.at(
+        (x0, y0, x1, min(y1, y0 + 6.5)), wall_top=wall_top, top=top, roof=shape
+    )
 
 
-def add_garage(p: FamilyHouse, garage: Wing) -> None:
+def add_garage(house: FamilyHouse, garage: Wing) -> None:
     """Adds a garage whose door is in front."""
-    openings = Openings(p, garage, p.boxes)
+    openings = Openings(house, garage, house.boxes)
     length = garage.x1 - garage.x0
     wing_openings.add_garage_door(
-        openings, 0, length / 2, min(length - 0.7, 4.9)
+        openings, 0, x=length / 2, width=min(length - 0.7, 4.9)
     )
     openings.add_bays(
-        (1, 3), 1.0, 3.4, [wing_openings.sash(0.9, 0.0, 1.1, 2.0)]
+        (1, 3),
+        z=1.0,
+        pitch=3.4,
+        choices=[wing_openings.sash(width=0.9, z=0.0, sill=1.1, head=2.0)],
     )
     openings.enclose((wing_openings.GLASS_M,))

@@ -14,6 +14,7 @@ from cns_drake.city.facades import (
     Roof,
     Wing,
     add_chimney,
+    around,
     balconies,
     bays,
     wing_openings,
@@ -43,9 +44,9 @@ class GardenFlats(Building):
         # Whether every other house turns its gable to the front.
         self.crossed = self.chance(0.5)
         self.window_pitch = max(self.uniform(2.6, 3.4), site.width / 12)
-        self.window_width = self.uniform(1.1, 1.6, 2)
-        self.veranda_width = self.uniform(2.8, 4.0, 2)
-        self.veranda_reach = self.uniform(1.4, 1.9, 2)
+        self.window_width = self.uniform(1.1, 1.6, digits=2)
+        self.veranda_width = self.uniform(2.8, 4.0, digits=2)
+        self.veranda_reach = self.uniform(1.4, 1.9, digits=2)
         self.casing = "sill"
         if site.width < 20.0:
             self.casing = self.pick(("frame", "sill"))
@@ -74,79 +75,115 @@ class GardenFlats(Building):
                 run = (bounds[1] - bounds[0]) / 2
                 slope = 2 * (self.height - wall_top - ROOF_M) / deep
                 top = min(wall_top + ROOF_M + slope * run, self.height - 0.1)
-            shape = Roof(self.roof, cross, 0.4, 0.35, ROOF_M)
+            shape = Roof(
+                self.roof,
+                along_y=cross,
+                eaves=0.4,
+                verge=0.35,
+                thickness=ROOF_M,
+            )
             area = (bounds[k] - 0.05 * (k > 0), y, bounds[k + 1], y + deep)
-            boxes.append(Wing.at(area, wall_top, top, shape))
+            boxes.append(Wing.at(area, wall_top=wall_top, top=top, roof=shape))
         for k, wing in enumerate(boxes):
             _add_house(self, wing, boxes, storeys, k)
 
 
 def _add_house(
-    p: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
+    flats: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
 ) -> None:
-    openings = Openings(p, wing, boxes)
+    openings = Openings(flats, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR_M) / storeys
     head = min(2.2, storey - 0.4)
-    for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 4.5)):
+    for edges, pitch in (((0, 2), flats.window_pitch), ((1, 3), 4.5)):
         wing_openings.add_window_storeys(
             openings,
             edges,
-            _FLOOR_M,
-            storey,
-            storeys,
-            pitch,
-            p.window_width,
+            floor=_FLOOR_M,
+            storey=storey,
+            count=storeys,
+            pitch=pitch,
+            width=flats.window_width,
             head=head,
         )
     wall = wing.wall(0)
     middle = wall.length / 2
     glass = wing_openings.GLASS_M
-    openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
+    openings.clear(
+        0, x0=middle - 1.1, x1=middle + 1.1, z0=0.0, z1=wing.wall_top
+    )
     if wing.wall_top > 6.0:
-        stair = bays.window(1.8, _FLOOR_M + 2.6, wing.wall_top - 0.7, glass)
-        openings.replace_by_bay(0, middle, 2.6, stair)
-    wing_openings.add_door(openings, 0, middle, _FLOOR_M, width=1.2, lights=0.4)
-    area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
-    p.add_to("trim", wall.box(*area, _FLOOR_M + 2.3, _FLOOR_M + 2.5))
-    p.add_to("base", wall.standing(*area, _FLOOR_M, bottom=True))
-    _add_verandas(p, wing, storeys, storey, number)
-    wing_openings.add_casings(openings, (0,), p.casing)
+        stair = bays.window(
+            width=1.8,
+            sill=_FLOOR_M + 2.6,
+            head=wing.wall_top - 0.7,
+            depth=glass,
+        )
+        openings.replace_by_bay(0, x=middle, width=2.6, bay=stair)
+    wing_openings.add_door(
+        openings, 0, x=middle, floor=_FLOOR_M, width=1.2, lights=0.4
+    )
+    across, reach = around(middle, 1.4), (-0.05, 1.3)
+    canopy = wall.box(across, reach, z=(_FLOOR_M + 2.3, _FLOOR_M + 2.5))
+    landing = wall.standing(across, reach, z1=_FLOOR_M, bottom=True)
+    flats.add_to("trim", canopy)
+    flats.add_to("base", landing)
+    _add_verandas(flats, wing, storeys, storey, number)
+    wing_openings.add_casings(openings, (0,), flats.casing)
     z = round(_FLOOR_M + storey, 2)
-    bands = (Band(0.0, _FLOOR_M, -0.05), Band(z - 0.2, z, -0.05))
+    bands = (
+        Band(z0=0.0, z1=_FLOOR_M, depth=-0.05),
+        Band(z0=z - 0.2, z1=z, depth=-0.05),
+    )
     low = wing.wall_top + 0.4
-    attic = wing_roofs.attic_window(0.9, low, low + 1.0, glass, 2)
-    openings.enclose((glass,), bands, attic=attic)
+    attic = wing_roofs.attic_window(
+        width=0.9, z0=low, z1=low + 1.0, depth=glass, count=2
+    )
+    openings.enclose((glass,), bands=bands, attic=attic)
     if not wing.roof.along_y:
         x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
         spot = (x, y, wing.top - 1.3)
-        brick = p.kind.choices["bricks"][0]
-        add_chimney(p, f"chimney_{number}", spot, brick)
+        brick = flats.kind.choices["bricks"][0]
+        add_chimney(flats, f"chimney_{number}", spot, brick)
 
 
 def _add_verandas(
-    p: GardenFlats, wing: Wing, storeys: int, storey: float, number: int
+    flats: GardenFlats, wing: Wing, storeys: int, storey: float, number: int
 ) -> None:
     """Adds verandas above one another, left and right of the entrance."""
     wall = wing.wall(0)
-    width = min(p.veranda_width, wall.length / 2 - 2.2)
+    width = min(flats.veranda_width, wall.length / 2 - 2.2)
     if width < 2.0:
         return
-    reach = p.veranda_reach
+    reach = flats.veranda_reach
     top = wing.wall_top - 0.1
     pieces, frame = [], []
     for x in (0.9 + width / 2, wall.length - 0.9 - width / 2):
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-        pieces.append(wall.place(balconies.balcony(a, b, reach, 0.0, 1.0)))
+        pieces.append(
+            wall.place(
+                balconies.balcony(x0=a, x1=b, reach=reach, z=0.0, rail=1.0)
+            )
+        )
         for u in (a + 0.1, b - 0.1):
-            spot = (u - 0.09, u + 0.09, reach - 0.2, reach - 0.02)
-            frame.append(wall.standing(*spot, top - 0.1))
-        lid = (a - 0.1, b + 0.1, -0.05, reach + 0.1, top - 0.25, top)
-        frame.append(wall.box(*lid))
+            frame.append(
+                wall.standing(
+                    x=around(u, 0.09),
+                    y=(reach - 0.2, reach - 0.02),
+                    z1=top - 0.1,
+                )
+            )
+        frame.append(
+            wall.box(
+                x=(a - 0.1, b + 0.1),
+                y=(-0.05, reach + 0.1),
+                z=(top - 0.25, top),
+            )
+        )
     part = f"house_{number}"
-    trim = p.colours["trim"]
+    trim = flats.colours["trim"]
     mesh = merge_meshes(*pieces)
-    shape = MeshShape(p.define(f"{part}_verandas", mesh))
+    shape = MeshShape(flats.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):
         at = (0.0, 0.0, _FLOOR_M + k * storey)
-        p.place(f"{part}_verandas_{k}", shape, at, finish=trim)
-    p.add(f"{part}_posts", *frame, finish=trim)
+        flats.place(f"{part}_verandas_{k}", shape, at, finish=trim)
+    flats.add(f"{part}_posts", *frame, finish=trim)

@@ -7,6 +7,7 @@ from cns_drake.city.facades import (
     Building,
     Openings,
     Wing,
+    around,
     bays,
     equip_roof,
     outlines,
@@ -27,7 +28,7 @@ class GasStation(Building):
         site = self.site
         self.canopy_top = round(min(self.height, self.uniform(5.0, 5.8)), 2)
         # Height of the canopy's edge.
-        self.fascia = self.uniform(0.6, 1.0, 2)
+        self.fascia = self.uniform(0.6, 1.0, digits=2)
         # Whether the canopy is a pair of raised wings.
         self.sloped = self.chance(0.35)
         # Number of rows of pumps, and of pumps in each row.
@@ -36,12 +37,14 @@ class GasStation(Building):
         self.shop_depth = round(
             min(self.uniform(6.0, 9.0), 0.36 * site.depth), 2
         )
-        self.shop_height = self.uniform(3.6, 4.3, 2)
+        self.shop_height = self.uniform(3.6, 4.3, digits=2)
         # Whether a car wash stands beside the shop.
         self.wash = site.width > 26.0 and self.chance(0.7)
         # Whether the car wash and the sign are on the left.
         self.mirrored = self.chance(0.5)
-        self.roof_items = self.draw_roof_items("ac_unit vents ac_unit", 1, 4)
+        self.roof_items = self.draw_roof_items(
+            "ac_unit vents ac_unit", low=1, high=4
+        )
 
     def build(self) -> None:
         """Adds all parts of the gas station: a shop behind a canopy with pumps.
@@ -64,110 +67,165 @@ class GasStation(Building):
         _add_sign(self, (x0, x1), y0)
 
 
-def _pump_rows(p: GasStation, canopy: np.ndarray) -> list[float]:
+def _pump_rows(station: GasStation, canopy: np.ndarray) -> list[float]:
     """Returns the y of each row of pumps [m]."""
     (_, y0), (_, y1) = canopy[0], canopy[2]
-    return [y0 + (k + 0.5) * (y1 - y0) / p.lanes for k in range(p.lanes)]
+    return [
+        y0 + (k + 0.5) * (y1 - y0) / station.lanes for k in range(station.lanes)
+    ]
 
 
-def _add_canopy(p: GasStation, canopy: np.ndarray) -> None:
+def _add_canopy(station: GasStation, canopy: np.ndarray) -> None:
     """Adds the roof on its columns, lights on its underside."""
     x0, y0, x1, y1 = outlines.extent(canopy)
-    top = p.canopy_top
-    low = p.canopy_top - p.fascia
-    if p.sloped:
+    top = station.canopy_top
+    low = station.canopy_top - station.fascia
+    if station.sloped:
         middle = (y0 + y1) / 2
         line = [(y0, top - 0.3), (middle, top - 0.9), (y1, top - 0.3)]
-        p.add_to("brand", roofs.shell(line, x0, x1, 0.35))
-        low = top - 1.2
-        rim = (x0 + 0.5, x1 - 0.5, middle - 0.4, middle + 0.4, low, top - 0.6)
-        p.add_to("steel", solids.box(*rim))
-    else:
-        p.add_to(
-            "brand",
-            solids.skirt(canopy, canopy, low, top),
-            solids.roof_pan(canopy, top - 0.4, top, 0.25),
+        station.add_to(
+            "brand", roofs.shell(line, start=x0, end=x1, thickness=0.35)
         )
-        p.add_to("steel", solids.flat(canopy, low, up=False))
-    count = max(2, p.pumps)
-    for y in _pump_rows(p, canopy):
+        low = top - 1.2
+        station.add_to(
+            "steel",
+            solids.box(
+                x=(x0 + 0.5, x1 - 0.5),
+                y=around(middle, 0.4),
+                z=(low, top - 0.6),
+            ),
+        )
+    else:
+        station.add_to(
+            "brand",
+            solids.skirt(canopy, canopy, z0=low, z1=top),
+            solids.roof_pan(
+                canopy, z_floor=top - 0.4, z_top=top, thickness=0.25
+            ),
+        )
+        station.add_to("steel", solids.flat(canopy, low, up=False))
+    count = max(2, station.pumps)
+    for y in _pump_rows(station, canopy):
         for x in np.linspace(x0 + 2.2, x1 - 2.2, count).tolist():
-            p.add_to("steel", solids.post(x, y, 0.22, low + 0.1))
+            station.add_to("steel", solids.post(x, y, half=0.22, z1=low + 0.1))
 
 
-def _add_islands(p: GasStation, canopy: np.ndarray) -> None:
+def _add_islands(station: GasStation, canopy: np.ndarray) -> None:
     """Adds kerbed islands with their pumps and bollards."""
     (x0, _), (x1, _) = canopy[0], canopy[2]
-    step = (x1 - x0 - 3.0) / p.pumps
+    step = (x1 - x0 - 3.0) / station.pumps
     half = min(2.2, 0.4 * step)
-    for y in _pump_rows(p, canopy):
-        for k in range(p.pumps):
+    for y in _pump_rows(station, canopy):
+        for k in range(station.pumps):
             x = x0 + 1.5 + (k + 0.5) * step
-            kerb = (x - half, x + half, y - 0.55, y + 0.55, 0.18)
-            p.add_to("concrete", solids.standing(*kerb))
-            p.add_to("steel", _pump().moved((x, y, 0.15)))
-            head = (x - 0.42, x + 0.42, y - 0.27, y + 0.27, 1.75, 2.1)
-            p.add_to("brand", solids.box(*head))
+            station.add_to(
+                "concrete",
+                solids.standing(x=around(x, half), y=around(y, 0.55), z1=0.18),
+            )
+            station.add_to("steel", _pump().moved((x, y, 0.15)))
+            station.add_to(
+                "brand",
+                solids.box(
+                    x=around(x, 0.42),
+                    y=around(y, 0.27),
+                    z=(1.75, 2.1),
+                ),
+            )
             for u in (x - half + 0.15, x + half - 0.15):
-                post = outlines.regular_polygon(0.08, 6, (u, y))
-                p.add_to("brand", solids.prism(post, 0.15, 0.95))
+                post = outlines.regular_polygon(
+                    radius=0.08, count=6, center=(u, y)
+                )
+                station.add_to("brand", solids.prism(post, z0=0.15, z1=0.95))
 
 
-def _add_shop(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
+def _add_shop(station: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     x0, x1 = xs[0] + 0.4, xs[1] - 0.4
-    wash = 5.2 if p.wash else 0.0
+    wash = 5.2 if station.wash else 0.0
     wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
-    start = x1 - wide if p.mirrored else x0
-    shop = Wing.flat((start, ys[0], start + wide, ys[1]), p.shop_height, 0.5)
-    openings = Openings(p, shop)
-    glazing = bays.shop_front(2.7, _RECESS_M, door=False)
-    openings.add_bays((0,), 1.0, 3.4, [glazing], 0.4)
-    doors = bays.window(2.0, 0.0, 2.5, _RECESS_M, mullions=1)
-    openings.replace_by_bay(0, 0.55 * wide, 2.6, doors)
-    openings.add_bays(
-        (1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS_M)]
+    start = x1 - wide if station.mirrored else x0
+    shop = Wing.flat(
+        (start, ys[0], start + wide, ys[1]),
+        top=station.shop_height,
+        parapet=0.5,
     )
-    openings.enclose((_RECESS_M,), (Band(0.0, 0.25, -0.05),))
-    sign = (0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
-    p.add_to("brand", shop.wall(0).box(*sign))
-    equip_roof(p, shop.outline, shop.floor, p.roof_items)
+    openings = Openings(station, shop)
+    glazing = bays.shop_front(head=2.7, depth=_RECESS_M, door=False)
+    openings.add_bays((0,), z=1.0, pitch=3.4, choices=[glazing], margin=0.4)
+    doors = bays.window(
+        width=2.0, sill=0.0, head=2.5, depth=_RECESS_M, mullions=1
+    )
+    openings.replace_by_bay(0, x=0.55 * wide, width=2.6, bay=doors)
+    openings.add_bays(
+        (1, 2, 3),
+        z=1.0,
+        pitch=4.5,
+        choices=[bays.window(width=1.0, sill=1.6, head=2.3, depth=_RECESS_M)],
+    )
+    openings.enclose((_RECESS_M,), bands=(Band(z0=0.0, z1=0.25, depth=-0.05),))
+    station.add_to(
+        "brand",
+        shop.wall(0).box(
+            x=(0.3, wide - 0.3),
+            y=(-0.02, 0.3),
+            z=(2.85, station.shop_height + 0.02),
+        ),
+    )
+    equip_roof(station, shop.outline, shop.floor, station.roof_items)
     if wash:
-        a = x0 if p.mirrored else x1 - wash
-        _add_wash(p, (a, a + wash), ys)
+        a = x0 if station.mirrored else x1 - wash
+        _add_wash(station, (a, a + wash), ys)
 
 
-def _add_wash(p: GasStation, xs: bays.Span, ys: bays.Span) -> None:
+def _add_wash(station: GasStation, xs: bays.Span, ys: bays.Span) -> None:
     """Adds a car wash: a gate in front and one behind."""
-    box = Wing.flat((xs[0], ys[0], xs[1], ys[1]), p.shop_height - 0.2, 0.3)
-    openings = Openings(p, box)
+    box = Wing.flat(
+        (xs[0], ys[0], xs[1], ys[1]), top=station.shop_height - 0.2, parapet=0.3
+    )
+    openings = Openings(station, box)
     for edge in (0, 2):
         openings.replace_by_bay(
-            edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5)
+            edge,
+            x=(xs[1] - xs[0]) / 2,
+            width=4.4,
+            bay=bays.gate(width=3.4, height=2.9, depth=0.5),
         )
-    openings.add_bays((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS_M)])
+    openings.add_bays(
+        (1, 3),
+        z=1.0,
+        pitch=3.0,
+        choices=[bays.window(width=2.2, sill=1.0, head=2.4, depth=_RECESS_M)],
+    )
     openings.enclose((_RECESS_M,))
 
 
-def _add_sign(p: GasStation, xs: bays.Span, y0: float) -> None:
+def _add_sign(station: GasStation, xs: bays.Span, y0: float) -> None:
     """Adds the price sign at a front corner."""
-    x = xs[0] + 1.2 if p.mirrored else xs[1] - 1.2
+    x = xs[0] + 1.2 if station.mirrored else xs[1] - 1.2
     y = y0 + 0.9
-    top = p.height
+    top = station.height
     for u in (x - 0.7, x + 0.7):
-        p.add_to("steel", solids.post(u, y, 0.1, top - 0.5))
+        station.add_to("steel", solids.post(u, y, half=0.1, z1=top - 0.5))
     for k, z in enumerate(np.arange(top - 1.2, 1.9, -0.75).tolist()):
-        board = solids.box(x - 0.85, x + 0.85, y - 0.16, y + 0.16, z, z + 0.65)
-        p.add_to("steel" if k % 2 else "brand", board)
-    crown = solids.box(x - 0.95, x + 0.95, y - 0.2, y + 0.2, top - 0.5, top)
-    p.add_to("brand", crown)
+        board = solids.box(
+            x=around(x, 0.85), y=around(y, 0.16), z=(z, z + 0.65)
+        )
+        station.add_to("steel" if k % 2 else "brand", board)
+    crown = solids.box(x=around(x, 0.95), y=around(y, 0.2), z=(top - 0.5, top))
+    station.add_to("brand", crown)
 
 
 def _pump() -> Mesh:
     """Returns a double-sided pump with screens and nozzles, on z = 0."""
-    pieces = [solids.box(-0.38, 0.38, -0.22, 0.22, 0.0, 1.65, bottom=False)]
+    pieces = [
+        solids.box(
+            x=(-0.38, 0.38), y=(-0.22, 0.22), z=(0.0, 1.65), bottom=False
+        )
+    ]
     for side in (-1.0, 1.0):
         y0, y1 = sorted((side * 0.2, side * 0.3))
-        pieces.append(solids.box(-0.3, 0.3, y0, y1, 1.0, 1.45))
+        pieces.append(solids.box(x=(-0.3, 0.3), y=(y0, y1), z=(1.0, 1.45)))
         for x in (-0.34, 0.26):
-            pieces.append(solids.box(x, x + 0.1, y0, y1, 0.55, 0.95))
+            pieces.append(
+                solids.box(x=(x, x + 0.1), y=(y0, y1), z=(0.55, 0.95))
+            )
     return merge_meshes(*pieces)

@@ -33,25 +33,25 @@ class GridTower(Building):
         # How far the slabs slide, as a share of the width; or the size of the
         # notches, as a share of the shorter side.
         self.shift = self.uniform(0.1, 0.18)
-        self.lobby = self.uniform(5.5, 8.0, 2)
+        self.lobby = self.uniform(5.5, 8.0, digits=2)
         self.storey = self.uniform(3.5, 4.0)
         self.pitch = max(self.uniform(3.4, 5.0), site.open_length / 28)
         # Width of the wall between windows side by side (pier), and its height
         # between windows one above another (beam).
-        self.pier = self.uniform(0.5, 0.9, 2)
-        self.beam = self.uniform(0.5, 0.9, 2)
-        self.recess = self.uniform(0.4, 0.8, 2)
+        self.pier = self.uniform(0.5, 0.9, digits=2)
+        self.beam = self.uniform(0.5, 0.9, digits=2)
+        self.recess = self.uniform(0.4, 0.8, digits=2)
         # Whether each frame spans two storeys.
         self.double = self.chance(0.4)
         # Where a plant floor interrupts the grid, as a share of the height; 0
         # for none.
         self.waist = self.uniform(0.45, 0.65) if self.height > 55.0 else 0.0
         # Height of the screen around the roof.
-        self.crown = self.uniform(2.4, 4.5, 2)
+        self.crown = self.uniform(2.4, 4.5, digits=2)
         self.roof_items = self.draw_roof_items(
             "lift_house cooling_tower air_handler cooling_tower mast ac_unit",
-            3,
-            7,
+            low=3,
+            high=7,
         )
 
     def build(self) -> None:
@@ -66,73 +66,114 @@ class GridTower(Building):
             top = _add_plant_floor(self, plan, top)
         top = _add_grid(self, plan, top, self.height - self.crown, "storey")
         rim = round(self.height - top, 3)
-        louvre = bays.window(self.pitch - self.pier, 0.5, rim - 0.5, 0.25)
-        louvres = bays.rhythm(self.pitch, [louvre], self.margin)
-        crown = Facade(rim, (Band(0.0, 0.25, -0.1),), louvres)
+        louvre = bays.window(
+            width=self.pitch - self.pier, sill=0.5, head=rim - 0.5, depth=0.25
+        )
+        louvres = bays.rhythm(self.pitch, [louvre], margin=self.margin)
+        crown = Facade(
+            rim, bands=(Band(z0=0.0, z1=0.25, depth=-0.1),), layout=louvres
+        )
         roof = tiers.add_crown(
-            self, plan, crown, top, rim - 0.6, thickness=0.45
+            self, plan, crown, z0=top, parapet=rim - 0.6, thickness=0.45
         )
         free = outlines.inset(plan, 0.5)
         equip_roof(self, free, roof, self.roof_items, clear=0.8)
 
 
-def _outline(p: GridTower, site: Site) -> np.ndarray:
+def _outline(tower: GridTower, site: Site) -> np.ndarray:
     """Returns the outline, slightly within the site; the front comes first."""
     x0, y0, x1, y1 = site.bounds
     base = outlines.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
-    if p.plan == "notched":
-        return outlines.notched(base, p.shift * outlines.shortest_side(base))
-    if p.plan == "box":
+    if tower.plan == "notched":
+        return outlines.notched(
+            base, tower.shift * outlines.shortest_side(base)
+        )
+    if tower.plan == "box":
         return base
     (a, c), (b, d) = base[0], base[2]
-    sx, my = p.shift * (b - a), (c + d) / 2
+    sx, my = tower.shift * (b - a), (c + d) / 2
     return np.array(
-        [(a, c), (b - sx, c), (b - sx, my), (b, my), (b, d), (a + sx, d),
-         (a + sx, my), (a, my)]
-    )  # fmt: skip
+        [
+            (a, c),
+            (b - sx, c),
+            (b - sx, my),
+            (b, my),
+            (b, d),
+            (a + sx, d),
+            (a + sx, my),
+            (a, my),
+        ]
+    )
 
 
-def _add_lobby(p: GridTower, plan: np.ndarray) -> float:
+def _add_lobby(tower: GridTower, plan: np.ndarray) -> float:
     """Adds a tall glazed hall behind the feet of the piers."""
-    h = p.lobby
-    pane = bays.window(p.pitch - p.pier, 0.3, h - 1.2, p.recess, transom=3.2)
-    glazing = bays.rhythm(p.pitch, [pane], p.margin)
-    door = bays.entrance(3.6, 3.2, p.recess + 0.6, surround=0.15)
-    layout = bays.with_door(glazing, door, 6.4)
-    facade = Facade(h, (Band(h - 0.9, h - 0.2, -0.12),), layout, (p.recess,))
+    h = tower.lobby
+    pane = bays.window(
+        width=tower.pitch - tower.pier,
+        sill=0.3,
+        head=h - 1.2,
+        depth=tower.recess,
+        transom=3.2,
+    )
+    glazing = bays.rhythm(tower.pitch, [pane], margin=tower.margin)
+    door = bays.entrance(
+        width=3.6, height=3.2, depth=tower.recess + 0.6, surround=0.15
+    )
+    layout = bays.with_door(glazing, door, width=6.4)
+    facade = Facade(
+        h,
+        bands=(Band(z0=h - 0.9, z1=h - 0.2, depth=-0.12),),
+        layout=layout,
+        glass=(tower.recess,),
+    )
     half = min(4.5, WallFrame(plan, 0).length / 2 - 0.6)
-    lid = canopies.front_canopy(plan, half, 1.6, 3.7)
-    return tiers.add_ground(p, plan, facade, [lid])
+    lid = canopies.front_canopy(plan, half=half, reach=1.6, z=3.7)
+    return tiers.add_ground(tower, plan, facade, extras=[lid])
 
 
 def _add_grid(
-    p: GridTower, plan: np.ndarray, z0: float, goal: float, part: str
+    tower: GridTower, plan: np.ndarray, z0: float, goal: float, part: str
 ) -> float:
     """Adds storeys behind frames up to about `goal`; returns their top [m]."""
-    unit = p.storey * (2 if p.double else 1)
-    groups, per_group, height = tiers.storey_groups(goal - z0, unit, 7)
+    unit = tower.storey * (2 if tower.double else 1)
+    groups, per_group, height = tiers.storey_groups(
+        goal - z0, storey=unit, most=7
+    )
     # Part of the beam closes the storey at its top.
-    low, high = round(p.beam - 0.25, 2), height - 0.25
+    low, high = round(tower.beam - 0.25, 2), height - 0.25
     frame = bays.window(
-        p.pitch - p.pier, low, high, p.recess, pier=p.pier / 2,
-        transom=round((low + high) / 2, 2) if p.double else None,
-    )  # fmt: skip
-    layout = bays.rhythm(p.pitch, [frame], p.margin)
-    facade = Facade(height, (), layout, (p.recess,))
-    return tiers.add_storeys(p, plan, facade, z0, groups, per_group, part=part)
+        width=tower.pitch - tower.pier,
+        sill=low,
+        head=high,
+        depth=tower.recess,
+        pier=tower.pier / 2,
+        transom=round((low + high) / 2, 2) if tower.double else None,
+    )
+    layout = bays.rhythm(tower.pitch, [frame], margin=tower.margin)
+    facade = Facade(height, bands=(), layout=layout, glass=(tower.recess,))
+    return tiers.add_storeys(
+        tower,
+        plan,
+        facade,
+        z0=z0,
+        groups=groups,
+        per_group=per_group,
+        part=part,
+    )
 
 
-def _add_plant_floor(p: GridTower, plan: np.ndarray, z0: float) -> float:
+def _add_plant_floor(tower: GridTower, plan: np.ndarray, z0: float) -> float:
     """Adds a floor of louvres, set back behind the grid."""
-    inner = outlines.inset(plan, p.recess)
+    inner = outlines.inset(plan, tower.recess)
     slats = [
-        Band(round(0.4 + 0.6 * k, 2), round(0.7 + 0.6 * k, 2), 0.18)
+        Band(z0=round(0.4 + 0.6 * k, 2), z1=round(0.7 + 0.6 * k, 2), depth=0.18)
         for k in range(5)
     ]
-    facade = Facade(3.9, tuple(slats))
+    facade = Facade(3.9, bands=tuple(slats))
     ring = tiers.lidded_walls(inner, facade, z0)
-    p.add("plant", ring)
+    tower.add("plant", ring)
     top = round(z0 + 3.9, 3)
     for z, up in ((z0, True), (top, False)):
-        p.add(f"ledge_{int(up)}", solids.flat(plan, z, up=up))
+        tower.add(f"ledge_{int(up)}", solids.flat(plan, z, up=up))
     return top

@@ -14,6 +14,7 @@ from cns_drake.city.facades import (
     WallFrame,
     Wing,
     add_chimney,
+    around,
     bay_windows,
     boards,
     outlines,
@@ -62,7 +63,7 @@ class HouseInRow(Building):
         self.plinth = self.pick((0.2, 0.5, 0.8, 1.0))
         self.door_left = self.chance(0.5)
         self.window_pitch = self.uniform(1.9, 2.5)
-        self.window_width = self.uniform(0.9, 1.2, 2)
+        self.window_width = self.uniform(0.9, 1.2, digits=2)
         self.casing = self.pick(casings)
         # `none`, `canted`, `box` (on the ground) or `oriel` (above it).
         self.bay = self.pick(("none", "canted", "box", "oriel"))
@@ -77,7 +78,7 @@ class HouseInRow(Building):
 
 
 def add_house(
-    p: HouseInRow,
+    house: HouseInRow,
     area: outlines.Area,
     blind: frozenset[int],
     part: str = "",
@@ -88,103 +89,124 @@ def add_house(
     Ground in front of the house stays free for the stoop.
 
     Args:
-        p: the building.
+        house: the building.
         area: ground of the house [m].
         blind: numbers of the edges towards neighbours.
         part: beginning of the names of parts that only this house has.
         door_material: material of the door.
     """
-    wing, storeys = wing_and_storeys(p, area, blind)
-    openings = Openings(p, wing)
-    step = (wing.wall_top - 0.25 - p.floor) / storeys
+    wing, storeys = wing_and_storeys(house, area, blind)
+    openings = Openings(house, wing)
+    step = (wing.wall_top - 0.25 - house.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
-    for edges, pitch in (((0, 2), p.window_pitch), (sides, 4.2)):
+    for edges, pitch in (((0, 2), house.window_pitch), (sides, 4.2)):
         wing_openings.add_window_storeys(
             openings,
             edges,
-            p.floor,
-            step,
-            storeys,
-            pitch,
-            p.window_width,
+            floor=house.floor,
+            storey=step,
+            count=storeys,
+            pitch=pitch,
+            width=house.window_width,
             head=min(2.2, step - 0.45),
         )
-    door = _add_entrance(p, wing, openings, door_material)
-    _add_bay(p, wing, openings, storeys, step, door)
-    wing_openings.add_casings(openings, (0,), p.casing)
-    bands = [Band(0.0, round(p.floor, 2), -0.05)]
+    door = _add_entrance(house, wing, openings, door_material)
+    _add_bay(house, wing, openings, storeys, step, door)
+    wing_openings.add_casings(openings, (0,), house.casing)
+    bands = [Band(z0=0.0, z1=round(house.floor, 2), depth=-0.05)]
     if storeys > 1:
-        z = round(p.floor + step, 2)
-        bands.append(Band(round(z - 0.15, 2), z, -0.05))
-    if p.roof == "flat":
+        z = round(house.floor + step, 2)
+        bands.append(Band(z0=round(z - 0.15, 2), z1=z, depth=-0.05))
+    if house.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
-        bands.append(Band(z, wing.wall_top, -0.22))
+        bands.append(Band(z0=z, z1=wing.wall_top, depth=-0.22))
     openings.add_walls((wing_openings.GLASS_M,), bands)
-    add_roof(p, wing)
-    if p.chimney:
-        add_roof_chimney(p, wing, f"{part}chimney")
+    add_roof(house, wing)
+    if house.chimney:
+        add_roof_chimney(house, wing, f"{part}chimney")
     return wing
 
 
 def wing_and_storeys(
-    p: HouseInRow, area: outlines.Area, blind: frozenset[int]
+    house: HouseInRow, area: outlines.Area, blind: frozenset[int]
 ) -> tuple[Wing, int]:
-    """Returns the wing of a house, and its number of storeys above `p.floor`.
+    """Returns the wing of a house, and its number of storeys.
+
+    Storeys are counted from `house.floor`.
 
     `area` is the ground of the house [m], and `blind` contains the numbers of
     the edges towards neighbours.
     """
     x0, y0, x1, y1 = area
-    across = p.roof in ("front", "stepped")
+    across = house.roof in ("front", "stepped")
     span = (x1 - x0) if across else (y1 - y0)
-    top = p.height
-    rise = p.rise * span / 2
-    if p.roof == "flat":
+    top = house.height
+    rise = house.rise * span / 2
+    if house.roof == "flat":
         rise = 0.5
-    elif p.roof == "stepped":
+    elif house.roof == "stepped":
         top -= 0.4
     elif not across:
         top -= _FIREWALL_M
-    room = top - p.floor - ROOF_M - 0.25
-    storeys = max(1, round((room - rise) / p.storey))
-    if p.roof == "flat":
+    room = top - house.floor - ROOF_M - 0.25
+    storeys = max(1, round((room - rise) / house.storey))
+    if house.roof == "flat":
         wall_top = top - rise
     else:
-        wanted = p.floor + storeys * p.storey + 0.25
+        wanted = house.floor + storeys * house.storey + 0.25
         least = top - ROOF_M - 0.75 * span
         wall_top = min(max(wanted, least), top - ROOF_M - 0.1 * span)
-    kind = "gable" if across else p.roof
-    eaves, verge = 0.0 if across else 0.35, 0.0 if p.roof == "stepped" else 0.3
-    roof = Roof(kind, across, eaves, verge, ROOF_M, parapet=0.45)
-    return Wing.at((x0, y0, x1, y1), wall_top, top, roof, blind), storeys
+    kind = "gable" if across else house.roof
+    eaves, verge = (
+        0.0 if across else 0.35,
+        0.0 if house.roof == "stepped" else 0.3,
+    )
+    roof = Roof(
+        kind,
+        along_y=across,
+        eaves=eaves,
+        verge=verge,
+        thickness=ROOF_M,
+        parapet=0.45,
+    )
+    return Wing.at(
+        (x0, y0, x1, y1), wall_top=wall_top, top=top, roof=roof, blind=blind
+    ), storeys
 
 
 def _add_entrance(
-    p: HouseInRow, wing: Wing, openings: Openings, material: str
+    house: HouseInRow, wing: Wing, openings: Openings, material: str
 ) -> float:
     """Adds the door and its landing; returns the door's x on the wall [m]."""
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
-    x = inset if p.door_left else wall.length - inset
+    x = inset if house.door_left else wall.length - inset
     wing_openings.add_door(
-        openings, 0, x, p.floor, height=2.25, material=material
+        openings, 0, x=x, floor=house.floor, height=2.25, material=material
     )
-    count = max(1, round(p.floor / 0.17))
-    run = min(0.29 * count, max(p.stoop - 0.5, 0.3 * p.stoop))
-    landing = p.stoop - run
+    count = max(1, round(house.floor / 0.17))
+    run = min(0.29 * count, max(house.stoop - 0.5, 0.3 * house.stoop))
+    landing = house.stoop - run
     a, b = x - 0.65, x + 0.65
-    if p.floor > 0.05:
-        slab = wall.standing(a, b, -0.05, landing, p.floor, bottom=True)
-        p.add_to("base", slab)
-        porches.add_steps(p, wall, a, b, landing, p.floor, run)
-    if p.canopy:
-        z = p.floor + 2.4
-        p.add_to("trim", wall.box(x - 0.8, x + 0.8, -0.05, 0.8, z, z + 0.14))
+    if house.floor > 0.05:
+        slab = wall.standing(
+            x=(a, b), y=(-0.05, landing), z1=house.floor, bottom=True
+        )
+        house.add_to("base", slab)
+        porches.add_steps(
+            house, wall, x0=a, x1=b, start=landing, rise=house.floor, room=run
+        )
+    if house.canopy:
+        z = house.floor + 2.4
+        house.add_to(
+            "trim",
+            wall.box(x=around(x, 0.8), y=(-0.05, 0.8), z=(z, z + 0.14)),
+        )
     return x
 
 
 def _add_bay(
-    p: HouseInRow,
+    house: HouseInRow,
     wing: Wing,
     openings: Openings,
     storeys: int,
@@ -193,42 +215,66 @@ def _add_bay(
 ) -> None:
     """Adds a bay window beside the door, in place of the windows there."""
     wall = wing.wall(0)
-    a, b = (door + 0.8, wall.length) if p.door_left else (0.0, door - 0.8)
+    a, b = (door + 0.8, wall.length) if house.door_left else (0.0, door - 0.8)
     width = min(b - a - 0.7, 2.6)
-    if p.bay == "none" or width < 1.7 or (p.bay == "oriel" and storeys < 2):
+    if (
+        house.bay == "none"
+        or width < 1.7
+        or (house.bay == "oriel" and storeys < 2)
+    ):
         return
-    count = min(p.bay_storeys, storeys)
+    count = min(house.bay_storeys, storeys)
     x = (a + b) / 2
     low = 0.0
-    foot = p.floor
-    if p.bay == "oriel":
-        low = p.floor + step
+    foot = house.floor
+    if house.bay == "oriel":
+        low = house.floor + step
         foot = 0.0
         count = min(count, storeys - 1)
     high = min(foot + low + count * step - 0.1, wing.wall_top - 0.6)
-    reach = min(0.6, 0.5 * p.stoop)
-    openings.clear(0, x - width / 2 - 0.1, x + width / 2 + 0.1, low, high + 0.5)
+    reach = min(0.6, 0.5 * house.stoop)
+    openings.clear(
+        0, x0=x - width / 2 - 0.1, x1=x + width / 2 + 0.1, z0=low, z1=high + 0.5
+    )
     bay_windows.add_bay_window(
-        p, wall, x, width, reach, round(low, 2), round(high, 2),
-        storeys=count, canted=p.bay != "box",
-    )  # fmt: skip
+        house,
+        wall,
+        x=x,
+        width=width,
+        reach=reach,
+        z0=round(low, 2),
+        z1=round(high, 2),
+        storeys=count,
+        canted=house.bay != "box",
+    )
 
 
-def add_roof(p: HouseInRow, wing: Wing) -> None:
+def add_roof(house: HouseInRow, wing: Wing) -> None:
     """Adds the roof of a house with its dormers, firewalls or steps."""
     low = wing.wall_top + 0.45
-    attic = wing_roofs.attic_window(0.8, low, low + 1.1, wing_openings.GLASS_M)
-    wing_roofs.add_roof(p, wing, None if p.roof == "stepped" else attic)
-    if p.roof == "stepped":
+    attic = wing_roofs.attic_window(
+        width=0.8, z0=low, z1=low + 1.1, depth=wing_openings.GLASS_M
+    )
+    wing_roofs.add_roof(house, wing, None if house.roof == "stepped" else attic)
+    if house.roof == "stepped":
         for edge in (0, 2):
-            p.add_to("walls", *_stepped_gable(wing, wing.wall(edge)))
-        _add_gable_windows(p, wing)
-    elif p.roof in ("gable", "gambrel"):
+            house.add_to("walls", *_stepped_gable(wing, wing.wall(edge)))
+        _add_gable_windows(house, wing)
+    elif house.roof in ("gable", "gambrel"):
         line = [(u, z + _FIREWALL_M) for u, z in wing.roof_line]
         for x in (wing.x0, wing.x1 - 0.3):
-            firewall = roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
-            p.add_to("walls", firewall)
-        wing_roofs.add_dormers(p, wing, 0.0, wing.width, p.dormers, p.dormer)
+            firewall = roofs.shell(
+                line, start=x, end=x + 0.3, thickness=_FIREWALL_M + 0.1
+            )
+            house.add_to("walls", firewall)
+        wing_roofs.add_dormers(
+            house,
+            wing,
+            start=0.0,
+            end=wing.width,
+            count=house.dormers,
+            roof=house.dormer,
+        )
 
 
 def _stepped_gable(wing: Wing, wall: WallFrame) -> list[Mesh]:
@@ -242,8 +288,12 @@ def _stepped_gable(wing: Wing, wall: WallFrame) -> list[Mesh]:
         half = max(middle * (1.0 - k / count), 0.5)
         low = wing.wall_top + rise * (k / count) - 0.3
         top = wing.wall_top + rise * (k + 1) / count
-        spot = (middle - half, middle + half, -0.32, 0.03, low, top)
-        pieces.append(wall.box(*(round(v, 2) for v in spot)))
+        step = wall.box(
+            x=(round(middle - half, 2), round(middle + half, 2)),
+            y=(-0.32, 0.03),
+            z=(round(low, 2), round(top, 2)),
+        )
+        pieces.append(step)
     return pieces
 
 
@@ -254,37 +304,45 @@ def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     for edge in (0, 2):
         wall = wing.wall(edge)
         for u in spots:
-            pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, wing_openings.GLASS_M)
+            pane = Patch(
+                x0=u - 0.45,
+                x1=u + 0.45,
+                z0=z,
+                z1=z + 1.2,
+                depth=wing_openings.GLASS_M,
+            )
             frame = boards.casings([pane], (pane.depth,), "frame", 0.12)
-            glass = boards.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
+            glass = boards.board(
+                x0=pane.x0, x1=pane.x1, z0=pane.z0, z1=pane.z1, reach=0.05
+            )
             out.add_to("trim", *(wall.place(piece) for piece in frame))
             out.add_to("glass", wall.place(glass))
 
 
-def add_roof_chimney(p: HouseInRow, wing: Wing, name: str) -> None:
+def add_roof_chimney(house: HouseInRow, wing: Wing, name: str) -> None:
     """Adds a chimney to the roof of a house; `name` is the part's name."""
     yaw = math.pi / 2
-    if p.roof in ("front", "stepped"):
+    if house.roof in ("front", "stepped"):
         x = wing.x0 + 0.3 * wing.width
         z = roofs.line_height(wing.roof_line, x)
         spot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
-        add_chimney(p, name, spot, p.brick, yaw=yaw)
+        add_chimney(house, name, spot, house.brick, yaw=yaw)
         return
-    x = wing.x0 + 0.45 if p.door_left else wing.x1 - 0.45
+    x = wing.x0 + 0.45 if house.door_left else wing.x1 - 0.45
     y = wing.y0 + 0.55 * wing.depth
     spot = (x, y, roofs.line_height(wing.roof_line, y) - 0.8)
     row = "chimney_row"
     scale = (0.8, 0.85, 1.0)
-    add_chimney(p, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
+    add_chimney(house, name, spot, house.brick, item=row, yaw=yaw, scale=scale)
 
 
-def front_of_site(p: HouseInRow) -> tuple[float, float, frozenset[int]]:
+def front_of_site(house: HouseInRow) -> tuple[float, float, frozenset[int]]:
     """Returns x of a house's left and right wall [m], and the blind edges.
 
     A side wall without a neighbour stands back far enough for the cornice of a
     flat roof, so that the cornice stays on the lot.
     """
-    x0, _, x1, _ = p.site.bounds
-    side = 0.3 * (p.roof == "flat")
-    blind = p.site.blind_edges & {1, 3}
+    x0, _, x1, _ = house.site.bounds
+    side = 0.3 * (house.roof == "flat")
+    blind = house.site.blind_edges & {1, 3}
     return x0 + side * (3 not in blind), x1 - side * (1 not in blind), blind

@@ -104,7 +104,7 @@ class Landmark(Building):
                 shape = self.shared(part.mesh, scale)
             xyz = middle + stretch * part.xyz
             finish = Finish(part.rgb, part.material)
-            self.place(part.name, shape, xyz, part.yaw, finish)
+            self.place(part.name, shape, xyz, yaw=part.yaw, finish=finish)
 
 
 @cache

@@ -43,7 +43,7 @@ class PodiumTower(Building):
         self.tower = self.rng.uniform(0.5, 0.68, 2).tolist()
         run = 2 * (self.tower[0] * site.width + self.tower[1] * site.depth)
         self.podium_storeys = self.whole(2, 4)
-        self.ground_height = self.uniform(4.8, 5.6, 2)
+        self.ground_height = self.uniform(4.8, 5.6, digits=2)
         self.storey_height = self.uniform(3.2, 3.7)
         self.shop_pitch = self.uniform(5.5, 7.5) * min(
             1.3, max(1.0, (site.width + site.depth) / 70)
@@ -52,8 +52,8 @@ class PodiumTower(Building):
         self.at = self.rng.choice([0.15, 0.5, 0.85], 2).tolist()
         self.chamfer = self.pick((0.0, 2.0, 3.5))
         self.pitch = max(self.uniform(3.0, 4.2), run / 19)
-        self.recess = self.uniform(0.35, 0.5, 2)
-        self.frame = self.uniform(0.5, 0.9, 2)
+        self.recess = self.uniform(0.35, 0.5, digits=2)
+        self.frame = self.uniform(0.5, 0.9, digits=2)
         self.mullions = int(run < 70.0)
         self.balconies = self.chance(0.5)
         self.awnings = self.uniform(0.3, 0.9)
@@ -66,10 +66,24 @@ class PodiumTower(Building):
         (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
         top, walls = _add_shops(self), _podium_storey(self)
         top = tiers.add_storeys(
-            self, base, walls, top, self.podium_storeys, 1, part="podium"
+            self,
+            base,
+            walls,
+            z0=top,
+            groups=self.podium_storeys,
+            per_group=1,
+            part="podium",
         )
-        edge = Facade(1.6, (Band(0.2, 0.7, -0.3), Band(1.4, 1.6, -0.1)))
-        roof = tiers.add_crown(self, base, edge, top, 1.2, part="terrace")
+        edge = Facade(
+            1.6,
+            bands=(
+                Band(z0=0.2, z1=0.7, depth=-0.3),
+                Band(z0=1.4, z1=1.6, depth=-0.1),
+            ),
+        )
+        roof = tiers.add_crown(
+            self, base, edge, z0=top, parapet=1.2, part="terrace"
+        )
         width, depth = self.tower[0] * (x1 - x0), self.tower[1] * (y1 - y0)
         left = round(x0 + self.at[0] * (x1 - x0 - width), 2)
         near = round(y0 + self.at[1] * (y1 - y0 - depth), 2)
@@ -82,60 +96,107 @@ class PodiumTower(Building):
         _add_tower(self, plan, roof)
 
 
-def _add_shops(p: PodiumTower) -> float:
-    outline, h = p.site.outline, p.ground_height
+def _add_shops(building: PodiumTower) -> float:
+    outline, h = building.site.outline, building.ground_height
     front = WallFrame(outline, 0)
-    pitch = p.shop_pitch
-    choices = [bays.shop_front(h - 0.6, 0.45, door=d) for d in (True, False)]
+    pitch = building.shop_pitch
+    choices = [
+        bays.shop_front(head=h - 0.6, depth=0.45, door=d) for d in (True, False)
+    ]
     shops = bays.rhythm(pitch, choices, margin=0.8)
-    gates = [bays.gate(4.0, 3.4), bays.blank]
-    main = bays.with_middle(shops, bays.entrance(4.0, 3.8, 1.6), 6.0)
+    gates = [bays.gate(width=4.0, height=3.4), bays.blank]
+    main = bays.with_middle(
+        shops, bays.entrance(width=4.0, height=3.8, depth=1.6), width=6.0
+    )
     service = bays.rhythm(pitch, gates, margin=1.0)
     layout = bays.by_edge({0: main, 2: service}, shops)
-    bands = (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2))
-    cells = bays.stretches(front.length, pitch, 0.8)
-    shape = canopies.AwningShape(0.4, 1.35, 2.7, h - 1.3)
-    shades = canopies.awnings(front, cells, p.rng, p.awnings, shape, 3.2)
-    canopies.add_awnings(p, shades)
-    roof = canopies.front_canopy(outline, 3.2, 1.45, 4.0)
-    facade = Facade(h, bands, layout, (0.45,))
-    return tiers.add_ground(p, outline, facade, [roof])
+    bands = (
+        Band(z0=0.0, z1=0.3, depth=-0.06),
+        Band(z0=h - 1.1, z1=h - 0.2, depth=-0.2),
+    )
+    cells = bays.stretches(front.length, pitch=pitch, margin=0.8)
+    shape = canopies.AwningShape(narrower=0.4, reach=1.35, z0=2.7, z1=h - 1.3)
+    shades = canopies.awnings(
+        front,
+        cells,
+        building.rng,
+        share=building.awnings,
+        shape=shape,
+        door=3.2,
+    )
+    canopies.add_awnings(building, shades)
+    roof = canopies.front_canopy(outline, half=3.2, reach=1.45, z=4.0)
+    facade = Facade(h, bands=bands, layout=layout, glass=(0.45,))
+    return tiers.add_ground(building, outline, facade, extras=[roof])
 
 
-def _podium_storey(p: PodiumTower) -> Facade:
+def _podium_storey(building: PodiumTower) -> Facade:
     storey = 4.2
-    window = bays.window(p.shop_pitch - 1.4, 0.7, storey - 0.7, 0.3, mullions=2)
-    layout = bays.rhythm(p.shop_pitch, [window], margin=0.8)
-    return Facade(storey, (Band(0.0, 0.25, -0.12),), layout, glass=(0.3,))
+    window = bays.window(
+        width=building.shop_pitch - 1.4,
+        sill=0.7,
+        head=storey - 0.7,
+        depth=0.3,
+        mullions=2,
+    )
+    layout = bays.rhythm(building.shop_pitch, [window], margin=0.8)
+    return Facade(
+        storey,
+        bands=(Band(z0=0.0, z1=0.25, depth=-0.12),),
+        layout=layout,
+        glass=(0.3,),
+    )
 
 
-def _add_tower(p: PodiumTower, plan: np.ndarray, z0: float) -> None:
-    room = p.height - 3.0 - z0
-    groups, per_group, storey = tiers.storey_groups(room, p.storey_height)
+def _add_tower(building: PodiumTower, plan: np.ndarray, z0: float) -> None:
+    room = building.height - 3.0 - z0
+    groups, per_group, storey = tiers.storey_groups(
+        room, storey=building.storey_height
+    )
     # Deep frames, one bay wide, with the glass at their backs.
     frame = bays.window(
-        1e3, round(p.frame / 2, 2), round(storey - p.frame / 2, 2), p.recess,
-        pier=round(p.frame / 2, 2), mullions=p.mullions,
-    )  # fmt: skip
-    layout = bays.rhythm(p.pitch, [frame], margin=0.5)
-    walls = Facade(storey, (), layout, (p.recess,))
+        width=1e3,
+        sill=round(building.frame / 2, 2),
+        head=round(storey - building.frame / 2, 2),
+        depth=building.recess,
+        pier=round(building.frame / 2, 2),
+        mullions=building.mullions,
+    )
+    layout = bays.rhythm(building.pitch, [frame], margin=0.5)
+    walls = Facade(storey, bands=(), layout=layout, glass=(building.recess,))
     extras = []
-    for edge in range(len(plan)) if p.balconies else ():
+    for edge in range(len(plan)) if building.balconies else ():
         wall = WallFrame(plan, edge)
-        if wall.length > 3 * p.pitch:
-            x = 0.5 + p.pitch
-            extras.append(wall.place(balconies.balcony(x - 2.6, x, 1.4, 0.0)))
-    top = tiers.add_storeys(p, plan, walls, z0, groups, per_group, extras)
-    crown = round(p.height - top, 3)
-    louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
-    screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
+        if wall.length > 3 * building.pitch:
+            x = 0.5 + building.pitch
+            extras.append(
+                wall.place(
+                    balconies.balcony(x0=x - 2.6, x1=x, reach=1.4, z=0.0)
+                )
+            )
+    top = tiers.add_storeys(
+        building,
+        plan,
+        walls,
+        z0=z0,
+        groups=groups,
+        per_group=per_group,
+        extras=extras,
+    )
+    crown = round(building.height - top, 3)
+    louvres = tuple(
+        Band(z0=z, z1=z + 0.35, depth=0.15) for z in (0.5, 1.2, 1.9)
+    )
+    screen = Facade(
+        crown, bands=(*louvres, Band(z0=2.6, z1=crown, depth=-0.15))
+    )
     items = _ROOF_ITEMS
-    tiers.add_crown(p, plan, screen, top, 2.2, items=items)
+    tiers.add_crown(building, plan, screen, z0=top, parapet=2.2, items=items)
 
 
-def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
+def _add_garden(building: PodiumTower, tower: np.ndarray, z: float) -> None:
     """Adds planters and a pergola to the podium roof's widest free strip."""
-    x0, y0, x1, y1 = p.site.bounds
+    x0, y0, x1, y1 = building.site.bounds
     (tx0, ty0), (tx1, ty1) = tower[0], tower[2]
     strips = (
         (x0, tx0, y0, y1),
@@ -151,24 +212,27 @@ def _add_garden(p: PodiumTower, tower: np.ndarray, z: float) -> None:
         garden = _garden(b - a, d - c).moved((a, c, z))
     else:
         garden = _garden(d - c, b - a).moved((b, c, z), math.pi / 2)
-    p.add("garden", garden, finish=Finish((0.45, 0.40, 0.33)))
+    building.add("garden", garden, finish=Finish((0.45, 0.40, 0.33)))
 
 
 def _garden(length: float, width: float) -> Mesh:
     """Returns planters along x, with a pergola behind them."""
     planters = (
-        (u * length, (u + 0.12) * length, 0.0, 1.2, -0.1, 0.8)
+        ((u * length, (u + 0.12) * length), (0.0, 1.2), (-0.1, 0.8))
         for u in (0.1, 0.32, 0.54, 0.76)
     )
     places = [round(u * length, 2) for u in np.linspace(0.25, 0.75, 7)]
-    beams = (solids.box(x, x + 0.15, 1.5, width, 2.6, 2.85) for x in places)
+    beams = (
+        solids.box(x=(x, x + 0.15), y=(1.5, width), z=(2.6, 2.85))
+        for x in places
+    )
     posts = (
-        (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
+        ((x, x + 0.15), (y, y + 0.15), (-0.1, 2.7))
         for x in (places[0], places[-1])
         for y in (1.6, width - 0.2)
     )
     return merge_meshes(
-        *(solids.box(*spot, bottom=False) for spot in planters),
+        *(solids.box(x, y, z, bottom=False) for x, y, z in planters),
         *beams,
-        *(solids.box(*spot, bottom=False) for spot in posts),
+        *(solids.box(x, y, z, bottom=False) for x, y, z in posts),
     )

@@ -25,7 +25,7 @@ class RowHouse(HouseInRow):
         self.floor = self.plinth
         # Height and side of the lower wing behind the house, and its width as a
         # share of the width of the house.
-        self.annex_height = self.uniform(2.8, 3.6, 2)
+        self.annex_height = self.uniform(2.8, 3.6, digits=2)
         self.annex_share = self.uniform(0.45, 0.65)
         self.annex_left = self.chance(0.5)
 
@@ -45,17 +45,24 @@ class RowHouse(HouseInRow):
             _add_annex(self, main, back)
 
 
-def _add_annex(p: RowHouse, main: Wing, back: float) -> None:
+def _add_annex(house: RowHouse, main: Wing, back: float) -> None:
     """Adds a low wing behind the house, on one side."""
-    width = p.annex_share * main.width
-    x0 = main.x0 if p.annex_left else main.x1 - width
-    blind = main.blind & {3 if p.annex_left else 1}
-    top = min(p.annex_height + 0.9, main.wall_top)
-    wall_top = min(p.annex_height, top - 0.4)
+    width = house.annex_share * main.width
+    x0 = main.x0 if house.annex_left else main.x1 - width
+    blind = main.blind & {3 if house.annex_left else 1}
+    top = min(house.annex_height + 0.9, main.wall_top)
+    wall_top = min(house.annex_height, top - 0.4)
     area = (x0, main.y1 - 0.06, x0 + width, back)
-    roof = Roof("shed", True, 0.0, 0.2, 0.18)
-    openings = Openings(p, Wing.at(area, wall_top, top, roof, blind), (main,))
+    roof = Roof("shed", along_y=True, eaves=0.0, verge=0.2, thickness=0.18)
+    openings = Openings(
+        house,
+        Wing.at(area, wall_top=wall_top, top=top, roof=roof, blind=blind),
+        (main,),
+    )
     openings.add_bays(
-        (1, 2, 3), 0.9, 2.6, [wing_openings.sash(1.1, 0.1, 0.9, 2.1)]
+        (1, 2, 3),
+        z=0.9,
+        pitch=2.6,
+        choices=[wing_openings.sash(width=1.1, z=0.1, sill=0.9, head=2.1)],
     )
     openings.enclose((wing_openings.GLASS_M,))

@@ -1,5 +1,7 @@
 """The pair of semi-detached houses."""
 
+from functools import partial
+
 import numpy as np
 
 from cns_drake.city.buildings.family_house import (
@@ -21,6 +23,7 @@ from cns_drake.city.facades import (
     Roof,
     Wing,
     add_chimney,
+    around,
     bay_windows,
     porches,
     wing_openings,
@@ -35,20 +38,20 @@ class SemiDetached(FamilyHouse):
         self.roof = self.pick(("gable", "hip"))
         # Wanted pitch of the roof.
         self.pitch_deg = self.uniform(30.0, 45.0)
-        self.floor = self.uniform(0.15, 0.45, 2)
+        self.floor = self.uniform(0.15, 0.45, digits=2)
         self.window_pitch = self.uniform(2.4, 3.2)
-        self.window_width = self.uniform(1.0, 1.4, 2)
+        self.window_width = self.uniform(1.0, 1.4, digits=2)
         self.casing = self.pick(("frame", "sill", "sill", "shutters"))
         # `gabled` (through all storeys, under a gable of its own), `canted`
         # or `none`.
         self.bay = self.pick(("gabled", "canted", "gabled", "none"))
-        self.bay_width = self.uniform(2.6, 3.2, 2)
-        self.bay_reach = self.uniform(0.6, 1.0, 2)
+        self.bay_width = self.uniform(2.6, 3.2, digits=2)
+        self.bay_reach = self.uniform(0.6, 1.0, digits=2)
         self.doors_inside = self.chance(0.5)
-        self.porch_reach = self.uniform(1.1, 1.5, 2)
+        self.porch_reach = self.uniform(1.1, 1.5, digits=2)
         # Roof of the two garages, one on either side, or `none`.
         self.garages = self.pick(("none", "flat", "shed", "hip"))
-        self.garage_width = self.uniform(2.9, 3.4, 2)
+        self.garage_width = self.uniform(2.9, 3.4, digits=2)
         self.chimneys = self.pick(("middle", "ends"))
 
     def build(self) -> None:
@@ -66,7 +69,7 @@ class SemiDetached(FamilyHouse):
         wall_top = wall_top_for(self.height, self.floor, deep, n)
         shape = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
         area = (left + side, front, right - side, front + deep)
-        main = Wing.at(area, wall_top, self.height, shape)
+        main = Wing.at(area, wall_top=wall_top, top=self.height, roof=shape)
         bays = _gabled_bays(self, main) if self.bay == "gabled" else ()
         garages = []
         if has_garages:
@@ -80,7 +83,14 @@ class SemiDetached(FamilyHouse):
         for wing in bays:
             rows = Openings(self, wing, self.boxes)
             wing_openings.add_window_storeys(
-                rows, (0,), self.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+                rows,
+                (0,),
+                floor=self.floor,
+                storey=STOREY_M,
+                count=n,
+                pitch=2.4,
+                width=1.5,
+                margin=0.2,
             )
             add_walls_and_roof(self, wing, rows)
         for garage in garages:
@@ -88,75 +98,97 @@ class SemiDetached(FamilyHouse):
         _add_chimneys(self, main)
 
 
-def _bay_middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+def _bay_middles(houses: SemiDetached, main: Wing) -> tuple[float, float]:
     """Returns the middles of the two bays along the main wall [m]."""
     half = (main.x1 - main.x0) / 2
     # Doors take the middle or the ends; bays take the rest of each half.
-    u = 0.6 * half if p.doors_inside else 0.36 * half
-    offset = half - u if not p.doors_inside else u
+    u = 0.6 * half if houses.doors_inside else 0.36 * half
+    offset = half - u if not houses.doors_inside else u
     return half - offset, half + offset
 
 
-def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
-    width = min(p.bay_width, 0.45 * (main.x1 - main.x0) / 2)
+def _gabled_bays(houses: SemiDetached, main: Wing) -> tuple[Wing, ...]:
+    width = min(houses.bay_width, 0.45 * (main.x1 - main.x0) / 2)
     if width < 1.8:
         return ()
     rise = min(0.5 * width, main.top - main.wall_top - ROOF_M - 0.2)
     top = main.wall_top + ROOF_M + rise
-    shape = Roof("gable", True, 0.2, 0.25, ROOF_M)
+    shape = Roof("gable", along_y=True, eaves=0.2, verge=0.25, thickness=ROOF_M)
     middle = (main.y0 + main.y1) / 2
     fronts = (
         (main.x0 + x - width / 2, main.x0 + x + width / 2)
-        for x in _bay_middles(p, main)
+        for x in _bay_middles(houses, main)
     )
-    y0 = main.y0 - p.bay_reach
+    y0 = main.y0 - houses.bay_reach
     return tuple(
-        Wing.at((a, y0, b, middle), main.wall_top, top, shape)
+        Wing.at((a, y0, b, middle), wall_top=main.wall_top, top=top, roof=shape)
         for a, b in fronts
     )
 
 
 def _add_entrances(
-    p: SemiDetached, main: Wing, openings: Openings, y0: float
+    houses: SemiDetached, main: Wing, openings: Openings, y0: float
 ) -> None:
     """Adds the doors under one or two roofs, and bays on the ground floor."""
     wall = main.wall(0)
     half = wall.length / 2
     room = main.y0 - y0 - 0.1
-    reach = min(p.porch_reach, room - 0.3)
-    offset = 0.75 if p.doors_inside else half - 0.95
-    eaves = p.floor + 2.35
-    size = (reach, p.floor, eaves, eaves + 0.4)
+    reach = min(houses.porch_reach, room - 0.3)
+    offset = 0.75 if houses.doors_inside else half - 0.95
+    eaves = houses.floor + 2.35
+    add_porch = partial(
+        porches.add_porch,
+        houses,
+        wall,
+        reach=reach,
+        deck=houses.floor,
+        eaves=eaves,
+        top=eaves + 0.4,
+    )
     for x in (half - offset, half + offset):
-        wing_openings.add_door(openings, 0, x, p.floor)
-        if not p.doors_inside:
-            porches.add_porch(p, wall, x - 0.85, x + 0.85, *size)
-    if p.doors_inside:
-        porches.add_porch(
-            p, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
-        )
-    for x in _bay_middles(p, main) if p.bay == "canted" else ():
+        wing_openings.add_door(openings, 0, x=x, floor=houses.floor)
+        if not houses.doors_inside:
+            add_porch(x0=x - 0.85, x1=x + 0.85)
+    if houses.doors_inside:
+        add_porch(x0=half - 1.6, x1=half + 1.6, roof="flat", posts=3)
+    for x in _bay_middles(houses, main) if houses.bay == "canted" else ():
         width = min(2.4, 0.5 * half)
         ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
-        openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
+        openings.clear(0, *ends, 0.0, houses.floor + STOREY_M - 0.2)
         bay_windows.add_bay_window(
-            p, wall, x, width, min(0.7, room - 0.1), 0.0,
-            round(p.floor + 2.3, 2),
-        )  # fmt: skip
-    if p.doors_inside:
-        step = (half - 1.4, half + 1.4, reach, reach + 0.28, 0.12)
-        p.add_to("base", wall.standing(*step, bottom=True))
+            houses,
+            wall,
+            x=x,
+            width=width,
+            reach=min(0.7, room - 0.1),
+            z0=0.0,
+            z1=round(houses.floor + 2.3, 2),
+        )
+    if houses.doors_inside:
+        houses.add_to(
+            "base",
+            wall.standing(
+                x=around(half, 1.4),
+                y=(reach, reach + 0.28),
+                z1=0.12,
+                bottom=True,
+            ),
+        )
 
 
-def _add_chimneys(p: SemiDetached, main: Wing) -> None:
+def _add_chimneys(houses: SemiDetached, main: Wing) -> None:
     x, y = main.center
     spots = [x]
-    if p.chimneys != "middle":
-        side = 0.7 if p.roof == "gable" else 0.35 * main.width
+    if houses.chimneys != "middle":
+        side = 0.7 if houses.roof == "gable" else 0.35 * main.width
         spots = [main.x0 + side, main.x1 - side]
     for k, x in enumerate(spots):
         add_chimney(
-            p, f"chimney_{k}", (x, y, main.top - 1.1),
-            p.kind.choices["bricks"][0], item="chimney_row",
-            yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
-        )  # fmt: skip
+            houses,
+            f"chimney_{k}",
+            (x, y, main.top - 1.1),
+            houses.kind.choices["bricks"][0],
+            item="chimney_row",
+            yaw=np.pi / 2,
+            scale=(0.8, 1.0, 1.0),
+        )

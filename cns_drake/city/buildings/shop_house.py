@@ -33,7 +33,7 @@ class ShopHouse(HouseInRow):
         self.window_pitch = max(self.window_pitch, (width + depth) / 22)
         self.stoop = 0.35
         # Height of the shops. A low house contains nothing but shops.
-        self.floor = self.uniform(3.5, 4.2, 2)
+        self.floor = self.uniform(3.5, 4.2, digits=2)
         if self.height - self.floor < 3.2:
             self.roof = "flat"
             self.floor = round(min(3.4, self.height - 1.6), 2)
@@ -43,9 +43,9 @@ class ShopHouse(HouseInRow):
         # Greatest number of bay windows above the shops.
         self.oriels = self.whole(0, 3)
         # How far the band above the shops sticks out.
-        self.course = self.uniform(0.08, 0.2, 2)
+        self.course = self.uniform(0.08, 0.2, digits=2)
         self.roof_items = self.draw_roof_items(
-            "stair_house vents ac_unit skylight", 1, 5
+            "stair_house vents ac_unit skylight", low=1, high=5
         )
 
     def build(self) -> None:
@@ -67,15 +67,22 @@ class ShopHouse(HouseInRow):
         width = self.window_width
         for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
             wing_openings.add_window_storeys(
-                openings, edges, ground, step, upper, pitch, width, head=head
+                openings,
+                edges,
+                floor=ground,
+                storey=step,
+                count=upper,
+                pitch=pitch,
+                width=width,
+                head=head,
             )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
         wing_openings.add_casings(openings, (0,), self.casing)
-        bands = [Band(round(ground - 0.3, 2), ground, -self.course)]
+        bands = [Band(z0=round(ground - 0.3, 2), z1=ground, depth=-self.course)]
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
-            bands.append(Band(z, wing.wall_top, -0.25))
+            bands.append(Band(z0=z, z1=wing.wall_top, depth=-0.25))
         glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
         openings.add_walls(glass, bands)
         add_roof(self, wing)
@@ -85,41 +92,63 @@ class ShopHouse(HouseInRow):
             add_roof_chimney(self, wing, "chimney")
 
 
-def _add_ground(p: ShopHouse, wing: Wing, openings: Openings) -> None:
+def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
     """Adds the shops, the door to the flats, service doors at the back."""
     wall = wing.wall(0)
-    door = 1.7 * (p.floor < p.height - 3.0)
+    door = 1.7 * (house.floor < house.height - 3.0)
     length = wall.length
-    left = p.door_left
+    left = house.door_left
     start, end = (door, length) if left else (0.0, length - door)
-    wing_openings.add_shops(openings, 0, start, end, p.floor,
-        width=p.shop_width, awnings=p.awnings,
-    )  # fmt: skip
+    wing_openings.add_shops(
+        openings,
+        0,
+        start=start,
+        end=end,
+        height=house.floor,
+        width=house.shop_width,
+        awnings=house.awnings,
+    )
     if door:
         x = 0.9 if left else length - 0.9
-        wing_openings.add_door(openings, 0, x, 0.0, height=2.3)
-    back = [wing_openings.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
-    openings.add_bays((2,), 0.5, 4.5, back, 0.8)
+        wing_openings.add_door(openings, 0, x=x, floor=0.0, height=2.3)
+    back = [
+        wing_openings.sash(width=1.2, z=0.0, sill=1.4, head=2.3),
+        bays.gate(width=2.2, height=2.3, depth=0.2),
+    ]
+    openings.add_bays((2,), z=0.5, pitch=4.5, choices=back, margin=0.8)
 
 
 def _add_oriels(
-    p: ShopHouse, wing: Wing, openings: Openings, upper: int, step: float
+    house: ShopHouse, wing: Wing, openings: Openings, upper: int, step: float
 ) -> None:
-    if upper < 1 or step < 2.5 or p.oriels == 0:
+    if upper < 1 or step < 2.5 or house.oriels == 0:
         return
     wall = wing.wall(0)
-    low = round(p.floor + 0.15, 2)
-    high = round(p.floor + max(1, upper - 1) * step - 0.15, 2)
+    low = round(house.floor + 0.15, 2)
+    high = round(house.floor + max(1, upper - 1) * step - 0.15, 2)
     high = min(high, wing.wall_top - 0.7)
-    for a, b in bays.stretches(wall.length, wall.length / p.oriels, 0.4):
+    for a, b in bays.stretches(
+        wall.length, pitch=wall.length / house.oriels, margin=0.4
+    ):
         width = min(2.4, b - a - 1.2)
         if width < 1.5:
             continue
         x = (a + b) / 2
         openings.clear(
-            0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
+            0,
+            x0=x - width / 2 - 0.15,
+            x1=x + width / 2 + 0.15,
+            z0=low,
+            z1=high + 0.4,
         )
         bay_windows.add_bay_window(
-            p, wall, x, width, 0.6, low, high,
-            storeys=max(1, upper - 1), canted=p.bay != "box",
-        )  # fmt: skip
+            house,
+            wall,
+            x=x,
+            width=width,
+            reach=0.6,
+            z0=low,
+            z1=high,
+            storeys=max(1, upper - 1),
+            canted=house.bay != "box",
+        )

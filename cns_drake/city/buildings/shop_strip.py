@@ -8,6 +8,7 @@ from cns_drake.city.facades import (
     Openings,
     Roof,
     Wing,
+    around,
     bays,
     equip_roof,
     wing_openings,
@@ -33,11 +34,11 @@ class ShopStrip(Building):
         self.upper = self.uniform(0.2, 0.7)
         # Whether one canopy runs along all shops; otherwise shops have awnings.
         self.canopy = self.chance(0.45)
-        self.canopy_reach = self.uniform(0.9, 1.3, 2)
+        self.canopy_reach = self.uniform(0.9, 1.3, digits=2)
         # Step from one height of a parapet to the next.
-        self.steps = self.uniform(0.3, 0.6, 2)
+        self.steps = self.uniform(0.3, 0.6, digits=2)
         self.roof_items = self.draw_roof_items(
-            "ac_unit ac_unit vents skylight", 1, 5
+            "ac_unit ac_unit vents skylight", low=1, high=5
         )
 
     def build(self) -> None:
@@ -60,7 +61,9 @@ class ShopStrip(Building):
             back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
             area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
-            wing = Wing.at(area, top - 0.1, top, roof, blind)
+            wing = Wing.at(
+                area, wall_top=top - 0.1, top=top, roof=roof, blind=blind
+            )
             _add_unit(self, wing, tall)
             # Only every third unit has equipment on its roof.
             if k % 3 == 0:
@@ -70,53 +73,91 @@ class ShopStrip(Building):
                 )
 
 
-def _parapet_top(p: ShopStrip, tall: bool) -> float:
+def _parapet_top(strip: ShopStrip, tall: bool) -> float:
     """Returns the parapet's height for a unit that is not the highest [m]."""
-    drop = p.steps * p.whole(0, 3)
-    if tall or p.height < p.ground + _UPPER_M:
-        return round(max(p.height - drop, p.ground + 0.4), 2)
-    return round(p.ground + 0.5 + 0.5 * drop, 2)
+    drop = strip.steps * strip.whole(0, 3)
+    if tall or strip.height < strip.ground + _UPPER_M:
+        return round(max(strip.height - drop, strip.ground + 0.4), 2)
+    return round(strip.ground + 0.5 + 0.5 * drop, 2)
 
 
-def _add_unit(p: ShopStrip, wing: Wing, tall: bool) -> None:
-    openings = Openings(p, wing)
+def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
+    openings = Openings(strip, wing)
     wall = wing.wall(0)
-    cladding = "walls" if p.chance(0.5) else "facing"
-    upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
-    storey = (wing.top - 0.5 - p.ground) / max(upper_floors, 1)
-    width = p.uniform(1.1, 2.2, 2)
+    cladding = "walls" if strip.chance(0.5) else "facing"
+    upper_floors = round((wing.top - strip.ground - 0.6) / 3.0) if tall else 0
+    storey = (wing.top - 0.5 - strip.ground) / max(upper_floors, 1)
+    width = strip.uniform(1.1, 2.2, digits=2)
     wing_openings.add_window_storeys(
-        openings, (0, 2), p.ground, storey, upper_floors, width + 1.1, width,
+        openings,
+        (0, 2),
+        floor=strip.ground,
+        storey=storey,
+        count=upper_floors,
+        pitch=width + 1.1,
+        width=width,
         head=min(2.3, storey - 0.4),
-    )  # fmt: skip
-    wing_openings.add_shops(openings, 0, 0.2, wall.length - 0.2, p.ground,
-        width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
-    )  # fmt: skip
-    back = [bays.gate(2.0, 2.2, 0.2), wing_openings.sash(1.0, 0.0, 1.6, 2.3)]
-    openings.add_bays((2,), 0.5, 3.6, back, 0.7)
+    )
+    wing_openings.add_shops(
+        openings,
+        0,
+        start=0.2,
+        end=wall.length - 0.2,
+        height=strip.ground,
+        width=9.0,
+        awnings=0.0 if strip.canopy else 0.7,
+        reach=strip.canopy_reach,
+    )
+    back = [
+        bays.gate(width=2.0, height=2.2, depth=0.2),
+        wing_openings.sash(width=1.0, z=0.0, sill=1.6, head=2.3),
+    ]
+    openings.add_bays((2,), z=0.5, pitch=3.6, choices=back, margin=0.7)
     glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
-    openings.enclose(glass, (Band(0.0, 0.3, -0.05),), cladding)
-    if p.canopy:
-        z = p.ground - 0.95
-        reach = p.canopy_reach
-        lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
-        p.add_to("awning", wall.box(*lid))
-    _add_parapet(p, wing, cladding)
+    openings.enclose(
+        glass, bands=(Band(z0=0.0, z1=0.3, depth=-0.05),), material=cladding
+    )
+    if strip.canopy:
+        z = strip.ground - 0.95
+        reach = strip.canopy_reach
+        strip.add_to(
+            "awning",
+            wall.box(
+                x=(0.05, wall.length - 0.05), y=(-0.02, reach), z=(z, z + 0.22)
+            ),
+        )
+    _add_parapet(strip, wing, cladding)
 
 
-def _add_parapet(p: ShopStrip, wing: Wing, cladding: str) -> None:
+def _add_parapet(strip: ShopStrip, wing: Wing, cladding: str) -> None:
     """Adds a coping along the parapet's front, or piers at its ends."""
     wall = wing.wall(0)
     top = wing.top
     length = wall.length
-    if p.chance(0.5):
-        coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
-        p.add_to("trim", wall.box(*coping))
+    if strip.chance(0.5):
+        strip.add_to(
+            "trim",
+            wall.box(
+                x=(0.02, length - 0.02),
+                y=(-0.05, 0.12),
+                z=(top - 0.2, top - 0.02),
+            ),
+        )
     else:
         for x in (0.25, length - 0.25):
-            pier = (x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
-            p.add_to(cladding, wall.box(*pier))
-    visible = top - p.ground - 0.1 > 0.6 and top < p.height - 3.0
-    if p.chance(0.4) and visible:
-        sign = (0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7)
-        p.add_to("sign", wall.box(*sign))
+            strip.add_to(
+                cladding,
+                wall.box(
+                    x=around(x, 0.22), y=(-0.05, 0.15), z=(0.0, top - 0.03)
+                ),
+            )
+    visible = top - strip.ground - 0.1 > 0.6 and top < strip.height - 3.0
+    if strip.chance(0.4) and visible:
+        strip.add_to(
+            "sign",
+            wall.box(
+                x=(0.25 * length, 0.75 * length),
+                y=(-0.15, 0.1),
+                z=(top - 0.3, top + 0.7),
+            ),
+        )

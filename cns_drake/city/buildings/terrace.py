@@ -59,9 +59,12 @@ class Terrace(HouseInRow):
             house = self._varied(k)
             house.height = self.height - self.step * low
             add_house(
-                house, area, self.site.blind_edges_of_unit(k, count),
-                f"house_{k:02d}_", self.pick(_DOORS),
-            )  # fmt: skip
+                house,
+                area,
+                self.site.blind_edges_of_unit(k, count),
+                f"house_{k:02d}_",
+                self.pick(_DOORS),
+            )
 
     def _varied(self, k: int) -> HouseInRow:
         """Returns the k-th house, which differs from its neighbours in details.

@@ -9,6 +9,7 @@ from cns_drake.city.facades import (
     Building,
     Facade,
     WallFrame,
+    around,
     bays,
     facade_mesh,
     glass_mesh,
@@ -78,116 +79,152 @@ class UnfinishedTower(Building):
 
 
 def _column_places(
-    p: UnfinishedTower, plan: np.ndarray
+    tower: UnfinishedTower, plan: np.ndarray
 ) -> list[outlines.Point]:
     """Returns the places of the columns."""
     x0, y0, x1, y1 = outlines.extent(plan)
     places = []
     for a, b in ((x0, x1), (y0, y1)):
-        count = min(6, max(2, round((b - a) / p.pitch) + 1))
+        count = min(6, max(2, round((b - a) / tower.pitch) + 1))
         places.append(np.round(np.linspace(a + 0.5, b - 0.5, count), 2))
     xs, ys = (place.tolist() for place in places)
     return [(x, y) for x in xs for y in ys]
 
 
-def _add_frame(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_frame(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the columns and the slab of every storey."""
-    columns = _column_places(p, plan)
-    low = p.storey - _SLAB_M
-    top = p.storeys * p.storey
-    pieces = [solids.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
-    pieces.append(solids.prism(plan, low, p.storey, bottom=True))
+    columns = _column_places(tower, plan)
+    low = tower.storey - _SLAB_M
+    top = tower.storeys * tower.storey
+    pieces = [
+        solids.post(x, y, half=0.25, z1=low + 0.02, z0=0.0) for x, y in columns
+    ]
+    pieces.append(solids.prism(plan, z0=low, z1=tower.storey, bottom=True))
     # The stubs of the next storey's columns, and their reinforcing bars.
-    stubs = [solids.prism(plan, -solids.FOUNDATION_M, 0.05)]
+    stubs = [solids.prism(plan, z0=-solids.FOUNDATION_M, z1=0.05)]
     for x, y in columns:
-        foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
-        bar = outlines.regular_polygon(0.05, 3, (x + 0.12, y))
-        stubs.append(solids.box(*foot, top - 0.05, top + 0.5))
-        stubs.append(solids.prism(bar, top + 0.45, top + 1.5))
+        bar = outlines.regular_polygon(
+            radius=0.05, count=3, center=(x + 0.12, y)
+        )
+        stubs.append(
+            solids.box(
+                x=around(x, 0.25),
+                y=around(y, 0.25),
+                z=(top - 0.05, top + 0.5),
+            )
+        )
+        stubs.append(solids.prism(bar, z0=top + 0.45, z1=top + 1.5))
     for edge in range(4):
         wall = WallFrame(plan, edge)
-        for z in (p.storey + 0.5, p.storey + 1.0):
-            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
-            pieces.append(wall.box(*rail, z, z + 0.06))
+        for z in (tower.storey + 0.5, tower.storey + 1.0):
+            pieces.append(
+                wall.box(
+                    x=(0.05, wall.length - 0.05),
+                    y=(-0.08, -0.03),
+                    z=(z, z + 0.06),
+                )
+            )
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
-            post = (u - 0.03, u + 0.03, -0.09, -0.03)
-            stubs.append(wall.box(*post, top, top + 1.1))
-    group = _repeated_meshes(pieces, p.group, p.storey)
-    step = p.group * p.storey
-    p.stack("frame", group, 0.0, step, p.storeys // p.group)
-    p.add("stubs", *stubs)
+            stubs.append(
+                wall.box(
+                    x=around(u, 0.03), y=(-0.09, -0.03), z=(top, top + 1.1)
+                )
+            )
+    group = _repeated_meshes(pieces, tower.group, tower.storey)
+    step = tower.group * tower.storey
+    tower.stack(
+        "frame", group, z0=0.0, step=step, count=tower.storeys // tower.group
+    )
+    tower.add("stubs", *stubs)
 
 
-def _add_core(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_core(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the core with its doorways, and the climbing formwork on it."""
     x0, y0, x1, y1 = outlines.extent(plan)
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
-    a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
+    a, b = tower.core[0] * (x1 - x0) / 2, tower.core[1] * (y1 - y0) / 2
     core = np.round(outlines.rectangle(x - a, y - b, x + a, y + b), 2)
-    door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
+    door = bays.alone(
+        bays.window(width=1.2, sill=0.05, head=2.2, depth=0.35), width=2.0
+    )
     layout = bays.by_edge({0: door, 2: door}, bays.plain)
-    facade = Facade(p.storey, (), layout).stacked(p.storeys)
-    top = round(p.storeys * p.storey, 3)
-    high = p.height
-    p.add(
+    facade = Facade(tower.storey, bands=(), layout=layout).stacked(
+        tower.storeys
+    )
+    top = round(tower.storeys * tower.storey, 3)
+    high = tower.height
+    tower.add(
         "core",
         facade_mesh(core, facade),
-        solids.skirt(core, core, top, high - 0.4),
-        solids.roof_pan(core, high - 2.0, high - 0.4, 0.3),
+        solids.skirt(core, core, z0=top, z1=high - 0.4),
+        solids.roof_pan(
+            core, z_floor=high - 2.0, z_top=high - 0.4, thickness=0.3
+        ),
     )
     form = outlines.inset(core, -0.3)
-    p.add(
+    tower.add(
         "form",
-        solids.skirt(form, form, high - 2.6, high),
+        solids.skirt(form, form, z0=high - 2.6, z1=high),
         solids.flat(form, high - 2.6, up=False),
-        solids.roof_pan(form, high - 0.6, high, 0.3),
+        solids.roof_pan(form, z_floor=high - 0.6, z_top=high, thickness=0.3),
         finish=_TIMBER,
     )
 
 
-def _add_cladding(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_cladding(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds the finished walls of the lower storeys."""
     outer = outlines.inset(plan, -_CLADDING_M)
-    head = round(p.storey - 0.5, 2)
-    pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
-    rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
-    facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
+    head = round(tower.storey - 0.5, 2)
+    pitch = max(tower.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
+    rows = bays.rhythm(
+        pitch,
+        [bays.window(width=pitch - 0.5, sill=0.7, head=head, depth=0.2)],
+        margin=0.5,
+    )
+    facade = Facade(
+        tower.storey,
+        bands=(Band(z0=0.0, z1=0.2, depth=-0.08),),
+        layout=rows,
+        glass=(0.2,),
+    )
     # The backs of the panels, which are seen from within, and their top edges.
-    backs = solids.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
-    rim = solids.skirt(outer, plan, p.storey, p.storey)
+    backs = solids.skirt(plan[::-1], plan[::-1], z0=0.0, z1=tower.storey)
+    rim = solids.skirt(outer, plan, z0=tower.storey, z1=tower.storey)
     walls = [facade_mesh(outer, facade), backs, rim]
     panes = [glass_mesh(outer, facade)]
-    groups, step = p.clad // p.group, p.group * p.storey
+    groups, step = tower.clad // tower.group, tower.group * tower.storey
     for part, pieces, finish in (
-        ("cladding", walls, p.colours["clad"]),
-        ("cladding_glass", panes, p.glass),
+        ("cladding", walls, tower.colours["clad"]),
+        ("cladding_glass", panes, tower.glass),
     ):
-        mesh = _repeated_meshes(pieces, p.group, p.storey)
-        p.stack(part, mesh, 0.0, step, groups, finish)
-    p.add("foot", solids.foundation(outer), finish=p.colours["clad"])
+        mesh = _repeated_meshes(pieces, tower.group, tower.storey)
+        tower.stack(part, mesh, z0=0.0, step=step, count=groups, finish=finish)
+    tower.add("foot", solids.foundation(outer), finish=tower.colours["clad"])
 
 
-def _add_props(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_props(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds props below the top slab, along the front and the back."""
     x0, y0, x1, y1 = outlines.extent(plan)
-    low = (p.storeys - 1) * p.storey
-    high = p.storeys * p.storey - _SLAB_M + 0.02
+    low = (tower.storeys - 1) * tower.storey
+    high = tower.storeys * tower.storey - _SLAB_M + 0.02
     props = []
     for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
         for y in (y0 + 1.2, y1 - 1.2):
-            shaft = outlines.regular_polygon(0.06, 4, (x, y))
-            props.append(solids.skirt(shaft, shaft, low - 0.02, high))
-    p.add("props", *props, finish=_STEEL)
+            shaft = outlines.regular_polygon(
+                radius=0.06, count=4, center=(x, y)
+            )
+            props.append(solids.skirt(shaft, shaft, z0=low - 0.02, z1=high))
+    tower.add("props", *props, finish=_STEEL)
 
 
-def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_scaffolds(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds scaffolds: uprights of full height, with platforms between them."""
-    lifts = max(2, int(p.scaffold_top * p.storey / _SCAFFOLD_LIFT_M))
+    lifts = max(2, int(tower.scaffold_top * tower.storey / _SCAFFOLD_LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
     lifts = per_group * groups
     levels, standards, nets = [], [], []
-    for edge in p.scaffolds:
+    for edge in tower.scaffolds:
         wall = WallFrame(plan, edge)
         count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
         xs = np.round(
@@ -196,47 +233,56 @@ def _add_scaffolds(p: UnfinishedTower, plan: np.ndarray) -> None:
         levels.append(wall.place(_scaffold_level(xs)))
         for x in xs:
             for y in (0.6, 1.45):
-                pole = outlines.square(x, y, 0.04)
+                pole = outlines.square(x, y, half=0.04)
                 mesh = solids.prism(
-                    pole, -solids.FOUNDATION_M, lifts * _SCAFFOLD_LIFT_M + 0.9
+                    pole,
+                    z0=-solids.FOUNDATION_M,
+                    z1=lifts * _SCAFFOLD_LIFT_M + 0.9,
                 )
                 standards.append(wall.place(mesh))
         for a, b in itertools.pairwise(xs):
-            if p.chance(p.nets):
-                first = p.whole(0, lifts - 1)
-                last = p.whole(first + 1, lifts + 1)
+            if tower.chance(tower.nets):
+                first = tower.whole(0, lifts - 1)
+                last = tower.whole(first + 1, lifts + 1)
                 low = first * _SCAFFOLD_LIFT_M + 0.2
                 high = last * _SCAFFOLD_LIFT_M - 0.2
-                spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
-                nets.append(wall.box(*spot, low, high))
+                nets.append(
+                    wall.box(
+                        x=(round(a + 0.05, 2), round(b - 0.05, 2)),
+                        y=(1.56, 1.6),
+                        z=(low, high),
+                    )
+                )
     stack = _repeated_meshes(levels, per_group, _SCAFFOLD_LIFT_M)
-    p.stack(
+    tower.stack(
         "scaffold",
         stack,
-        0.0,
-        per_group * _SCAFFOLD_LIFT_M,
-        groups,
+        z0=0.0,
+        step=per_group * _SCAFFOLD_LIFT_M,
+        count=groups,
         finish=_STEEL,
     )
-    p.add("standards", *standards, finish=_STEEL)
-    p.add("nets", *nets, finish=p.colours["net"])
+    tower.add("standards", *standards, finish=_STEEL)
+    tower.add("nets", *nets, finish=tower.colours["net"])
 
 
-def _add_hoist(p: UnfinishedTower, plan: np.ndarray) -> None:
+def _add_hoist(tower: UnfinishedTower, plan: np.ndarray) -> None:
     """Adds a hoist's mast and cage at the back."""
     wall = WallFrame(plan, 2)
     x = 0.5 * wall.length
-    top = p.storeys * p.storey - 1.0
+    top = tower.storeys * tower.storey - 1.0
     pieces = [
-        wall.standing(u - 0.05, u + 0.05, v - 0.05, v + 0.05, top)
+        wall.standing(x=around(u, 0.05), y=around(v, 0.05), z1=top)
         for u in (x - 0.3, x + 0.3)
         for v in (0.3, 0.9)
     ]
     for z in np.arange(1.0, top, 4.5).tolist():
-        pieces.append(wall.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
+        pieces.append(
+            wall.box(x=around(x, 0.3), y=(-0.05, 0.92), z=(z, z + 0.08))
+        )
     z = round(0.55 * top, 1)
-    cage = wall.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
-    p.add("hoist", *pieces, cage, finish=Finish((0.80, 0.62, 0.16)))
+    cage = wall.box(x=(x + 0.4, x + 1.9), y=(0.15, 1.35), z=(z, z + 2.4))
+    tower.add("hoist", *pieces, cage, finish=Finish((0.80, 0.62, 0.16)))
 
 
 def _repeated_meshes(pieces: list[Mesh], count: int, step: float) -> Mesh:
@@ -251,10 +297,10 @@ def _scaffold_level(xs: list[float]) -> Mesh:
     a = xs[0]
     b = xs[-1]
     top = _SCAFFOLD_LIFT_M
-    pieces = [solids.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
+    pieces = [solids.box(x=(a, b), y=(0.55, 1.5), z=(top - 0.12, top - 0.05))]
     for z in (0.5, 1.0):
-        pieces.append(solids.box(a, b, 1.5, 1.54, z, z + 0.06))
+        pieces.append(solids.box(x=(a, b), y=(1.5, 1.54), z=(z, z + 0.06)))
     for x0, x1 in itertools.pairwise(xs[::3]):
         start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
-        pieces.append(solids.beam(start, stop, 0.07))
+        pieces.append(solids.beam(start, stop, width=0.07))
     return merge_meshes(*pieces)

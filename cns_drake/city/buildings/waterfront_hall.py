@@ -7,6 +7,7 @@ import numpy as np
 from cns_drake.city.facades import (
     Building,
     WallFrame,
+    around,
     bays,
     outlines,
     piers,
@@ -28,16 +29,16 @@ class WaterfrontHall(Building):
         """Samples sizes and style."""
         site = self.site
         self.roof = self.pick(("gable", "barrel", "sawtooth"))
-        self.dock_depth = self.uniform(2.5, 4.0, 1)
+        self.dock_depth = self.uniform(2.5, 4.0, digits=1)
         depth = site.depth - self.dock_depth
         self.eaves = round(self.height * self.uniform(0.6, 0.7), 1)
         self.spans = max(1, round(depth / self.uniform(16.0, 22.0)))
         self.pitch = max(self.uniform(4.5, 6.0), (site.width + depth) / 15)
-        self.pier_width = self.uniform(0.6, 0.9, 2)
-        self.pier_reach = self.uniform(0.2, 0.34, 2)
-        self.window_depth = self.uniform(0.2, 0.35, 2)
+        self.pier_width = self.uniform(0.6, 0.9, digits=2)
+        self.pier_reach = self.uniform(0.2, 0.34, digits=2)
+        self.window_depth = self.uniform(0.2, 0.35, digits=2)
         self.door_every = self.whole(2, 4)
-        self.dock_height = self.uniform(0.9, 1.2, 2)
+        self.dock_height = self.uniform(0.9, 1.2, digits=2)
         self.ventilators = self.whole(3, 7)
 
     def build(self) -> None:
@@ -53,86 +54,120 @@ class WaterfrontHall(Building):
             solids.foundation(plan),
             facade_mesh(plan, facade),
             piers.wall_piers(
-                plan, self.pitch, self.pier_width, self.pier_reach, 0.0,
-                self.eaves - 0.5, margin=0.5 + self.pier_width / 2,
+                plan,
+                pitch=self.pitch,
+                width=self.pier_width,
+                reach=self.pier_reach,
+                z0=0.0,
+                z1=self.eaves - 0.5,
+                margin=0.5 + self.pier_width / 2,
             ),
             *_dock(self, x0, x1, y0, front),
-        ]  # fmt: skip
+        ]
         self.add("walls", *pieces)
         self.add_glass("glass", glass_mesh(plan, facade))
         self.add("roof", _roof(self, plan), finish=self.colours["roof"])
 
 
-def _walls(p: WaterfrontHall) -> Facade:
+def _walls(hall: WaterfrontHall) -> Facade:
     """Returns walls with tall windows between piers, and doors among them."""
-    head = p.eaves - 1.0
+    head = hall.eaves - 1.0
     window = bays.window(
-        p.pitch - 1.6, 2.2, head, p.window_depth, mullions=1,
+        width=hall.pitch - 1.6,
+        sill=2.2,
+        head=head,
+        depth=hall.window_depth,
+        mullions=1,
         transom=round((2.2 + head) / 2, 2),
-    )  # fmt: skip
-    door = bays.gate(p.pitch - 1.4, min(4.6, head - 0.3))
-    front = bays.gate(p.pitch - 1.4, min(4.2 + p.dock_height, head - 0.3))
-    choices = [front] + [window] * (p.door_every - 1)
-    rows = bays.rhythm(p.pitch, [window], margin=0.5)
-    layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
-    layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
-    bands = (
-        Band(0.0, 0.6, -0.1),
-        Band(p.eaves - 0.5, p.eaves, -0.3),
     )
-    return Facade(p.eaves, bands, layout, (p.window_depth,))
+    door = bays.gate(width=hall.pitch - 1.4, height=min(4.6, head - 0.3))
+    front = bays.gate(
+        width=hall.pitch - 1.4, height=min(4.2 + hall.dock_height, head - 0.3)
+    )
+    choices = [front] + [window] * (hall.door_every - 1)
+    rows = bays.rhythm(hall.pitch, [window], margin=0.5)
+    layouts = {0: bays.rhythm(hall.pitch, choices, margin=0.5), 2: rows}
+    layout = bays.by_edge(
+        layouts, bays.with_middle(rows, door, width=hall.pitch)
+    )
+    bands = (
+        Band(z0=0.0, z1=0.6, depth=-0.1),
+        Band(z0=hall.eaves - 0.5, z1=hall.eaves, depth=-0.3),
+    )
+    return Facade(
+        hall.eaves, bands=bands, layout=layout, glass=(hall.window_depth,)
+    )
 
 
 def _dock(
-    p: WaterfrontHall, x0: float, x1: float, y0: float, front: float
+    hall: WaterfrontHall, x0: float, x1: float, y0: float, front: float
 ) -> list[Mesh]:
     """Returns a loading platform under a canopy, with steps at both ends."""
-    high = p.dock_height
+    high = hall.dock_height
     a, b = x0 + 2.0, x1 - 2.0
-    platform = solids.standing(a, b, y0 + 0.4, front, high, bottom=True)
-    steps = porches.steps(0.0, p.dock_depth - 0.6, 1.6, high, 5)
+    platform = solids.standing(
+        x=(a, b), y=(y0 + 0.4, front), z1=high, bottom=True
+    )
+    steps = porches.steps(
+        x0=0.0, x1=hall.dock_depth - 0.6, reach=1.6, rise=high, count=5
+    )
     ends = outlines.rectangle(a, y0 + 0.4, b, front)
     pieces = [platform]
     pieces += [WallFrame(ends, k).place(steps) for k in (1, 3)]
-    eaves = min(p.eaves - 0.8, high + 5.2)
-    ya, za = front - p.dock_depth + 0.1, eaves - 0.5
+    eaves = min(hall.eaves - 0.8, high + 5.2)
+    ya, za = front - hall.dock_depth + 0.1, eaves - 0.5
     yb, zb = front, eaves
     section = [(ya, za), (yb, zb), (yb, zb + 0.2), (ya, za + 0.25)]
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
     faces += [(0, 1, 2, 3), (7, 6, 5, 4)]
     pieces.append(Mesh(vertices, tuple(faces)).inside_out())
-    for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
-        post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
-        pieces.append(solids.box(*post, high - 0.1, eaves - 0.2))
+    for x, _ in bays.stretches(b - a, pitch=1.5 * hall.pitch, margin=0.3)[1:]:
+        pieces.append(
+            solids.box(
+                x=(a + x - 0.12, a + x + 0.12),
+                y=(y0 + 0.6, y0 + 0.84),
+                z=(high - 0.1, eaves - 0.2),
+            )
+        )
     return pieces
 
 
-def _roof(p: WaterfrontHall, plan: np.ndarray) -> Mesh:
+def _roof(hall: WaterfrontHall, plan: np.ndarray) -> Mesh:
     (x0, y0), (x1, y1) = plan[0], plan[2]
-    rise = p.height - p.eaves
-    if p.roof == "sawtooth":
-        teeth = solids.extruded(_sawtooth_line(x0, x1, rise), y0, y1)
-        return solids.swapped(teeth).moved((0.0, 0.0, p.eaves))
+    rise = hall.height - hall.eaves
+    if hall.roof == "sawtooth":
+        teeth = solids.extruded(_sawtooth_line(x0, x1, rise), x0=y0, x1=y1)
+        return solids.swapped(teeth).moved((0.0, 0.0, hall.eaves))
     pieces = []
-    edges = np.linspace(y0, y1, p.spans + 1)
+    edges = np.linspace(y0, y1, hall.spans + 1)
     for a, b in itertools.pairwise(edges):
-        shed = solids.extruded(_span_line(p.roof, a, b, rise), x0, x1)
-        pieces.append(shed.moved((0.0, 0.0, p.eaves)))
-        pieces += _monitor(p, x0, x1, (a + b) / 2)
+        shed = solids.extruded(_span_line(hall.roof, a, b, rise), x0=x0, x1=x1)
+        pieces.append(shed.moved((0.0, 0.0, hall.eaves)))
+        pieces += _monitor(hall, x0, x1, (a + b) / 2)
     return merge_meshes(*pieces)
 
 
-def _monitor(p: WaterfrontHall, x0: float, x1: float, y: float) -> list[Mesh]:
+def _monitor(
+    hall: WaterfrontHall, x0: float, x1: float, y: float
+) -> list[Mesh]:
     """Returns a monitor along the ridge with evenly spaced ventilators."""
-    top, low = p.height - 0.25, p.height - 1.1
+    top, low = hall.height - 0.25, hall.height - 1.1
     length = x1 - x0
     a, b = x0 + 0.15 * length, x1 - 0.15 * length
-    pieces = [solids.box(a, b, y - 0.7, y + 0.7, low, top, bottom=False)]
-    for k in range(p.ventilators):
-        x = a + (k + 0.5) * (b - a) / p.ventilators
-        hood = (x - 0.5, x + 0.5, y - 0.9, y + 0.9)
-        pieces.append(solids.box(*hood, low, p.height, bottom=False))
+    pieces = [
+        solids.box(x=(a, b), y=around(y, 0.7), z=(low, top), bottom=False)
+    ]
+    for k in range(hall.ventilators):
+        x = a + (k + 0.5) * (b - a) / hall.ventilators
+        pieces.append(
+            solids.box(
+                x=around(x, 0.5),
+                y=around(y, 0.9),
+                z=(low, hall.height),
+                bottom=False,
+            )
+        )
     return pieces
 
 

@@ -6,6 +6,7 @@ from cns_drake.city.facades.building import Building
 from cns_drake.city.facades.reliefs import Band, Patch, Relief, lifted
 from cns_drake.city.facades.roof_equipment import add_chimney, equip_roof
 from cns_drake.city.facades.site import Site
+from cns_drake.city.facades.solids import around
 from cns_drake.city.facades.wall_frames import WallFrame
 from cns_drake.city.facades.walls import (
     Facade,
@@ -32,6 +33,7 @@ __all__ = [
     "Wing",
     "add_chimney",
     "add_railing",
+    "around",
     "equip_roof",
     "facade_mesh",
     "free_stretches",

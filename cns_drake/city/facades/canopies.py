@@ -114,12 +114,12 @@ def awnings(
     return pieces
 
 
-def add_awnings(p: Building, pieces: Sequence[Mesh]) -> None:
+def add_awnings(building: Building, pieces: Sequence[Mesh]) -> None:
     """Adds awnings to a building, all in the same random colour.
 
     `pieces` contains the awnings in the building's frame. Without awnings,
     nothing is added.
     """
     if pieces:
-        finish = p.pick(p.kind.choices["awnings"])
-        p.add("awnings", *pieces, finish=finish)
+        finish = building.pick(building.kind.choices["awnings"])
+        building.add("awnings", *pieces, finish=finish)

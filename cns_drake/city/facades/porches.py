@@ -27,7 +27,9 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
     for k in range(count):
         y = reach * (count - k) / count
         top = rise * (k + 1) / count
-        pieces.append(solids.box(x0, x1, 0.0, y, -solids.FOUNDATION_M, top))
+        pieces.append(
+            solids.standing(x=(x0, x1), y=(0.0, y), z1=top, bottom=True)
+        )
     return merge_meshes(*pieces)
 
 
@@ -61,15 +63,20 @@ def add_porch(
         roof: `shed`, `gable` (a pediment across the full width) or `flat`.
         posts: number of posts, at least 2.
     """
-    pieces = [solids.box(x0, x1, -0.05, reach, -solids.FOUNDATION_M, deck)]
+    pieces = [
+        solids.standing(x=(x0, x1), y=(-0.05, reach), z1=deck, bottom=True)
+    ]
     y, half = reach - 0.15, _POST_M / 2
     for x in np.linspace(x0 + 0.15, x1 - 0.15, posts).tolist():
-        spot = (x - half, x + half, y - half, y + half)
-        pieces.append(solids.box(*spot, deck, eaves + 0.02, bottom=False))
-    pieces.append(solids.box(x0, x1, y - 0.1, y + 0.1, eaves, eaves + 0.22))
+        pieces.append(solids.post(x, y, half, z1=eaves + 0.02, z0=deck))
+    pieces.append(
+        solids.box(x=(x0, x1), y=(y - 0.1, y + 0.1), z=(eaves, eaves + 0.22))
+    )
     for x in (x0 + 0.1, x1 - 0.1):
         pieces.append(
-            solids.box(x - 0.1, x + 0.1, -0.05, y, eaves, eaves + 0.22)
+            solids.box(
+                x=(x - 0.1, x + 0.1), y=(-0.05, y), z=(eaves, eaves + 0.22)
+            )
         )
     lid = _porch_roof(x0, x1, reach, eaves + 0.2, top, roof)
     out.add_to("roof", wall.place(lid))
@@ -117,6 +124,6 @@ def _porch_roof(
         line = roofs.with_eaves(line, 0.2, 0.2)
         return roofs.shell(line, -0.1, out, 0.12, along_y=True)
     if roof == "flat":
-        return solids.box(a, b, -0.05, out, z, top)
+        return solids.box(x=(a, b), y=(-0.05, out), z=(z, top))
     line = [(-0.05, top), (out, z + 0.1)]
     return roofs.shell(line, a, b, 0.12)

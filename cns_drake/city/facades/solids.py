@@ -13,6 +13,8 @@ from cns_drake.city.facades import outlines
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.triangulation import cut_ears
 
+# Least and greatest coordinate along an axis [m].
+Range = tuple[float, float]
 # Buildings reach this far below their own ground level, since the ground is not
 # flat [m].
 FOUNDATION_M = 0.5
@@ -232,20 +234,42 @@ def roof_pan(
     return merge_meshes(coping, wall, flat(inner, z_floor))
 
 
-def box(*limits: float, bottom: bool = True) -> Mesh:
-    """Returns an upright box between x0, x1, y0, y1, z0 and z1 [m]."""
-    x0, x1, y0, y1, z0, z1 = limits
-    return prism(outlines.rectangle(x0, y0, x1, y1), z0, z1, bottom=bottom)
+def around(middle: float, half: float) -> Range:
+    """Returns the range from `middle` - `half` to `middle` + `half` [m]."""
+    return middle - half, middle + half
 
 
-def standing(*limits: float, bottom: bool = False) -> Mesh:
-    """Returns a box that stands on the ground, from x0, x1, y0, y1, z1 [m].
+def box(
+    x: Range,
+    y: Range,
+    z: Range,
+    *,
+    bottom: bool = True,
+) -> Mesh:
+    """Returns an upright box.
 
-    The box reaches down to `FOUNDATION_M` below the ground. The box has a lower
-    side if `bottom` is set.
+    Args:
+        x: least and greatest x [m].
+        y: least and greatest y [m].
+        z: heights of the bottom and the top [m].
+        bottom: whether the box has a lower side.
     """
-    *spot, z1 = limits
-    return box(*spot, -FOUNDATION_M, z1, bottom=bottom)
+    plan = outlines.rectangle(x[0], y[0], x[1], y[1])
+    return prism(plan, z[0], z[1], bottom=bottom)
+
+
+def standing(x: Range, y: Range, z1: float, *, bottom: bool = False) -> Mesh:
+    """Returns a box that stands on the ground.
+
+    The box reaches down to `FOUNDATION_M` below the ground.
+
+    Args:
+        x: least and greatest x [m].
+        y: least and greatest y [m].
+        z1: height of the top [m].
+        bottom: whether the box has a lower side.
+    """
+    return box(x, y, (-FOUNDATION_M, z1), bottom=bottom)
 
 
 def post(
@@ -260,7 +284,9 @@ def post(
         z1: height of the top [m].
         z0: height of the foot [m]; by default hidden below the ground.
     """
-    return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
+    return box(
+        (x - half, x + half), (y - half, y + half), (z0, z1), bottom=False
+    )
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:

@@ -41,21 +41,43 @@ class WallFrame:
         vertices = np.column_stack([xy, height + z])
         return Mesh(vertices, mesh.faces).inside_out()
 
-    def box(self, *limits: float, bottom: bool = True) -> Mesh:
-        """Returns a box, in the building's frame.
+    def box(
+        self,
+        x: solids.Range,
+        y: solids.Range,
+        z: solids.Range,
+        *,
+        bottom: bool = True,
+    ) -> Mesh:
+        """Returns an upright box, in the building's frame.
 
-        The limits are x0, x1, y0, y1, z0 and z1 in wall coordinates [m]. The
-        box has a lower side if `bottom` is set.
+        Args:
+            x: where the box begins and ends along the wall [m].
+            y: distances of the box's back and front out of the wall [m].
+            z: heights of the bottom and the top [m].
+            bottom: whether the box has a lower side.
         """
-        return self.place(solids.box(*limits, bottom=bottom))
+        return self.place(solids.box(x, y, z, bottom=bottom))
 
-    def standing(self, *limits: float, bottom: bool = False) -> Mesh:
+    def standing(
+        self,
+        x: solids.Range,
+        y: solids.Range,
+        z1: float,
+        *,
+        bottom: bool = False,
+    ) -> Mesh:
         """Returns a box that stands on the ground, in the building's frame.
 
-        The limits are x0, x1, y0, y1 and z1 in wall coordinates [m]. The box
-        reaches below the ground, and has a lower side if `bottom` is set.
+        The box reaches below the ground.
+
+        Args:
+            x: where the box begins and ends along the wall [m].
+            y: distances of the box's back and front out of the wall [m].
+            z1: height of the top [m].
+            bottom: whether the box has a lower side.
         """
-        return self.place(solids.standing(*limits, bottom=bottom))
+        return self.place(solids.standing(x, y, z1, bottom=bottom))
 
     @property
     def heading(self) -> float:

@@ -174,7 +174,9 @@ def add_shops(
         openings.replace_by_bay(edge, (x0 + x1) / 2, x1 - x0, shop)
         z = head + 0.08
         tall = out.uniform(0.55, 0.8, 2)
-        fascia = wall.box(x0 + 0.15, x1 - 0.15, -0.02, 0.14, z, z + tall)
+        fascia = wall.box(
+            x=(x0 + 0.15, x1 - 0.15), y=(-0.02, 0.14), z=(z, z + tall)
+        )
         out.add_to("sign", fascia)
         if out.chance(awnings):
             shade = canopies.awning(
@@ -185,7 +187,9 @@ def add_shops(
             x = x0 + 0.25 if out.chance(0.5) else x1 - 0.25
             # Hanging signs, like awnings, are above people's heads.
             z = max(2.4, head + 0.1)
-            blade = wall.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
+            blade = wall.box(
+                x=(x - 0.06, x + 0.06), y=(0.1, 0.9), z=(z, z + 0.8)
+            )
             out.add_to("trim", blade)
 
 

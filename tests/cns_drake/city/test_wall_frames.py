@@ -50,7 +50,7 @@ def test_wall_frame_looks_outwards():
     assert wall.length == pytest.approx(6.0)
     assert wall.heading == pytest.approx(math.pi / 2)
     np.testing.assert_allclose(wall.point(1.0, 0.5), (12.5, 4.0))
-    box_ = solids.box(1.0, 2.0, 0.0, 0.5, 0.0, 3.0)
+    box_ = solids.box(x=(1.0, 2.0), y=(0.0, 0.5), z=(0.0, 3.0))
     placed = wall.place(box_, z=2.0)
     np.testing.assert_allclose(placed.vertices.min(axis=0), (12.0, 4.0, 2.0))
     np.testing.assert_allclose(placed.vertices.max(axis=0), (12.5, 5.0, 5.0))
