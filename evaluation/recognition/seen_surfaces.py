@@ -245,6 +245,151 @@ def _length(p: np.ndarray) -> float:
     return math.sqrt(p[0] ** 2 + p[1] ** 2 + p[2] ** 2)
 
 
+class _Returns(NamedTuple):
+    """The returns in the four quadrants around a direction.
+
+    Attributes:
+        number: how many there are, from 0 to 4.
+        nearest: the least range [m]; infinite without returns.
+        farthest: the greatest range [m]; 0 without returns.
+        is_one_surface: whether they are on one surface, to which a plane fits.
+    """
+
+    number: int
+    nearest: float
+    farthest: float
+    is_one_surface: bool
+
+
+@compiled
+def _measure_returns(seen: np.ndarray, corners: np.ndarray) -> _Returns:
+    """Returns the ranges of the returns around a direction.
+
+    Args:
+        seen: (N, 3) points of the scan [m].
+        corners: (4,) index of the return in each quadrant, -1 for none.
+    """
+    number = 0
+    nearest = math.inf
+    farthest = 0.0
+    for corner in corners:
+        if corner >= 0:
+            reach = _length(seen[corner])
+            number += 1
+            nearest, farthest = min(nearest, reach), max(farthest, reach)
+    is_one_surface = number >= 3 and farthest <= _FARTHEST * nearest
+    return _Returns(number, nearest, farthest, is_one_surface)
+
+
+class _PlaneSide(NamedTuple):
+    """Where a point p lies relative to a plane n x = h; all 0 without a plane.
+
+    Attributes:
+        along: n p.
+        h: the plane's h.
+        size: length of the normal n.
+    """
+
+    along: float
+    h: float
+    size: float
+
+
+@compiled
+def _compare_to_plane(
+    p: np.ndarray,
+    seen: np.ndarray,
+    corners: np.ndarray,
+    away: np.ndarray,
+    around: _Returns,
+) -> _PlaneSide:
+    """Compares a point with the plane through the returns around it.
+
+    There is no plane with fewer than three returns.
+
+    Args:
+        p: (3,) the point [m].
+        seen: (N, 3) points of the scan [m].
+        corners: (4,) index of the return in each quadrant, -1 for none.
+        away: (4,) angular distances of these returns [deg].
+        around: the same returns' ranges.
+    """
+    if around.number < 3:
+        return _PlaneSide(0.0, 0.0, 0.0)
+    x, y, z, h = _fit_plane(seen, corners, away)
+    along = x * p[0] + y * p[1] + z * p[2]
+    return _PlaneSide(along, h, math.sqrt(x * x + y * y + z * z))
+
+
+@compiled
+def _is_beside_return(
+    p: np.ndarray, seen: np.ndarray, corners: np.ndarray, away: np.ndarray
+) -> bool:
+    """Returns whether a return near a point's direction has the point's range.
+
+    Args:
+        p: (3,) the point [m].
+        seen: (N, 3) points of the scan [m].
+        corners: (4,) index of the return in each quadrant, -1 for none.
+        away: (4,) angular distances of these returns [deg], infinite for none.
+    """
+    distance = _length(p)
+    for quadrant in range(4):
+        if away[quadrant] <= _NEAR_DEG:
+            reach = _length(seen[corners[quadrant]])
+            if abs(reach - distance) <= TOLERANCE:
+                return True
+    return False
+
+
+@compiled
+def _classify(
+    distance: float, around: _Returns, side: _PlaneSide, is_beside: bool
+) -> int:
+    """Returns whether a point is shown, hidden or neither.
+
+    Args:
+        distance: range of the point [m].
+        around: the returns around its direction.
+        side: where the point lies relative to the plane through these returns.
+        is_beside: whether a return near its direction has the same range.
+    """
+    nearest, farthest = around.nearest, around.farthest
+    is_between = nearest - TOLERANCE <= distance <= farthest + TOLERANCE
+    # The plane meets the ray at h / along times the point.
+    is_on_plane = (
+        side.along != 0.0
+        and abs(side.h / side.along - 1.0) * distance <= TOLERANCE
+    )
+    if is_beside or is_on_plane or (is_between and around.is_one_surface):
+        return _SHOWN
+    if around.number > 0 and distance > farthest + TOLERANCE:
+        return _BEHIND
+    return _UNKNOWN
+
+
+@compiled
+def _measure_clearance(
+    distance: float, around: _Returns, side: _PlaneSide
+) -> float:
+    """Returns the distance of a point in front of the surface [m].
+
+    See `SeenSurfaces.clearances`; for the arguments, see `_classify`.
+    """
+    if around.number == 0:
+        return math.inf
+    if around.is_one_surface:
+        if side.along == 0.0 or side.size == 0.0:
+            return math.nan
+        towards = math.copysign(1.0, side.along)
+        return towards * (side.h - side.along) / side.size
+    if distance < around.nearest:
+        return around.nearest - distance
+    if distance > around.farthest:
+        return around.farthest - distance
+    return math.nan
+
+
 @compiled
 def _look_at(
     others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
@@ -253,52 +398,21 @@ def _look_at(
 
     A clearance is the distance of a point in front of the surface [m], see
     `SeenSurfaces.clearances`.
+
+    Args:
+        others: (M, 3) the points, in the frame of the scan's sensor [m].
+        seen, angles, starts: see `SeenSurfaces`.
     """
-    kinds = np.full(len(others), _UNKNOWN, np.int8)
+    kinds = np.empty(len(others), np.int8)
     clearances = np.empty(len(others))
     corners = np.empty(4, np.int64)
     away = np.empty(4)
     for i in range(len(others)):
         p = others[i]
-        distance = _length(p)
         _find_nearest_by_quadrant(p, angles, starts, corners, away)
-        farthest = 0.0
-        nearest = math.inf
-        count = 0
-        is_shown = False
-        for quadrant in range(4):
-            corner = corners[quadrant]
-            if corner < 0:
-                continue
-            reach = _length(seen[corner])
-            count += 1
-            farthest, nearest = max(farthest, reach), min(nearest, reach)
-            is_alike = abs(reach - distance) <= TOLERANCE
-            is_shown = is_shown or (is_alike and away[quadrant] <= _NEAR_DEG)
-        is_one_surface = count >= 3 and farthest <= _FARTHEST * nearest
-        along = size = h = 0.0
-        if count >= 3:
-            x, y, z, h = _fit_plane(seen, corners, away)
-            along = x * p[0] + y * p[1] + z * p[2]
-            size = math.sqrt(x * x + y * y + z * z)
-            is_between = nearest - TOLERANCE <= distance <= farthest + TOLERANCE
-            # The plane meets the ray at h / along times the point.
-            is_on_plane = (
-                along != 0.0 and abs(h / along - 1.0) * distance <= TOLERANCE
-            )
-            is_shown |= (is_between and is_one_surface) or is_on_plane
-        if is_shown:
-            kinds[i] = _SHOWN
-        elif count > 0 and distance > farthest + TOLERANCE:
-            kinds[i] = _BEHIND
-        clearances[i] = math.nan
-        if count == 0:
-            clearances[i] = math.inf
-        elif is_one_surface:
-            if along != 0.0 and size > 0.0:
-                clearances[i] = math.copysign(1.0, along) * (h - along) / size
-        elif distance < nearest:
-            clearances[i] = nearest - distance
-        elif distance > farthest:
-            clearances[i] = farthest - distance
+        around = _measure_returns(seen, corners)
+        side = _compare_to_plane(p, seen, corners, away, around)
+        is_beside = _is_beside_return(p, seen, corners, away)
+        kinds[i] = _classify(_length(p), around, side, is_beside)
+        clearances[i] = _measure_clearance(_length(p), around, side)
     return kinds, clearances
