@@ -19,6 +19,8 @@ from evaluation.maps.voxel_maps import downsample
 from evaluation.methods.sparse_convolution import coarser
 
 NUM_POINTS = 4096
+# Side of a cell of the networks, in clouds from -1 to 1.
+CELL = 0.01
 # Points this near to the greatest plane count as ground [m].
 _GROUND_WITHIN = 0.5
 # Number of planes that are tried.
@@ -31,7 +33,11 @@ _LEAST_VOXEL = 0.001
 _VOXEL_STEP = 0.025
 # Number of sides that are tried.
 _NUM_VOXELS = 400
+# Greatest length of the normal of three points that are on a line except for
+# rounding [m^2]. Lengths are increased by as much before a division.
 _TINY = 1e-6
+# Mean distance of the points from their centre, in clouds from -1 to 1.
+_MEAN_DISTANCE = 0.5
 # Least mean distance of points from their centre [m].
 _LEAST_EXTENT = 1e-3
 
@@ -47,31 +53,47 @@ def prepare_cloud(points: np.ndarray) -> np.ndarray:
         all of them are at one position.
     """
     rng = np.random.default_rng(0)
-    points = _without_ground(points, rng)
-    if len(points) == 0:
+    non_ground = _without_ground(points, rng)
+    if len(non_ground) == 0:
         return np.zeros((0, 3), np.float32)
-    size = bisect.bisect_left(
-        range(_NUM_VOXELS),
-        True,
-        key=lambda k: (
-            len(downsample(points, _LEAST_VOXEL + _VOXEL_STEP * k))
-            <= NUM_POINTS
-        ),
-    )
-    chosen = downsample(points, _LEAST_VOXEL + _VOXEL_STEP * size)
-    chosen = np.concatenate([chosen, _sample_missing(points, chosen, rng)])
+    centroids = downsample(non_ground, _least_voxel_size(non_ground))
+    chosen = _completed(centroids, non_ground, rng)
     centre = chosen.mean(axis=0)
     extent = np.linalg.norm(chosen - centre, axis=1).mean()
     if extent < _LEAST_EXTENT:
         return np.zeros((0, 3), np.float32)
-    points, chosen = (0.5 / extent * (one - centre) for one in (points, chosen))
-    points, chosen = (
-        one[(np.abs(one) <= 1.0).all(axis=1)] for one in (points, chosen)
+    scale = _MEAN_DISTANCE / extent
+    inside = _inside_cube(scale * (chosen - centre))
+    source = _inside_cube(scale * (non_ground - centre))
+    # Centroids can be inside although no point is.
+    cloud = _completed(inside, source if len(source) else inside, rng)
+    return (cloud * [-1.0, 1.0, 1.0]).astype(np.float32)
+
+
+def _least_voxel_size(points: np.ndarray) -> float:
+    """Returns the least voxel size that leaves at most 4096 points [m].
+
+    Only sizes in steps of `_VOXEL_STEP` are tried. The number of voxels is
+    assumed to fall with their size.
+
+    Args:
+        points: (N, 3) the points to downsample [m].
+    """
+
+    def size_of(k: int) -> float:
+        return _LEAST_VOXEL + _VOXEL_STEP * k
+
+    least = bisect.bisect_left(
+        range(_NUM_VOXELS),
+        True,
+        key=lambda k: len(downsample(points, size_of(k))) <= NUM_POINTS,
     )
-    # Chosen points are means, of which a voxel may have no point within.
-    source = points if len(points) else chosen
-    chosen = np.concatenate([chosen, _sample_missing(source, chosen, rng)])
-    return (chosen * [-1.0, 1.0, 1.0]).astype(np.float32)
+    return size_of(least)
+
+
+def _inside_cube(points: np.ndarray) -> np.ndarray:
+    """Returns those of N points whose coordinates are all from -1 to 1."""
+    return points[(np.abs(points) <= 1.0).all(axis=1)]
 
 
 def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -95,17 +117,21 @@ def _without_ground(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     ]
 
 
-def _sample_missing(
-    points: np.ndarray, chosen: np.ndarray, rng: np.random.Generator
+def _completed(
+    chosen: np.ndarray, source: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns random points, as many as `chosen` lacks to be complete."""
+    """Returns points (4096, 3), of which random ones complete the chosen ones.
+
+    Args:
+        chosen: (N, 3) the chosen points, N <= 4096.
+        source: (M, 3) points from which the others are drawn, M > 0; points
+            repeat only if there are too few.
+        rng: random generator.
+    """
     lacking = NUM_POINTS - len(chosen)
-    repeats = lacking > len(points)
-    return points[rng.choice(len(points), lacking, replace=repeats)]
-
-
-# Side of a cell of the networks, in clouds from -1 to 1.
-CELL = 0.01
+    repeats = lacking > len(source)
+    drawn = source[rng.choice(len(source), lacking, replace=repeats)]
+    return np.concatenate([chosen, drawn])
 
 
 def occupied_cells(cloud: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
