@@ -12,8 +12,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import Mesh, MeshShape
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.structures import ImportedStructure
 
 
 def cropped_city(
@@ -35,14 +35,14 @@ def cropped_city(
         raise InputError("--within: no drive was found; give one with --along")
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
-    changed: dict[ImportedStructure, ImportedStructure | None] = {}
+    changed: dict[ImportedObject, ImportedObject | None] = {}
     for one in city.kept:
         corners = one.triangles.reshape(-1, 3)
         if not _are_near(corners[None], paths, distance)[0]:
             name = one.structure.name
             faults.add("structure far from the drives, left out", name)
             changed[one] = None
-        elif one.kind == "TINRelief":
+        elif one.object_type == "TINRelief":
             changed[one] = _cropped_terrain(one, paths, distance)
     cropped = city.replaced(changed)
     if not cropped.kept:
@@ -65,8 +65,8 @@ def _are_near(
 
 
 def _cropped_terrain(
-    one: ImportedStructure, paths: BaseGeometry, distance: float
-) -> ImportedStructure:
+    one: ImportedObject, paths: BaseGeometry, distance: float
+) -> ImportedObject:
     """Returns the part of a terrain that is near paths."""
     meshes = {}
     for name, mesh in one.structure.model.meshes.items():

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ForeignCity:
     """The content of a city's file.
 
     Attributes:
-        structures: the structures of the city.
+        objects: the objects of the city, each with its structure.
         origin: origin of the map in the file's coordinates: metres east, north
             and up, or latitude and longitude [deg].
         reference_system: name of the reference system of the file's
@@ -65,7 +65,7 @@ class ForeignCity:
         small_objects: small objects, which are placed in a dressed city only.
     """
 
-    structures: list[ImportedStructure]
+    objects: list[ImportedObject]
     origin: tuple[float, ...]
     reference_system: str
     faults: ImportFaults

@@ -6,7 +6,7 @@ import numpy as np
 from shapely import STRtree
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject
 
 # Two buildings stand in the same place if they share this much of the smaller
 # outline.
@@ -14,9 +14,9 @@ _SHARED = 0.3
 
 
 def with_former_buildings(
-    former: Sequence[ImportedStructure], others: Iterable[ImportedStructure]
-) -> list[ImportedStructure]:
-    """Returns the structures of a past city: `others`, and former buildings.
+    former: Sequence[ImportedObject], others: Iterable[ImportedObject]
+) -> list[ImportedObject]:
+    """Returns the objects of a past city: `others`, and former buildings.
 
     Where a building of today stands in the place of a former building, the
     result contains only one of the two: the building of today if its year of
@@ -24,13 +24,13 @@ def with_former_buildings(
 
     Args:
         former: the former buildings, demolished at an unknown date.
-        others: structures of today, which stood in the past city as well.
+        others: objects of today, which stood in the past city as well.
     """
     others = list(others)
     later = [one for one in others if one.is_building]
     tree = STRtree([one.structure.model.footprint for one in later])
-    stood: list[ImportedStructure] = []
-    replaced: set[ImportedStructure] = set()
+    stood: list[ImportedObject] = []
+    replaced: set[ImportedObject] = set()
     for one in former:
         outline = one.structure.model.footprint
         there = [

@@ -19,7 +19,7 @@ from cns_drake.city.geometry import (
     hull_of,
 )
 from cns_drake.imports.faces import joined_triangles
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.surface_samples import surface_samples
 
 # Cell size of a guessed ground [m].
@@ -150,29 +150,27 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def ground_of(
-    structures: Sequence[ImportedStructure], below_bridges: bool = False
+    objects: Sequence[ImportedObject], below_bridges: bool = False
 ) -> Ground:
     """Returns the ground of a city: its terrain or, without one, a guess.
 
     The guess is a smooth ground through the lowest points of the structures.
 
     Args:
-        structures: structures of the city.
+        objects: objects of the city.
         below_bridges: whether bridges and tunnels are ignored in the guess,
             unless the city has no other structures.
     """
-    corners = joined_triangles(one.triangles for one in structures).reshape(
-        -1, 3
-    )
-    terrain = [one for one in structures if one.kind == "TINRelief"]
+    corners = joined_triangles(one.triangles for one in objects).reshape(-1, 3)
+    terrain = [one for one in objects if one.object_type == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
-        low = structures
+        low = objects
         if below_bridges:
             spans = ("Bridge", "Tunnel")
-            firm = [o for o in structures if not o.kind.startswith(spans)]
-            low = firm or structures
+            firm = [o for o in objects if not o.object_type.startswith(spans)]
+            low = firm or objects
         feet = [feet_of([o.triangles for o in low if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_CORNER_STRIDE]
@@ -183,26 +181,26 @@ def ground_of(
 
 
 def ground_structures(
-    structures: Sequence[ImportedStructure], ground: Ground
+    objects: Sequence[ImportedObject], ground: Ground
 ) -> list[Structure]:
     """Returns the guessed ground of a city, as a list of one structure.
 
     The list is empty if the imported file contains a terrain, because
-    `structures` then contains this terrain.
+    `objects` then contains this terrain.
 
     Args:
-        structures: structures of the city.
+        objects: objects of the city.
         ground: the guessed ground, see `ground_of`.
     """
-    if any(one.kind == "TINRelief" for one in structures):
+    if any(one.object_type == "TINRelief" for one in objects):
         return []
-    taken = {one.structure.name for one in structures}
+    taken = {one.structure.name for one in objects}
     name = "ground"
     while name in taken:
         name += "_"
     # The guessed ground must not hide streets and water.
     covered = joined_triangles(
-        one.triangles for one in structures if one.is_ground
+        one.triangles for one in objects if one.is_ground
     )
     lowered = ground.below(surface_samples(covered, ground.cell / 2.0))
     model = Model(

@@ -11,9 +11,9 @@ from shapely import STRtree
 
 from cns_drake.city.geometry import MeshShape
 from cns_drake.imports.former_buildings import with_former_buildings
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_share
 from cns_drake.imports.staged_city import StagedCity
-from cns_drake.imports.structures import ImportedStructure
 
 # Buildings within this distance of each other belong to one block [m].
 _BLOCK_WITHIN = 4.0
@@ -63,7 +63,7 @@ def grow(
     }
     first = [new for one in last if (new := variants.get(one, one)) is not None]
     missing = [one.structure.name for one in chosen if one not in lower]
-    stood: list[ImportedStructure] = []
+    stood: list[ImportedObject] = []
     if city.gone:
         before = first
         first = with_former_buildings(city.gone, before)
@@ -92,8 +92,8 @@ def grow(
 
 
 def _heights_of_lower(
-    chosen: Sequence[ImportedStructure], seed: int
-) -> dict[ImportedStructure, float]:
+    chosen: Sequence[ImportedObject], seed: int
+) -> dict[ImportedObject, float]:
     """Returns for each lower building the share of the height that remains."""
     least, most = _LOWER_HEIGHTS
     heights = {}
@@ -109,18 +109,18 @@ def _heights_of_lower(
 
 
 def _choose_buildings(
-    buildings: Sequence[ImportedStructure], number: int, seed: int
-) -> list[ImportedStructure]:
+    buildings: Sequence[ImportedObject], number: int, seed: int
+) -> list[ImportedObject]:
     """Returns `number` random buildings, about half of them block by block."""
-    blocks: dict[int, list[ImportedStructure]] = {}
+    blocks: dict[int, list[ImportedObject]] = {}
     for block, one in zip(_block_numbers(buildings), buildings, strict=True):
         blocks.setdefault(block, []).append(one)
 
-    def lot_of_block(members: list[ImportedStructure]) -> float:
+    def lot_of_block(members: list[ImportedObject]) -> float:
         name = min(one.structure.name for one in members)
         return random_share(seed, "block", name)
 
-    chosen: list[ImportedStructure] = []
+    chosen: list[ImportedObject] = []
     for members in sorted(blocks.values(), key=lot_of_block):
         if len(chosen) >= _SHARE_BY_BLOCK * number:
             break
@@ -133,7 +133,7 @@ def _choose_buildings(
     return chosen + singles[: number - len(chosen)]
 
 
-def _block_numbers(buildings: Sequence[ImportedStructure]) -> np.ndarray:
+def _block_numbers(buildings: Sequence[ImportedObject]) -> np.ndarray:
     """Returns for each building the number (N,) of its block."""
     if not buildings:
         return np.zeros(0, dtype=int)
@@ -148,8 +148,8 @@ def _block_numbers(buildings: Sequence[ImportedStructure]) -> np.ndarray:
 
 
 def _lowered_building(
-    one: ImportedStructure, share: float, taken: set[str]
-) -> ImportedStructure:
+    one: ImportedObject, share: float, taken: set[str]
+) -> ImportedObject:
     """Returns a building cut to a share of its height, with a new name."""
     suffix = "_lower"
     while f"{one.structure.name}{suffix}" in taken:
@@ -178,7 +178,7 @@ def _lowered_building(
     return replace(
         one,
         structure=structure,
-        kind=f"{one.kind}, lower at first",
+        object_type=f"{one.object_type}, lower at first",
         triangles=one.triangles * scale + move,
         original=one.structure.name,
     )

@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import doing
 from cns_drake.imports import map_files, overview
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.cropping import cropped_city
 from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.drives.cell_graph import CellGraph
@@ -28,12 +28,12 @@ from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import ground_of, ground_structures
 from cns_drake.imports.grown_city import grow
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import DriveOn, ImportOptions
 from cns_drake.imports.report import ImportReport
 from cns_drake.imports.staged_city import StagedCity, stage_city
-from cns_drake.imports.structures import ImportedStructure
 from cns_drake.roads.lane_path import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoint_file import read_waypoints
@@ -140,8 +140,8 @@ def _write_lanes(
     draft: Path,
     source: Path,
     city: ForeignCity,
-    bare: Sequence[ImportedStructure],
-    kept: Sequence[ImportedStructure],
+    bare: Sequence[ImportedObject],
+    kept: Sequence[ImportedObject],
     drives: Sequence[WaypointRoute],
     side: DriveOn,
 ) -> None:
@@ -162,7 +162,11 @@ def _write_lanes(
         city.streets,
         city.street_places,
         [*bare, *added],
-        [one for one in added if one.kind not in ("Sidewalk", "Lane mark")],
+        [
+            one
+            for one in added
+            if one.object_type not in ("Sidewalk", "Lane mark")
+        ],
         drives,
         side,
     )
@@ -177,7 +181,7 @@ def _report_of(
     staged: StagedCity, drives: Sequence[WaypointRoute], faults: ImportFaults
 ) -> ImportReport:
     return ImportReport(
-        kinds=dict(Counter(one.kind for one in staged.kept)),
+        kinds=dict(Counter(one.object_type for one in staged.kept)),
         triangles=sum(one.num_own_triangles for one in staged.kept),
         stages={stage: len(some) for stage, some in staged.standing.items()},
         undated=staged.undated,

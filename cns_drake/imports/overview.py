@@ -17,7 +17,7 @@ from cns_drake.imports.colours import WATER
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130
@@ -30,22 +30,22 @@ _ROOM_ALPHA = 0.6
 
 def draw_overview(
     path: Path,
-    structures: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
     space: FreeSpace | None,
     drives: Sequence[WaypointRoute],
 ) -> None:
-    """Draws a map's structures, the free space for a car and the drives.
+    """Draws a city's objects, the free space for a car and the drives.
 
     Where two drives share a street, the second drive is a thinner line on top
     of the first, so that both can be seen.
 
     Args:
         path: image file to write.
-        structures: the structures.
+        objects: the objects.
         space: the free space; None to draw none.
         drives: the drives, at most two.
     """
-    corners = joined_triangles(one.triangles for one in structures)
+    corners = joined_triangles(one.triangles for one in objects)
     xy = corners.reshape(-1, 3)[:, :2]
     low, high = xy.min(axis=0), xy.max(axis=0)
     if space is not None:
@@ -53,7 +53,7 @@ def draw_overview(
         high = low + CELL * np.array(space.clearance.shape[::-1])
     figure = Figure(layout="constrained")
     axes = figure.subplots()
-    classes = _draw_structures(axes, structures)
+    classes = _draw_objects(axes, objects)
     if space is not None:
         classes |= _draw_room(axes, space, low, high)
     legend = _draw_drives(axes, drives) | classes
@@ -79,15 +79,15 @@ def draw_overview(
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
 
 
-def _draw_structures(
-    axes: Axes, structures: Sequence[ImportedStructure]
+def _draw_objects(
+    axes: Axes, objects: Sequence[ImportedObject]
 ) -> dict[str, Artist]:
-    """Draws structures, the ground first; returns the legend."""
+    """Draws objects, the ground first; returns the legend."""
     legend: dict[str, Artist] = {}
     for is_ground in (True, False):
         alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
-        for one in structures:
-            if one.is_ground == is_ground and one.kind != "TINRelief":
+        for one in objects:
+            if one.is_ground == is_ground and one.object_type != "TINRelief":
                 colour = _colour_of(one)
                 alike.setdefault(colour, []).append(one.triangles)
                 name = one.structure.semantic_class
@@ -127,7 +127,7 @@ def _draw_room(
         extent=(low[0], high[0], low[1], high[1]),
         cmap=ListedColormap([_ROOM_COLOUR]),
         alpha=_ROOM_ALPHA,
-        # Above the structures and below the lines.
+        # Above the objects and below the lines.
         zorder=1.5,
     )
     return {"room for a car": Patch(facecolor=_ROOM_COLOUR, alpha=_ROOM_ALPHA)}
@@ -157,7 +157,7 @@ def _draw_drives(
     return legend
 
 
-def _colour_of(one: ImportedStructure) -> tuple[float, float, float]:
+def _colour_of(one: ImportedObject) -> tuple[float, float, float]:
     part = one.structure.model.parts[0]
     if one.structure.semantic_class == "vegetation":
         return CLASS_RGB["vegetation"]

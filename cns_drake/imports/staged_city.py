@@ -1,4 +1,4 @@
-"""The structures of an imported city in each stage."""
+"""The objects of an imported city in each stage."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.building_years import stands_today
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.former_buildings import with_former_buildings
+from cns_drake.imports.imported_objects import ImportedObject, boxes_of
 from cns_drake.imports.options import ImportOptions
-from cns_drake.imports.structures import ImportedStructure, boxes_of
 from cns_drake.scene.labels import MAX_INSTANCE
 
 # Greatest distance of a structure from the middle of a city [m].
@@ -22,40 +22,40 @@ _FARTHEST = 10_000.0
 
 @dataclass(frozen=True)
 class StagedCity:
-    """The structures of an imported city, by stage.
+    """The objects of an imported city, by stage.
 
     Attributes:
-        standing: name of a stage -> structures that exist in this stage.
-        kept: structures that exist in at least one stage.
+        standing: name of a stage -> objects that exist in this stage.
+        kept: objects that exist in at least one stage.
         undated: number of buildings without a year.
         dated: number of buildings with a year.
         gone: buildings that no longer exist, for `grow`; empty if the options
             of the import do not include `grow`.
     """
 
-    standing: dict[str, list[ImportedStructure]]
-    kept: list[ImportedStructure]
+    standing: dict[str, list[ImportedObject]]
+    kept: list[ImportedObject]
     undated: int
     dated: int
-    gone: Sequence[ImportedStructure] = ()
+    gone: Sequence[ImportedObject] = ()
 
     def replaced(
-        self, changed: Mapping[ImportedStructure, ImportedStructure | None]
+        self, changed: Mapping[ImportedObject, ImportedObject | None]
     ) -> StagedCity:
-        """Returns the city with some structures replaced or removed.
+        """Returns the city with some objects replaced or removed.
 
-        `changed` maps a structure to its replacement, or to None to remove it.
+        `changed` maps an object to its replacement, or to None to remove it.
         """
 
-        def new(some: Iterable[ImportedStructure]) -> list[ImportedStructure]:
+        def new(some: Iterable[ImportedObject]) -> list[ImportedObject]:
             others = (changed.get(one, one) for one in some)
             return [one for one in others if one is not None]
 
         standing = {stage: new(some) for stage, some in self.standing.items()}
         return replace(self, standing=standing, kept=new(self.kept))
 
-    def with_structures(self, added: Sequence[ImportedStructure]) -> StagedCity:
-        """Returns the city with more structures, which exist in all stages."""
+    def with_objects(self, added: Sequence[ImportedObject]) -> StagedCity:
+        """Returns the city with more objects, which exist in all stages."""
         standing = {
             stage: [*some, *added] for stage, some in self.standing.items()
         }
@@ -65,9 +65,9 @@ class StagedCity:
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions
 ) -> StagedCity:
-    """Assigns the structures of an imported city to the stages of a map.
+    """Assigns the objects of an imported city to the stages of a map.
 
-    Structures that exist in no stage are counted in `city.faults`.
+    Objects that exist in no stage are counted in `city.faults`.
 
     Args:
         source: the imported file, named in error messages.
@@ -88,7 +88,7 @@ def stage_city(
         ]
         for k, stage in enumerate(stage_names(options.years))
     }
-    gone: list[ImportedStructure] = []
+    gone: list[ImportedObject] = []
     if options.grow is not None:
         (today,) = map(set, standing.values())
         gone = [one for one in found if one not in today]
@@ -121,14 +121,12 @@ def stage_city(
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
 
 
-def _is_here(one: ImportedStructure) -> bool:
+def _is_here(one: ImportedObject) -> bool:
     """Returns whether a structure, once built, still stands today."""
     return not one.is_gone and stands_today(one.until)
 
 
-def _stands_at(
-    one: ImportedStructure, stage: int, options: ImportOptions
-) -> bool:
+def _stands_at(one: ImportedObject, stage: int, options: ImportOptions) -> bool:
     """Returns whether a structure stands in the stage of number `stage`.
 
     A structure that was demolished at an unknown date stands in all stages
@@ -169,15 +167,15 @@ def stage_names(years: Sequence[int]) -> list[str]:
     return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
 
-def _without_outliers(city: ForeignCity) -> list[ImportedStructure]:
+def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
     """Returns a city's structures, except structures far from the middle."""
-    if not city.structures:
+    if not city.objects:
         return []
-    boxes = boxes_of(city.structures)
+    boxes = boxes_of(city.objects)
     middle = np.median(boxes.mean(axis=1), axis=0)
     kept = []
     for one, reach in zip(
-        city.structures, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
+        city.objects, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
     ):
         if reach <= _FARTHEST:
             kept.append(one)
@@ -187,7 +185,7 @@ def _without_outliers(city: ForeignCity) -> list[ImportedStructure]:
     return kept
 
 
-def _why_never(one: ImportedStructure, options: ImportOptions) -> str:
+def _why_never(one: ImportedObject, options: ImportOptions) -> str:
     """Returns why a building stands at no stage, in words."""
     first = options.years[0] if options.years else None
     if one.until is not None and (first is None or one.until <= first):
@@ -201,7 +199,7 @@ def _why_never(one: ImportedStructure, options: ImportOptions) -> str:
     return "that stood between stages"
 
 
-def _may_be_missing(one: ImportedStructure) -> bool:
+def _may_be_missing(one: ImportedObject) -> bool:
     """Returns whether a structure may be missing at some stages.
 
     Among the structures without a year, only buildings may be missing.

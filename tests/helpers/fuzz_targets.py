@@ -18,7 +18,7 @@ from cns_drake.city.generation.rendering import meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_drive
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.pictures.camera_views import load_views
 from cns_drake.recording.recording_folder import RecordingFolder

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from cns_drake.imports.cityjson.city import import_objects
 from cns_drake.imports.cityjson.reading import read_cityjson
-from cns_drake.imports.cityjson.structures import import_structures
 
 ORIGIN = np.array([85000.0, 446000.0, 3.0])
 
@@ -13,7 +13,7 @@ def structures(path, **options):
     values = {"lod": None, "year_attribute": None} | options
     return city, {
         one.structure.name: one
-        for one in import_structures(city, ORIGIN, **values)
+        for one in import_objects(city, ORIGIN, **values)
     }
 
 

@@ -98,7 +98,7 @@ def _look_outwards(city: CityFile) -> Iterator[bool]:
     """
     for one in city.objects.values():
         above = {"RoofSurface": 1.0, "GroundSurface": -1.0}
-        if one.kind == "TINRelief":
+        if one.object_type == "TINRelief":
             above[""] = 1.0
         for geometry in one.geometries:
             if not geometry.faces:

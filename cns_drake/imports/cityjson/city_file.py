@@ -34,14 +34,14 @@ class CityObject(NamedTuple):
 
     Attributes:
         name: id of the object.
-        kind: type of the object, such as BuildingPart.
+        object_type: type of the object, such as BuildingPart.
         attributes: attributes, as in the file.
         parents: ids of the objects of which this object is a part.
         geometries: geometries, except geometries that cannot be read.
     """
 
     name: str
-    kind: str
+    object_type: str
     attributes: Mapping[str, Any]
     parents: list[str]
     geometries: list[CityGeometry]

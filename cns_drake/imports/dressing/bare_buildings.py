@@ -10,8 +10,8 @@ from cns_drake.imports.dressing import roof_pieces
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.wall_panels import is_upright
 from cns_drake.imports.ground import Ground
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_generator
-from cns_drake.imports.structures import ImportedStructure
 
 # A building whose feet are farther from the ground than this was sunk into it
 # [m].
@@ -33,7 +33,7 @@ class BareBuilding:
         rng: random generator for the details.
     """
 
-    one: ImportedStructure
+    one: ImportedObject
     walls: np.ndarray
     roof: np.ndarray
     rest: np.ndarray
@@ -44,7 +44,7 @@ class BareBuilding:
 
 
 def split_buildings(
-    buildings: Sequence[ImportedStructure], ground: Ground, seed: int
+    buildings: Sequence[ImportedObject], ground: Ground, seed: int
 ) -> list[BareBuilding]:
     """Returns buildings, split into walls, roof and other surfaces.
 
@@ -66,7 +66,7 @@ def split_buildings(
 
 
 def _split_building(
-    one: ImportedStructure,
+    one: ImportedObject,
     ground: Ground,
     seed: int,
     known: Style | None = None,

@@ -28,9 +28,9 @@ from cns_drake.imports.dressing.wall_panels import Panel, find_panels
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
+from cns_drake.imports.imported_objects import ImportedObject, to_mesh
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure, to_mesh
 
 # Walls farther than this from all drives get no windows [m].
 _WALLS_WITHIN = 60.0
@@ -62,18 +62,18 @@ class DressedBuildings:
             which the file states this appearance.
     """
 
-    buildings: Mapping[ImportedStructure, ImportedStructure]
+    buildings: Mapping[ImportedObject, ImportedObject]
     at_random: Counter[str]
     by_file: Counter[str]
 
 
 def dress_buildings(
-    structures: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
     drives: Sequence[WaypointRoute],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
-    always: Collection[ImportedStructure] | None = None,
+    always: Collection[ImportedObject] | None = None,
     paving: np.ndarray = _NO_TRIANGLES,
 ) -> DressedBuildings:
     """Returns the buildings of a city, with added windows, doors and shops.
@@ -83,19 +83,18 @@ def dress_buildings(
     a drive get windows. Doors and shops face streets.
 
     Args:
-        structures: the structures of the city, of which the buildings get
-            details.
+        objects: the objects of the city, of which the buildings get details.
         drives: the drives; there is more detail near drives than elsewhere.
         streets: the streets that doors and shops face.
         ground: the ground on which buildings stand.
         seed: seed of all random draws.
-        always: structures that exist in all stages; None if all structures do.
+        always: objects that exist in all stages; None if all objects do.
             A wall gets no details if buildings that exist in all stages occlude
             it from the drives.
         paving: triangles (M, 3, 3) of terrain, streets and sidewalks, on which
             doors stand [m].
     """
-    buildings = [one for one in structures if one.is_building]
+    buildings = [one for one in objects if one.is_building]
     bare = split_buildings(buildings, ground, seed)
     walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:

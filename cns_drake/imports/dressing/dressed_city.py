@@ -23,9 +23,9 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.ground import Ground, ground_structures
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 from cns_drake.scene.labels import MAX_INSTANCE
 
 # Colour of paving stones.
@@ -85,12 +85,14 @@ def dress_city(
     paving = [
         one.triangles
         for one in [*kept, *laid]
-        if one.is_ground or one.kind == "Sidewalk"
+        if one.is_ground or one.object_type == "Sidewalk"
     ]
     buildings = dress_buildings(
         kept, drives, streets, ground, seed, always, joined_triangles(paving)
     )
-    added = [with_kerb(one) if one.kind == "Sidewalk" else one for one in laid]
+    added = [
+        with_kerb(one) if one.object_type == "Sidewalk" else one for one in laid
+    ]
     if drives:
         added += lane_marks(streets, drives)
     guessed_ground = ground_structures(kept, ground)
@@ -105,13 +107,13 @@ def dress_city(
         seed,
     )
     changed = dict(buildings.buildings)
-    at_random = buildings.at_random + Counter(one.kind for one in added)
+    at_random = buildings.at_random + Counter(one.object_type for one in added)
     if is_paved:
         changed |= _paved_terrain(kept)
     if drives:
-        walks = [one for one in kept if one.kind == "Sidewalk"]
+        walks = [one for one in kept if one.object_type == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
-    added += placed.structures
+    added += placed.objects
     _take_back_placed(city, placed)
     origins = {one.structure.name: "dressed" for one in changed.values()}
     names = {one.structure.name for one in added} - placed.from_file
@@ -123,9 +125,7 @@ def dress_city(
         "at_random": dict(sorted((at_random + placed.at_random).items())),
         "without_room": placed.no_room,
     }
-    dressed = staged.replaced({**changed, **placed.moved}).with_structures(
-        added
-    )
+    dressed = staged.replaced({**changed, **placed.moved}).with_objects(added)
     _check_number(len(dressed.kept))
     if is_paved:
         guessed_ground = list(map(in_paving_colour, guessed_ground))
@@ -133,8 +133,8 @@ def dress_city(
 
 
 def _paved_terrain(
-    kept: Sequence[ImportedStructure],
-) -> dict[ImportedStructure, ImportedStructure]:
+    kept: Sequence[ImportedObject],
+) -> dict[ImportedObject, ImportedObject]:
     """Returns for each terrain the same terrain in the colour of paving.
 
     The result is empty if the file has other ground, such as roads. Without
@@ -144,7 +144,7 @@ def _paved_terrain(
     Args:
         kept: structures of the city.
     """
-    terrain = [one for one in kept if one.kind == "TINRelief"]
+    terrain = [one for one in kept if one.object_type == "TINRelief"]
     if sum(one.is_ground for one in kept) != len(terrain):
         return {}
     return {
@@ -176,12 +176,12 @@ def _check_number(number: int) -> None:
 
 
 def _laid_paving(
-    kept: Sequence[ImportedStructure],
+    kept: Sequence[ImportedObject],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
     ground: Ground,
     is_paved: bool,
-) -> list[ImportedStructure]:
+) -> list[ImportedObject]:
     """Returns carriageways and sidewalks that the file does not have.
 
     Args:
@@ -191,7 +191,7 @@ def _laid_paving(
         ground: the ground.
         is_paved: whether ground of unknown kind is paved.
     """
-    laid: list[ImportedStructure] = []
+    laid: list[ImportedObject] = []
     if drives:
         laid += missing_sidewalks(kept, streets, drives)
         classes = {one.structure.semantic_class for one in kept}
@@ -202,10 +202,10 @@ def _laid_paving(
     return laid
 
 
-def is_dense(structures: Sequence[ImportedStructure]) -> bool:
+def is_dense(objects: Sequence[ImportedObject]) -> bool:
     """Returns whether buildings cover at least 12 % of their convex hull."""
     outlines = [
-        one.structure.model.footprint for one in structures if one.is_building
+        one.structure.model.footprint for one in objects if one.is_building
     ]
     if not outlines:
         return False

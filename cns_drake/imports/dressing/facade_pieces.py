@@ -36,7 +36,7 @@ from cns_drake.imports.dressing.facade_plan import (
 )
 from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.faces import parts_of
-from cns_drake.imports.structures import to_mesh
+from cns_drake.imports.imported_objects import to_mesh
 
 # How far parts protrude from their wall [m].
 _PLINTH_REACH = 0.06

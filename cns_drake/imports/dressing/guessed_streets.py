@@ -19,8 +19,8 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, joined_triangles, parts_of
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.ground import Ground
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH
-from cns_drake.imports.structures import ImportedStructure
 
 # Half the width of a street of unknown width [m].
 HALF_STREET = 3.9
@@ -33,17 +33,17 @@ _ABOVE_GROUND = 0.02
 
 
 def guessed_streets(
-    structures: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
     drives: Sequence[WaypointRoute],
     ground: Ground,
-) -> Iterator[ImportedStructure]:
-    """Yields structures for a carriageway and sidewalks along drives.
+) -> Iterator[ImportedObject]:
+    """Yields objects for a carriageway and sidewalks along drives.
 
     Use this function for a city whose file has no roads: the drives are assumed
     to be in the middle of the streets.
     """
     paths = MultiLineString([drive.path for drive in drives]).simplify(0.05)
-    near = near_drives(structures, drives)
+    near = near_drives(objects, drives)
     houses = [o for o in near if o.structure.semantic_class == "building"]
     roofs = triangles_from_above(houses, with_downward=False)
     reach = paths.buffer(HALF_STREET + SIDEWALK_WIDTH + _FROM_WALL)
@@ -58,7 +58,7 @@ def guessed_streets(
     half = _NARROWEST_SIDEWALK / 2.0
     wide = beside.buffer(-half, 2).buffer(half, 2)
     sidewalks = wide.intersection(beside)
-    terrain = (one for one in structures if one.kind == "TINRelief")
+    terrain = (one for one in objects if one.object_type == "TINRelief")
     below = turned_up(joined_triangles(one.triangles for one in terrain))
     if not len(below):
         mesh = ground.to_mesh()

@@ -6,7 +6,7 @@ import numpy as np
 
 from cns_drake.city.geometry import Mesh, MeshShape, Part, turned_up
 from cns_drake.imports.colours import Rgb
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject
 
 # The sides of a kerb reach this far down from its upper edges [m].
 _KERB_DEPTH = 0.25
@@ -14,7 +14,7 @@ _KERB_DEPTH = 0.25
 _KERB_RGB: Rgb = (0.60, 0.60, 0.58)
 
 
-def with_kerb(one: ImportedStructure) -> ImportedStructure:
+def with_kerb(one: ImportedObject) -> ImportedObject:
     """Returns a sidewalk with a kerb: a vertical face along its whole edge."""
     structure = one.structure
     name = f"{structure.name}_kerb"

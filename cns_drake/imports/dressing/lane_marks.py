@@ -9,8 +9,8 @@ from shapely.geometry import LineString, MultiLineString
 from cns_drake.city.ground.markings import DASH, DASH_GAP
 from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.streets import Street, ends_at_nodes
-from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # Streets get marks if they are this close to drives [m].
 _MARKS_WITHIN = 80.0
@@ -29,7 +29,7 @@ _BEFORE_JUNCTION = 4.0
 
 def lane_marks(
     streets: Sequence[Street], drives: Sequence[WaypointRoute]
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields dashed lines in the middle of the larger streets near drives.
 
     There must be at least one drive, and the ground must be level.
@@ -53,7 +53,7 @@ def lane_marks(
             kept = ~(shapely.distance(places, junctions) <= free)
             dashes = [_dash(line, s) for s in middles[kept].tolist()]
             if dashes:
-                yield make_imported(
+                yield make_object(
                     f"marks_{street.name}",
                     "road",
                     "Lane mark",

@@ -19,8 +19,8 @@ from cns_drake.imports.dressing.paving import (
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
-from cns_drake.imports.structures import ImportedStructure
 
 # Streets of these kinds have sidewalks unless their tags say otherwise.
 _WITH_SIDEWALKS = (
@@ -33,18 +33,17 @@ _WITH_SIDEWALKS = (
 
 
 def missing_sidewalks(
-    structures: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields sidewalks for streets whose tags do not mention sidewalks.
 
     Only the larger streets within 80 m of a drive get sidewalks. The ground
     must be level.
 
     Args:
-        structures: structures of the city, which the sidewalks must not
-            overlap.
+        objects: objects of the city, which the sidewalks must not overlap.
         streets: the streets.
         drives: the drives, at least one.
     """
@@ -64,9 +63,9 @@ def missing_sidewalks(
         return
     shapes = [
         one
-        for one in near_drives(structures, drives)
+        for one in near_drives(objects, drives)
         if one.structure.semantic_class in ("building", "road", "sidewalk")
-        or one.kind.startswith("Water")
+        or one.object_type.startswith("Water")
     ]
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
     taken = np.concatenate([triangles_from_above(shapes), lanes])

@@ -11,9 +11,9 @@ from cns_drake.city.placement.objects import pick_key
 from cns_drake.imports.dressing.roadside_places import place_along
 from cns_drake.imports.dressing.street_room import StreetRoom
 from cns_drake.imports.dressing.street_tables import TABLES
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 
 # Cars farther than this from all drives are left out [m].
 ROWS_WITHIN = 70.0
@@ -102,7 +102,7 @@ def park_along(
             s += float(rng.uniform(*_CAR_EVERY))
 
 
-def fill_car_park(room: StreetRoom, one: ImportedStructure, seed: int) -> None:
+def fill_car_park(room: StreetRoom, one: ImportedObject, seed: int) -> None:
     """Parks cars at random along the longer sides of a car park.
 
     Args:

@@ -18,8 +18,8 @@ from cns_drake.imports.dressing.paving import (
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import flat_surface, parts_of
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.streets import KERB_HEIGHT
-from cns_drake.imports.structures import ImportedStructure
 
 # Width of the widest gap that is paved [m].
 _WIDEST_GAP = 3.0
@@ -34,8 +34,8 @@ _SQUARE = 50.0
 
 
 def paved_gaps(
-    structures: Sequence[ImportedStructure], drives: Sequence[WaypointRoute]
-) -> Iterator[ImportedStructure]:
+    objects: Sequence[ImportedObject], drives: Sequence[WaypointRoute]
+) -> Iterator[ImportedObject]:
     """Yields sidewalks that fill gaps beside existing sidewalks.
 
     A gap is unpaved ground at most 3 m wide, such as the strip between a
@@ -43,12 +43,14 @@ def paved_gaps(
     must be level.
     """
     near = near_drives(
-        [one for one in structures if one.kind != "Tree"], drives
+        [one for one in objects if one.object_type != "Tree"], drives
     )
-    walks = [_flat_outline(one) for one in near if one.kind == "Sidewalk"]
+    walks = [
+        _flat_outline(one) for one in near if one.object_type == "Sidewalk"
+    ]
     if not walks:
         return
-    roads = [_flat_outline(one) for one in near if one.kind == "Road"]
+    roads = [_flat_outline(one) for one in near if one.object_type == "Road"]
     walks_tree = STRtree(walks)
     houses = [one for one in near if one.structure.semantic_class == "building"]
     roofs = triangles_from_above(houses)
@@ -61,7 +63,7 @@ def paved_gaps(
         [
             one
             for one in near
-            if one.kind not in ("Sidewalk", "Road", "Crossing")
+            if one.object_type not in ("Sidewalk", "Road", "Crossing")
             and one not in houses
         ]
     )
@@ -94,6 +96,6 @@ def paved_gaps(
         yield paved_structure(f"sidewalk_gap_{number}", "sidewalk", surface)
 
 
-def _flat_outline(one: ImportedStructure) -> BaseGeometry:
+def _flat_outline(one: ImportedObject) -> BaseGeometry:
     """Returns the area of a level structure, seen from above."""
     return shapely.coverage_union_all(triangles_from_above([one]))

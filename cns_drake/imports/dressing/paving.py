@@ -1,4 +1,4 @@
-"""Areas and structures of the paving that is added near drives."""
+"""Areas and objects of the paving that is added near drives."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from cns_drake.city.geometry import looks_up, turned_up
 from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles, parts_of
-from cns_drake.imports.structures import ImportedStructure, make_imported
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 
 # Within this distance of drives, sidewalks get kerbs and missing ones are added
 # [m].
@@ -19,24 +19,24 @@ PAVED_WITHIN = 80.0
 
 
 def near_drives(
-    structures: Sequence[ImportedStructure], drives: Sequence[WaypointRoute]
-) -> list[ImportedStructure]:
-    """Returns the structures that are at most 80 m from a drive."""
+    objects: Sequence[ImportedObject], drives: Sequence[WaypointRoute]
+) -> list[ImportedObject]:
+    """Returns the objects that are at most 80 m from a drive."""
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
-    outlines = [one.structure.model.footprint for one in structures]
+    outlines = [one.structure.model.footprint for one in objects]
     near = shapely.dwithin(np.array(outlines), paths, PAVED_WITHIN)
-    return [
-        one for one, is_near in zip(structures, near, strict=True) if is_near
-    ]
+    return [one for one, is_near in zip(objects, near, strict=True) if is_near]
 
 
 def paved_structure(
     name: str, semantic_class: str, surface: np.ndarray
-) -> ImportedStructure:
+) -> ImportedObject:
     """Returns a road or a sidewalk made of triangles (N, 3, 3) [m]."""
-    kind = semantic_class.capitalize()
-    return make_imported(name, semantic_class, kind, {"surface": surface}, {})
+    object_type = semantic_class.capitalize()
+    return make_object(
+        name, semantic_class, object_type, {"surface": surface}, {}
+    )
 
 
 def polygons_only(geometry: BaseGeometry) -> MultiPolygon:
@@ -50,14 +50,14 @@ def area_outside(area: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
 
 
 def triangles_from_above(
-    structures: Sequence[ImportedStructure], *, with_downward: bool = True
+    objects: Sequence[ImportedObject], *, with_downward: bool = True
 ) -> np.ndarray:
-    """Returns triangles of structures as polygons (N,), seen from above [m].
+    """Returns triangles of objects as polygons (N,), seen from above [m].
 
     Vertical triangles are left out. Triangles that look downwards are left out
     only if `with_downward` is false.
     """
-    triangles = joined_triangles(one.triangles for one in structures)
+    triangles = joined_triangles(one.triangles for one in objects)
     if with_downward:
         triangles = turned_up(triangles)
     rings = np.round(triangles[looks_up(triangles)][:, [0, 1, 2, 0], :2], 3)

@@ -30,9 +30,9 @@ from cns_drake.imports.dressing.street_tables import TABLES
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.foreign_city import SmallObject
 from cns_drake.imports.ground import Ground
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.named_randomness import random_generator
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 
 # Objects farther than this from all drives are left out [m].
 _OBJECTS_WITHIN = 100.0
@@ -43,7 +43,7 @@ _SMALL_EVERY = 22.0
 
 
 def dress_streets(
-    structures: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
     small_objects: Sequence[SmallObject],
     streets: Sequence[Street],
     drives: Sequence[WaypointRoute],
@@ -58,7 +58,7 @@ def dress_streets(
     Without drives nothing is placed.
 
     Args:
-        structures: structures that already exist.
+        objects: objects that already stand there.
         small_objects: small objects from the imported file.
         streets: the streets along which objects are added.
         drives: the drives of the map.
@@ -70,18 +70,18 @@ def dress_streets(
     found = PlacedObjects()
     if not drives:
         return found
-    room = StreetRoom(structures, drives, ground, guessed_ground, found)
+    room = StreetRoom(objects, drives, ground, guessed_ground, found)
     near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
-    for one in structures:
-        if one.kind == "Tree":
+    for one in objects:
+        if one.object_type == "Tree":
             room.keep_tree(_off_carriageway(room, one, near, courses))
     for number, small in enumerate(small_objects):
         if room.is_near(np.array([small.xy] * 2), _OBJECTS_WITHIN):
             _place_from_file(room, small, number, near, courses, seed)
-    for one in structures:
-        if one.kind == "Parking":
+    for one in objects:
+        if one.object_type == "Parking":
             fill_car_park(room, one, seed)
     for row in _streets_to_dress(near, drives):
         if room.is_near(np.array(row.line.coords), ROWS_WITHIN):
@@ -113,10 +113,10 @@ def _streets_to_dress(
 
 def _off_carriageway(
     room: StreetRoom,
-    tree: ImportedStructure,
+    tree: ImportedObject,
     streets: Sequence[Street],
     courses: Sequence[LineString],
-) -> ImportedStructure:
+) -> ImportedObject:
     """Returns a tree, moved off the carriageway and its kerb if necessary."""
     structure = tree.structure
     xy = np.array(structure.xyz[:2])
@@ -164,7 +164,7 @@ def _place_from_file(
     rng = random_generator(seed, "thing", name)
     at = (float(xy[0]), float(xy[1]))
     if room.place(name, one.kind, at, yaw or 0.0, rng):
-        placed_last = room.found.structures[-1].structure.name
+        placed_last = room.found.objects[-1].structure.name
         room.found.from_file.add(placed_last)
         room.found.sources.add(one.source)
         room.found.by_file[title_of(one.kind)] += 1

@@ -24,7 +24,7 @@ from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject
 
 # Least distance of objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
@@ -48,7 +48,7 @@ class PlacedObjects:
     """The small objects that were placed along streets, and their counts.
 
     Attributes:
-        structures: the objects.
+        objects: the objects.
         from_file: names of the structures that come from the file.
         moved: original -> moved tree, for trees of the file that stood on a
             carriageway.
@@ -59,11 +59,9 @@ class PlacedObjects:
             would block a drive or stand in a wall or another object.
     """
 
-    structures: list[ImportedStructure] = field(default_factory=list)
+    objects: list[ImportedObject] = field(default_factory=list)
     from_file: set[str] = field(default_factory=set)
-    moved: dict[ImportedStructure, ImportedStructure] = field(
-        default_factory=dict
-    )
+    moved: dict[ImportedObject, ImportedObject] = field(default_factory=dict)
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
     at_random: Counter[str] = field(default_factory=Counter)
@@ -81,7 +79,7 @@ class StreetRoom:
 
     def __init__(
         self,
-        structures: Sequence[ImportedStructure],
+        objects: Sequence[ImportedObject],
         drives: Sequence[WaypointRoute],
         ground: Ground,
         guessed_ground: Sequence[Structure],
@@ -90,7 +88,7 @@ class StreetRoom:
         """Takes what already stands, and the drives whose paths stay free.
 
         Args:
-            structures: structures of the city.
+            objects: objects of the city.
             drives: the drives, which are kept free.
             ground: the ground on which objects stand.
             guessed_ground: structures of the ground that was guessed; none if
@@ -103,30 +101,30 @@ class StreetRoom:
         shapely.prepare(self.paths)
 
         def triangles(
-            is_wanted: Callable[[ImportedStructure], bool],
+            is_wanted: Callable[[ImportedObject], bool],
         ) -> np.ndarray:
             return joined_triangles(
-                o.triangles for o in structures if is_wanted(o)
+                o.triangles for o in objects if is_wanted(o)
             )
 
         solids = triangles(
             lambda o: o.structure.semantic_class in _SOLID_CLASSES
         )
         self._solids = UpperSides(solids)
-        roads = triangles(lambda o: o.kind == "Road")
+        roads = triangles(lambda o: o.object_type == "Road")
         self._roads = UpperSides(turned_up(roads))
-        paved = triangles(lambda o: o.is_ground or o.kind == "Sidewalk")
+        paved = triangles(lambda o: o.is_ground or o.object_type == "Sidewalk")
         laid = joined_triangles([paved, ground_triangles(guessed_ground)])
         self._laid = UpperSides(turned_up(laid))
         self._taken = Occupancy()
-        self._names = {one.structure.name for one in structures}
+        self._names = {one.structure.name for one in objects}
         self.lamps: list[tuple[float, float]] = []
 
     def is_near(self, line: np.ndarray, distance: float) -> bool:
         """Returns whether a line (N, 2) is within a distance of a drive [m]."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
-    def keep_tree(self, tree: ImportedStructure) -> None:
+    def keep_tree(self, tree: ImportedObject) -> None:
         """Marks the place of a tree's trunk as occupied."""
         x, y, _ = tree.structure.xyz
         self._taken.add(Point(x, y).buffer(_TRUNK_RADIUS, 4))
@@ -197,8 +195,8 @@ class StreetRoom:
         self._names.add(name)
         structure = replace(structure, name=name, xyz=(x, y, z))
         triangles = _bounding_triangles(footprint, z)
-        self.found.structures.append(
-            ImportedStructure(structure, title_of(kind), None, triangles)
+        self.found.objects.append(
+            ImportedObject(structure, title_of(kind), None, triangles)
         )
         if kind == "lamp_post":
             self.lamps.append((x, y))

@@ -10,7 +10,7 @@ from shapely import STRtree
 
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
-from cns_drake.imports.structures import ImportedStructure, boxes_of
+from cns_drake.imports.imported_objects import ImportedObject, boxes_of
 from cns_drake.imports.surface_samples import surface_samples
 
 CELL = 1.0  # [m]
@@ -90,30 +90,30 @@ class FreeSpace:
 
 
 def find_free_space(
-    structures: Sequence[ImportedStructure], ground: Ground
+    objects: Sequence[ImportedObject], ground: Ground
 ) -> FreeSpace:
     """Returns the space for a car that is free in all stages of a city.
 
-    `structures` contains the structures of all stages. If the city has roads,
+    `objects` contains the objects of all stages. If the city has roads,
     only space on roads counts as free.
     """
-    low, high = _search_bounds(structures)
+    low, high = _search_bounds(objects)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     window = (low, high)
     on_road, in_water, blocked = np.zeros((3, *size[::-1]), dtype=bool)
     for covered, some in (
         (
             on_road,
-            [o for o in structures if o.structure.semantic_class == "road"],
+            [o for o in objects if o.structure.semantic_class == "road"],
         ),
-        (in_water, [o for o in structures if _is_water(o)]),
+        (in_water, [o for o in objects if _is_water(o)]),
     ):
         # In one call: thousands of small groups would take far longer.
         surfaces = joined_triangles(one.triangles for one in some)
         for row, column in _covered_cells(surfaces, window):
             covered[row, column] = True
     walls = []
-    for one in structures:
+    for one in objects:
         if not (one.is_ground or _is_water(one)):
             cells, triangles = _blocked_by(one, ground, window)
             blocked[cells] = True
@@ -138,8 +138,8 @@ def find_free_space(
     )
 
 
-def _is_water(one: ImportedStructure) -> bool:
-    return one.kind.startswith("Water")
+def _is_water(one: ImportedObject) -> bool:
+    return one.object_type.startswith("Water")
 
 
 def _covered_cells(
@@ -158,7 +158,7 @@ def _covered_cells(
 
 
 def _blocked_by(
-    one: ImportedStructure, ground: Ground, window: _Window
+    one: ImportedObject, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Returns the cells that a structure blocks, and the triangles that block.
 
@@ -211,9 +211,9 @@ def _largest_part_size(cells: np.ndarray) -> int:
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
-def _search_bounds(structures: Sequence[ImportedStructure]) -> _Window:
+def _search_bounds(objects: Sequence[ImportedObject]) -> _Window:
     """Returns the limits of the area in which free space is searched."""
-    boxes = boxes_of(structures)[:, :, :2]
+    boxes = boxes_of(objects)[:, :, :2]
     middle = np.median(boxes.mean(axis=1), axis=0)
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
     high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)

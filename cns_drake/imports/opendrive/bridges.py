@@ -9,8 +9,8 @@ from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Structure
+from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import LaneBand, lane_class
-from cns_drake.imports.structures import make_imported
 
 # The underside of a bridge is this far below its upper side [m].
 _DECK_DEPTH = np.array([0.0, 0.0, 0.8])
@@ -46,7 +46,7 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
         )
         triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
         if len(triangles):
-            yield make_imported(
+            yield make_object(
                 f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}
             ).structure
 

@@ -20,9 +20,9 @@ from cns_drake.city.geometry.polygons import GRID
 from cns_drake.city.ground.markings import DASH, DASH_GAP
 from cns_drake.imports.colours import WHITE, Rgb
 from cns_drake.imports.faces import parts_of
+from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import LaneBand
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
-from cns_drake.imports.structures import make_imported
 
 # The edges of carriageways and of lanes differ by less than this, which is also
 # the distance of lines from a kerb [m].
@@ -194,7 +194,7 @@ def road_marks(
                 surfaces[colour] = corners
         if not surfaces:
             continue
-        yield make_imported(
+        yield make_object(
             f"{prefix}_{road}",
             "road",
             "Road mark",

@@ -17,10 +17,10 @@ from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.trees import tree
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import TYPES, stations
 from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
 from cns_drake.imports.solids import extruded
-from cns_drake.imports.structures import make_imported
 
 # Things of these types are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
@@ -284,13 +284,13 @@ def _to_left(places: np.ndarray) -> np.ndarray:
 def _object_structure(
     thing: Thing, triangles: np.ndarray, footprint: BaseGeometry
 ) -> Structure:
-    one = make_imported(
+    one = make_object(
         thing.name,
         _name_by_type(thing.kind, "objects", "other-object"),
         "Object",
         {"body": triangles},
         {},
-        narrower=thing.kind,
+        kind=thing.kind,
     ).structure
     model = replace(one.model, footprint=footprint)
     return replace(one, model=model, tags=("object",))

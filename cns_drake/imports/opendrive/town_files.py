@@ -9,9 +9,9 @@ import shapely
 from cns_drake.city.generation.rendering import render_stages
 from cns_drake.city.geometry import Structure, polygons_of
 from cns_drake.imports import map_files, overview
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.opendrive.town import Town
 from cns_drake.imports.report import ImportReport
-from cns_drake.imports.structures import ImportedStructure
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # About the radius of a tree's crown, in pictures [m].
@@ -115,7 +115,7 @@ def _report_of(
 
 def _seen_from_above(
     structures: Iterable[Structure],
-) -> Iterable[ImportedStructure]:
+) -> Iterable[ImportedObject]:
     """Yields the footprints of structures as flat triangles."""
     for one in structures:
         if one.semantic_class not in _SHOWN_CLASSES:
@@ -135,6 +135,4 @@ def _seen_from_above(
         if corners:
             xy = np.array(corners)
             z = np.zeros((*xy.shape[:2], 1))
-            yield ImportedStructure(
-                one, "", None, np.concatenate([xy, z], axis=2)
-            )
+            yield ImportedObject(one, "", None, np.concatenate([xy, z], axis=2))

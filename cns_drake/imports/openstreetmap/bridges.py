@@ -10,9 +10,10 @@ from shapely import STRtree
 from shapely.geometry import LineString
 
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
+from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
 from cns_drake.imports.openstreetmap.features import OsmWay
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
     is_railway,
@@ -22,13 +23,12 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
 )
 from cns_drake.imports.streets import SIDEWALK_WIDTH
-from cns_drake.imports.structures import ImportedStructure
 
 # Distance of a parapet from the edge of the street [m].
 _PARAPET_FROM_EDGE = 0.2
 _PARAPET_THICKNESS = 0.25
 _PARAPET_HEIGHT = 1.0
-_PARAPET = Look("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
+_PARAPET = AreaLook("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _height_rank(way: OsmWay) -> tuple[float, str]:
 
 def parapets(
     ways: Iterable[OsmWay], bridges: Bridges, local: LocalMetres
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields parapets along both sides of road bridges.
 
     Only bridges at the height of the surrounding ground get parapets.
@@ -123,4 +123,4 @@ def parapets(
                 edge.buffer(_PARAPET_THICKNESS / 2.0, cap_style="flat")
             )
         source = (name, ImportFaults())
-        yield from raised_structure(f"parapet_{name}", _PARAPET, strips, source)
+        yield from raised_object(f"parapet_{name}", _PARAPET, strips, source)

@@ -16,6 +16,7 @@ from cns_drake.imports.building_years import construction_year, year_of_date
 from cns_drake.imports.colours import RED_ROOF
 from cns_drake.imports.faces import parts_of, valid_parts
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.openstreetmap.building_tags import (
     LEAST_WALL,
     building_kind,
@@ -27,7 +28,6 @@ from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.passages import Passage, Passages
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.solids import extruded
-from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # How the report counts buildings that are not made as in the file.
 TWICE = "building drawn twice, taken once"
@@ -105,7 +105,7 @@ def make_buildings(
     faults: ImportFaults,
     once: bool = False,
     passages: Sequence[Passage] = (),
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields buildings, made from outlines and building parts.
 
     Where a building has parts, the parts replace the outline.
@@ -144,7 +144,7 @@ def make_buildings(
         copies[whole.name] += 1
         copy = copies[whole.name]
         number = f"_{copy}" if copy > 1 else ""
-        made = make_imported(
+        made = make_object(
             f"building_{whole.name}{number}",
             "building",
             "Building",
@@ -155,7 +155,7 @@ def make_buildings(
             # If parts look different, the look of the first one counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
-            narrower=building_kind(whole.tags),
+            kind=building_kind(whole.tags),
         )
         yield replace(made, is_gone=True) if is_gone(whole.tags) else made
 

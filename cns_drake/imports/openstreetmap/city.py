@@ -21,7 +21,9 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.trees import tree
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap import reading, streets
+from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
 from cns_drake.imports.openstreetmap.bridges import (
     Bridges,
     bridges_of,
@@ -42,7 +44,6 @@ from cns_drake.imports.openstreetmap.element_kinds import (
 from cns_drake.imports.openstreetmap.features import OsmArea, OsmFeatures
 from cns_drake.imports.openstreetmap.grounds import ground_areas
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.looks import Look, raised_structure
 from cns_drake.imports.openstreetmap.passages import (
     Passage,
     WayOpenings,
@@ -60,7 +61,6 @@ from cns_drake.imports.openstreetmap.tags import (
 )
 from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 
 # Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
@@ -230,7 +230,7 @@ def _bounds(
 
 def _count_unused(
     features: OsmFeatures,
-    found: Iterable[ImportedStructure],
+    found: Iterable[ImportedObject],
     also: AbstractSet[str],
 ) -> None:
     """Counts, by kind, the objects of the file that the city does not use.
@@ -261,7 +261,7 @@ def _count_unused(
 
 def _barriers(
     features: OsmFeatures, local: LocalMetres
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     openings = WayOpenings(features.ways, local)
     for way in features.ways:
         name, tags, line, _ = way
@@ -279,13 +279,13 @@ def _barriers(
         course = LineString(local(line))
         strip: BaseGeometry = course.buffer(width / 2.0, cap_style="flat")
         strip = strip.difference(openings.across(way, course, features.faults))
-        look = Look("Barrier", semantic_class, None, high)
-        yield from raised_structure(f"{kind}_{name}", look, [strip], where)
+        look = AreaLook("Barrier", semantic_class, None, high)
+        yield from raised_object(f"{kind}_{name}", look, [strip], where)
 
 
 def _trees(
     features: OsmFeatures, local: LocalMetres
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     for name, tags, place in features.trees:
         if is_inside(tags):
             continue
@@ -304,4 +304,4 @@ def _trees(
         structure = Structure(f"tree_{name}", "vegetation", model, place_W)
         trunk = Point(x, y).buffer(0.3, 2)
         walls, _ = extruded(trunk, 0.0, 2.0, name, ImportFaults())
-        yield ImportedStructure(structure, "Tree", None, walls)
+        yield ImportedObject(structure, "Tree", None, walls)

@@ -7,10 +7,10 @@ from shapely.geometry import Polygon
 
 from cns_drake.imports import faces
 from cns_drake.imports.colours import WHITE_PAINT
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.openstreetmap.features import OsmFeatures
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, street_width
-from cns_drake.imports.structures import ImportedStructure, make_imported
 
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
@@ -22,7 +22,7 @@ _STRIPE_HEIGHT = 0.01
 
 def crossing_stripes(
     features: OsmFeatures, local: LocalMetres
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields the stripes of zebra crossings, slightly above their street."""
     marked = {number for number, tags in features.crossings if is_marked(tags)}
     for _, tags, line, nodes in features.ways:
@@ -43,7 +43,7 @@ def crossing_stripes(
                 faces.flat_surface(s, _STRIPE_HEIGHT, name, features.faults)
                 for s in stripes
             ]
-            yield make_imported(
+            yield make_object(
                 f"crossing_{name}",
                 "road",
                 "Crossing",

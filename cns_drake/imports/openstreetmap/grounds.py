@@ -6,19 +6,19 @@ https://wiki.openstreetmap.org/wiki/Map_features
 from collections.abc import Iterator
 
 from cns_drake.imports.colours import LAWN, WATER, Rgb
+from cns_drake.imports.imported_objects import ImportedObject
+from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
 from cns_drake.imports.openstreetmap.ground_tags import area_kind, green_kind
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.looks import Look, flat_structure
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
-from cns_drake.imports.structures import ImportedStructure
 
 _SAND: Rgb = (0.76, 0.68, 0.51)
 _GRAVEL: Rgb = (0.50, 0.47, 0.43)
 _TARTAN: Rgb = (0.60, 0.34, 0.28)
 _GROUND_LEVEL = -0.05  # [m]
-_PITCH = Look("Pitch", "other-ground", _TARTAN, -0.035)
+_PITCH = AreaLook("Pitch", "other-ground", _TARTAN, -0.035)
 _GRASS_SURFACES = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACE_COLOURS = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
@@ -26,9 +26,9 @@ _SURFACE_COLOURS = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
 _NOT_ON_GROUND = ("underground", "multi-storey", "rooftop")
 
 
-def _look_of(entry: list) -> Look:
-    kind, semantic_class, (red, green, blue), z = entry
-    return Look(kind, semantic_class, (red, green, blue), z)
+def _look_of(entry: list) -> AreaLook:
+    object_type, semantic_class, (red, green, blue), z = entry
+    return AreaLook(object_type, semantic_class, (red, green, blue), z)
 
 
 _LOOKS = [(_look_of(entry["look"]), entry) for entry in TABLES["grounds"]]
@@ -38,7 +38,7 @@ WATER_LOOK = _LOOKS[0][0]
 
 def ground_areas(
     features: OsmFeatures, local: LocalMetres, dressed: bool
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields areas on the ground, such as lawns and water.
 
     If `dressed`, there are additional kinds of areas, such as sports grounds,
@@ -53,24 +53,26 @@ def ground_areas(
         if look is None or has_tag(tags, "building"):
             continue
         outlines = map(local.polygon, polygons)
-        yield from flat_structure(
-            f"land_{name}", look, outlines, features.faults
-        )
+        yield from flat_object(f"land_{name}", look, outlines, features.faults)
 
 
-def _plain_look(tags: Tags) -> Look | None:
+def _plain_look(tags: Tags) -> AreaLook | None:
     found = area_kind(tags)
     if found is None:
         return None
-    kind, semantic_class = found
+    object_type, semantic_class = found
     colours = {"WaterBody": WATER, "LandUse": LAWN}
-    narrower = green_kind(tags) if kind == "LandUse" else ""
-    return Look(
-        kind, semantic_class, colours.get(kind), _GROUND_LEVEL, narrower
+    kind = green_kind(tags) if object_type == "LandUse" else ""
+    return AreaLook(
+        object_type,
+        semantic_class,
+        colours.get(object_type),
+        _GROUND_LEVEL,
+        kind,
     )
 
 
-def _detailed_look(tags: Tags) -> Look | None:
+def _detailed_look(tags: Tags) -> AreaLook | None:
     if is_tunnel(tags) or tags.get("layer", "").startswith("-"):
         return None
     if tags.get("leisure") == "pitch":
@@ -78,7 +80,7 @@ def _detailed_look(tags: Tags) -> Look | None:
     if tags.get("amenity") == "parking":
         if tags.get("parking") in _NOT_ON_GROUND:
             return None
-        return Look("Parking", "parking", None, -0.03)
+        return AreaLook("Parking", "parking", None, -0.03)
     for look, entry in _LOOKS:
         if any(
             tags.get(key) in values.split()
@@ -89,7 +91,7 @@ def _detailed_look(tags: Tags) -> Look | None:
     return _plain_look(tags)
 
 
-def _pitch_look(tags: Tags) -> Look:
+def _pitch_look(tags: Tags) -> AreaLook:
     surface = tags.get("surface")
     sports = tags.get("sport", "").split(";")
     is_grass = surface in _GRASS_SURFACES or (

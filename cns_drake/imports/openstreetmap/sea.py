@@ -12,11 +12,11 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject
+from cns_drake.imports.openstreetmap.area_looks import flat_object
 from cns_drake.imports.openstreetmap.features import OsmWay
 from cns_drake.imports.openstreetmap.grounds import WATER_LOOK
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.looks import flat_structure
-from cns_drake.imports.structures import ImportedStructure
 
 # A coastline that ends within the city is extended by this length [m].
 _COAST_EXTENSION = 3000.0
@@ -34,7 +34,7 @@ def sea(
     local: LocalMetres,
     limits: np.ndarray,
     faults: ImportFaults,
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields the sea, to the right of the coastlines, if there are any.
 
     Args:
@@ -55,7 +55,7 @@ def sea(
     edges = shapely.union_all([whole.boundary, *cuts])
     areas = shapely.get_parts(shapely.polygonize([edges]))
     water = shapely.union_all([area for area in areas if _is_sea(area, lines)])
-    yield from flat_structure(
+    yield from flat_object(
         f"sea_{coasts[0].name}", WATER_LOOK, faces.parts_of(water), faults
     )
 

@@ -10,10 +10,11 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.imports import faces
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import StreetPlaces
+from cns_drake.imports.imported_objects import ImportedObject
+from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.bridges import Bridges
 from cns_drake.imports.openstreetmap.features import OsmFeatures, OsmWay, Tags
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
-from cns_drake.imports.openstreetmap.looks import Look, flat_structure
 from cns_drake.imports.openstreetmap.speed_tags import speed_limit
 from cns_drake.imports.openstreetmap.tags import has_tag
 from cns_drake.imports.openstreetmap.way_tags import (
@@ -25,15 +26,14 @@ from cns_drake.imports.openstreetmap.way_tags import (
     street_width,
 )
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
-from cns_drake.imports.structures import ImportedStructure
 
-_ROAD = Look("Road", "road", None, 0.0)
-_WALK = Look("Sidewalk", "sidewalk", None, KERB_HEIGHT)
+_ROAD = AreaLook("Road", "road", None, 0.0)
+_WALK = AreaLook("Sidewalk", "sidewalk", None, KERB_HEIGHT)
 
 
 def street_surfaces(
     features: OsmFeatures, local: LocalMetres, bridges: Bridges
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields the carriageways, their sidewalks, and paths for people.
 
     Tunnels, and bridges over streets or railways, are left out and counted as
@@ -66,12 +66,12 @@ def street_surfaces(
                 walks.append((f"{name}_{'lr'[side < 0]}", strip))
     paved = shapely.union_all([area for _, area in roads])
     for name, area in roads:
-        yield from flat_structure(
+        yield from flat_object(
             f"road_{name}", _ROAD, faces.parts_of(area), faults
         )
     for name, area in walks:
         areas = faces.parts_of(area.difference(paved))
-        yield from flat_structure(f"walk_{name}", _WALK, areas, faults)
+        yield from flat_object(f"walk_{name}", _WALK, areas, faults)
 
 
 def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:

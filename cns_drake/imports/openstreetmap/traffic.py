@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.foreign_city import StreetPlaces
+from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.signals import (
     junctions_with_signals,
     with_signals,
@@ -21,7 +22,6 @@ from cns_drake.imports.openstreetmap.street_lanes import (
 from cns_drake.imports.openstreetmap.walkways import find_walkways
 from cns_drake.imports.options import DriveOn
 from cns_drake.imports.streets import Street
-from cns_drake.imports.structures import ImportedStructure
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_file import lane_text
 from cns_drake.traffic.lane_joining import join_lanes
@@ -39,21 +39,21 @@ _HIGHEST_OBSTACLE = 3.5
 def lane_text_of_streets(
     streets: Sequence[Street],
     places: StreetPlaces,
-    structures: Sequence[ImportedStructure],
-    added: Sequence[ImportedStructure],
+    objects: Sequence[ImportedObject],
+    added: Sequence[ImportedObject],
     drives: Sequence[WaypointRoute],
     drive_on: DriveOn,
 ) -> str | None:
     """Returns the text of a lane file; None if there is no lane to drive on.
 
     The file contains the streets within 300 m of the drives. The file also
-    lists objects, such as parked cars, that were added beside the streets and
+    lists details, such as parked cars, that were added beside the streets and
     stand in a lane.
 
     Args:
         streets: streets from the imported file.
         places: crossings, traffic signals and footpaths.
-        structures: structures from the imported file.
+        objects: objects from the imported file.
         added: objects that were added to the imported file.
         drives: the drives, near which there is traffic.
         drive_on: side of the road on which traffic keeps.
@@ -70,7 +70,7 @@ def lane_text_of_streets(
     if not near:
         return None
     walks = find_walkways(
-        near, places.paths, places.crossed, _sidewalks(structures, paths)
+        near, places.paths, places.crossed, _sidewalks(objects, paths)
     )
     surface = shapely.union_all(
         [
@@ -81,7 +81,7 @@ def lane_text_of_streets(
     )
     side = 1.0 if drive_on == "right" else -1.0
     traffic = make_traffic_lanes(near, set(walks.crossings), surface, side)
-    free = _are_free(traffic, structures)
+    free = _are_free(traffic, objects)
     outer = traffic.beside
     graph = join_lanes(
         traffic.lanes,
@@ -98,11 +98,13 @@ def lane_text_of_streets(
 
 
 def _sidewalks(
-    structures: Iterable[ImportedStructure], paths: BaseGeometry
+    objects: Iterable[ImportedObject], paths: BaseGeometry
 ) -> BaseGeometry:
     """Returns the area of sidewalks near drives."""
     triangles = [
-        one.triangles[:, :, :2] for one in structures if one.kind == "Sidewalk"
+        one.triangles[:, :, :2]
+        for one in objects
+        if one.object_type == "Sidewalk"
     ]
     if not triangles:
         return shapely.Polygon()
@@ -115,15 +117,15 @@ def _sidewalks(
 
 
 def _are_free(
-    traffic: StreetTraffic, structures: Iterable[ImportedStructure]
+    traffic: StreetTraffic, objects: Iterable[ImportedObject]
 ) -> np.ndarray:
     """Returns (L,) bool: whether no structure of the file blocks a lane."""
     solid = [
         one.triangles
-        for one in structures
+        for one in objects
         if not one.is_ground
-        and one.kind not in ("Sidewalk", "Lane mark")
-        and not one.kind.startswith("Water")
+        and one.object_type not in ("Sidewalk", "Lane mark")
+        and not one.object_type.startswith("Water")
     ]
     free = np.ones(len(traffic.lanes), bool)
     if not solid:
@@ -147,7 +149,7 @@ def _driven_area(points: np.ndarray) -> BaseGeometry:
 
 
 def _in_the_way(
-    graph: lane_graph.LaneGraph, added: Sequence[ImportedStructure]
+    graph: lane_graph.LaneGraph, added: Sequence[ImportedObject]
 ) -> list[str]:
     """Returns the names of objects that stand where vehicles drive."""
     if not added:

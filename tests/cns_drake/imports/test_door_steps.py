@@ -58,8 +58,8 @@ def test_floors_rise_with_the_paving(shops):
     ground[..., 2] = 0.1 + slope * ground[..., 0]
     for paving, least in ((ground, 0.03), (ground[:0], -1.0)):
         result = dress_buildings(
-            city.structures, [drive], city.streets,
-            ground_of(city.structures), 0, None, paving,
+            city.objects, [drive], city.streets,
+            ground_of(city.objects), 0, None, paving,
         )  # fmt: skip
         floors = low_floors(result.buildings.values()).reshape(-1, 3)
         above = floors[:, 2] - (0.1 + slope * floors[:, 0])
@@ -77,11 +77,13 @@ def test_floors_lie_above_paved_gaps(shops):
     staged = stage_city("a.osm", city, ImportOptions())
     ground = ground_of(staged.kept, True)
     result = dress_city(staged, city, [drive], ground, 0)
-    walks = [one for one in result.city.kept if one.kind == "Sidewalk"]
+    walks = [one for one in result.city.kept if one.object_type == "Sidewalk"]
     assert any("gap" in one.structure.name for one in walks)
     sides = UpperSides(turned_up(np.concatenate([w.triangles for w in walks])))
     buildings = [
-        one for one in result.city.kept if one.kind.startswith("Building")
+        one
+        for one in result.city.kept
+        if one.object_type.startswith("Building")
     ]
     floors = low_floors(buildings)
     front = floors.reshape(-1, 3)[:, :2] - [0.0, 0.1]

@@ -19,7 +19,7 @@ from cns_drake.city.geometry import Finish
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.upper_sides import UpperSides
 from cns_drake.command_line.cli import app
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing.dressed_buildings import dress_buildings
 from cns_drake.imports.dressing.facade_pieces import add_facade
 from cns_drake.imports.dressing.facade_plan import plan_facade, with_doors
@@ -68,8 +68,8 @@ def surfaces(one):
 
 def dressed(city, path=STREET, seed=0):
     drives = [WaypointRoute(path, path)]
-    ground = ground_of(city.structures)
-    result = dress_buildings(city.structures, drives, (), ground, seed)
+    ground = ground_of(city.objects)
+    result = dress_buildings(city.objects, drives, (), ground, seed)
     names = {one.structure.name: one for one in result.buildings}
     return {k: result.buildings[v] for k, v in names.items()}, result
 
@@ -114,7 +114,7 @@ def fronts(one, parts):
 
 def test_recesses_take_their_volume_and_nothing_else(row):
     after, _ = dressed(row)
-    for one in row.structures:
+    for one in row.objects:
         parts = surfaces(after[one.structure.name])
         closed = [
             parts[name]
@@ -135,7 +135,7 @@ def test_recesses_take_their_volume_and_nothing_else(row):
 
 def test_walls_stay_where_the_file_has_them(row):
     after, _ = dressed(row)
-    for one in row.structures:
+    for one in row.objects:
         parts = surfaces(after[one.structure.name])
         panels = find_panels([one.triangles[is_upright(one.triangles)]])
         before = sum(area(p.triangles) for p in panels)
@@ -151,11 +151,11 @@ def test_walls_stay_where_the_file_has_them(row):
 
 def test_a_wall_against_a_neighbour_has_no_windows(row):
     after, _ = dressed(row)
-    left, right = (row.structures[k].structure.name for k in (0, 1))
+    left, right = (row.objects[k].structure.name for k in (0, 1))
     for name, side in ((left, 1), (right, -1)):
         parts = surfaces(after[name])
         x = np.concatenate([parts["glass"], parts["doors"]])[:, :, 0]
-        wall = row.structures[0].triangles[:, :, 0].max()
+        wall = row.objects[0].triangles[:, :, 0].max()
         assert (np.abs(x - wall) > 0.4).all()
         # The far side of the same house has windows.
         assert (np.abs(x - (wall - 20.0 * side)).max(axis=1) < 0.5).any()
@@ -163,11 +163,11 @@ def test_a_wall_against_a_neighbour_has_no_windows(row):
 
 def test_tags_win(row):
     after, result = dressed(row)
-    model = after[row.structures[4].structure.name].structure.model
+    model = after[row.objects[4].structure.name].structure.model
     colours = {part.name: part.rgb for part in model.parts}
     assert colours["body"] == (1.0, 0.0, 0.0)
     assert result.by_file == {"levels": 2, "use": 4, "wall": 1}
-    parts = surfaces(after[row.structures[0].structure.name])
+    parts = surfaces(after[row.objects[0].structure.name])
     lowest = np.sort(parts["glass"][:, :, 2].min(axis=1).round(2))
     # Five storeys of three metres, as the file says.
     assert len(np.unique(np.floor(lowest / 3.0))) == 5
@@ -214,7 +214,7 @@ def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
     after, _ = dressed(row)
     again, _ = dressed(row)
     other, _ = dressed(row, seed=1)
-    name = row.structures[2].structure.name
+    name = row.objects[2].structure.name
 
     def look(found):
         return surfaces(found[name]), [
@@ -226,13 +226,13 @@ def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
     for part, triangles in first[0].items():
         np.testing.assert_array_equal(triangles, second[0][part])
     alone = dressed(
-        type(row)([row.structures[2]], row.origin, "", ImportFaults())
+        type(row)([row.objects[2]], row.origin, "", ImportFaults())
     )[0]
     assert look(alone)[1] == first[1]
 
 
 def test_a_lower_house_has_the_colours_of_the_whole_one(row):
-    city = type(row)(row.structures, row.origin, "", ImportFaults())
+    city = type(row)(row.objects, row.origin, "", ImportFaults())
     staged, changes = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
     assert changes["part_of_height"]
     drives = [WaypointRoute(STREET, STREET)]
@@ -257,7 +257,7 @@ def test_only_what_drives_see_from_near_has_windows(tmp_path):
     path = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -40.0)])
     after, _ = dressed(city, path)
     glass = surfaces(after[f"building_w{near}"])["glass"]
-    y = city.structures[0].triangles[:, :, 1]
+    y = city.objects[0].triangles[:, :, 1]
     # The rear is invisible.
     assert glass[:, :, 1].max() < y.min() + 11.0
     assert (glass[:, :, 1] < y.min() + 0.5).any()
@@ -273,14 +273,14 @@ def test_a_house_behind_one_that_always_stands_has_no_windows(
     osm.box(-40, 0, 80, 8, building="yes", height="30")
     behind = osm.box(-8, 20, 16, 10, building="yes", height="9")
     city = read(osm, tmp_path)
-    low = city.structures[0].triangles.min(axis=(0, 1))
+    low = city.objects[0].triangles.min(axis=(0, 1))
     path = STREET * [0.2, 1.0] + low[:2] + [40.0, 6.0]
-    always = city.structures if is_lasting else city.structures[1:]
+    always = city.objects if is_lasting else city.objects[1:]
     result = dress_buildings(
-        city.structures,
+        city.objects,
         [WaypointRoute(path, path)],
         (),
-        ground_of(city.structures),
+        ground_of(city.objects),
         0,
         always,
     )
@@ -295,9 +295,7 @@ def test_nothing_hangs_in_the_way_of_a_drive(tmp_path):
         osm.box(20 * k, 0, 20, 10, building="apartments", building__levels="4")
     osm.box(0, 30, 20, 10, building="retail", height="9")
     city = read(osm, tmp_path)
-    low = np.min(
-        [o.triangles.min(axis=(0, 1)) for o in city.structures], axis=0
-    )
+    low = np.min([o.triangles.min(axis=(0, 1)) for o in city.objects], axis=0)
     x = np.linspace(low[0], low[0] + 240, 60)
     path = np.column_stack([x, np.full(60, low[1] - 2.0)])
     after, result = dressed(city, path)
@@ -316,7 +314,7 @@ def test_models_with_windows_of_their_own_keep_them(tmp_path):
     city.box("own", 30, 0, (12, 12, 9))
     city.objects["own"]["geometry"][0]["lod"] = "3"
     found = import_cityjson(city.write(tmp_path / "c.json"), None, None)
-    low = np.min([o.triangles.min(axis=(0, 1)) for o in found.structures], 0)
+    low = np.min([o.triangles.min(axis=(0, 1)) for o in found.objects], 0)
     path = STREET + low[:2] + [0.0, 4.0]
     after, _ = dressed(found, path)
     assert "glass" in surfaces(after["plain"])

@@ -20,9 +20,9 @@ from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.import_map import import_city
+from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.overview import draw_overview
-from cns_drake.imports.structures import make_imported
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
@@ -246,9 +246,7 @@ def test_years_that_change_nothing(tmp_path, dates):
 @pytest.mark.usefixtures("overviews")
 def test_the_picture_shows_both_drives_where_they_share_a_street(tmp_path):
     triangle = np.array([[[0.0, 0, 0], [40.0, 0, 0], [0, 40.0, 0]]])
-    house = make_imported(
-        "house", "building", "Building", {"all": triangle}, {}
-    )
+    house = make_object("house", "building", "Building", {"all": triangle}, {})
     way = np.column_stack([np.linspace(-10.0, 50.0, 31), np.full(31, 30.0)])
     drives = [WaypointRoute(way[k : k + 20], way[k : k + 20]) for k in (0, 11)]
     path = tmp_path / "from_above.png"

@@ -141,7 +141,7 @@ def test_streets_have_width_and_sidewalks(tmp_path):
     osm.way([(-50, 8), (50, 8)], highway="primary", tunnel="yes")
     osm.way([(-50, 9), (50, 9)], railway="rail")
     _, found = import_osm(osm.write(tmp_path / "city.osm"))
-    kinds = {one.kind for one in found.values()}
+    kinds = {one.object_type for one in found.values()}
     assert kinds == {"Building", "Road", "Sidewalk"}
     low, high = bounds(found[f"road_w{road}"])
     assert high[1] - low[1] == pytest.approx(6.5, abs=0.01)
@@ -153,7 +153,7 @@ def test_streets_have_width_and_sidewalks(tmp_path):
     (path,) = (
         one
         for name, one in found.items()
-        if one.kind == "Sidewalk" and not name.endswith("_l")
+        if one.object_type == "Sidewalk" and not name.endswith("_l")
     )
     xy = path.triangles.reshape(-1, 3)[:, 1] - middle
     assert not ((xy > -3.2) & (xy < 3.2)).any()
@@ -174,7 +174,7 @@ def test_trees_water_and_hedges(tmp_path):
         for part in tree.model.parts
     ]
     assert max(tops) == pytest.approx(9.0, abs=0.02)
-    assert found[f"land_w{water}"].kind == "WaterBody"
+    assert found[f"land_w{water}"].object_type == "WaterBody"
     assert bounds(found[f"hedge_w{hedge}"])[1][2] == 1.5
 
 
@@ -310,7 +310,7 @@ def test_a_town_on_both_sides_of_the_180th_meridian(tmp_path, houses):
     path.write_text(f'<osm version="0.6">{"".join(nodes + ways)}</osm>')
     city = import_openstreetmap(path, None)
     x, y = np.sort(
-        [one.triangles[:, :, :2].mean(axis=(0, 1)) for one in city.structures],
+        [one.triangles[:, :, :2].mean(axis=(0, 1)) for one in city.objects],
         axis=0,
     ).T
     metres = 111_320.0 * np.cos(np.radians(houses[0][1]))

@@ -22,7 +22,7 @@ def area(one):
 
 
 def kinds(city):
-    return {one.structure.name: one.kind for one in city.structures}
+    return {one.structure.name: one.object_type for one in city.objects}
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
     dressed, bare = read(osm, tmp_path), read(osm, tmp_path, dressed=False)
     assert kinds(dressed).get(name) == kind
     assert kinds(bare).get(name) == plain
-    for one in dressed.structures:
+    for one in dressed.objects:
         if one.structure.name == name:
             assert area(one) == pytest.approx(600.0, abs=1.0)
             assert (one.triangles[:, :, 2] < 0.0).all()
@@ -86,7 +86,7 @@ def test_kinds_are_those_of_the_tags(tmp_path, building, land, expected):
     osm.box(0, 0, 10, 10, **building)
     osm.box(20, 0, 30, 20, **land)
     for dressed in (False, True):
-        found = read(osm, tmp_path, dressed).structures
+        found = read(osm, tmp_path, dressed).objects
         assert [one.structure.kind for one in found] == expected
 
 
@@ -99,7 +99,9 @@ def test_a_multipolygon_of_a_path_is_an_area(tmp_path):
         type="multipolygon",
         highway="pedestrian",
     )
-    (one,) = (o for o in read(osm, tmp_path).structures if o.kind == "Square")
+    (one,) = (
+        o for o in read(osm, tmp_path).objects if o.object_type == "Square"
+    )
     assert one.structure.name == f"land_r{square}"
     assert area(one) == pytest.approx(500.0, abs=1.0)
 
@@ -115,15 +117,15 @@ def test_the_ground_looks_upwards(tmp_path):
     )
     surfaces = [
         o
-        for o in read(osm, tmp_path).structures
-        if o.is_ground or o.kind == "Sidewalk"
+        for o in read(osm, tmp_path).objects
+        if o.is_ground or o.object_type == "Sidewalk"
     ]
-    assert {o.kind for o in surfaces} == {
+    assert {o.object_type for o in surfaces} == {
         "LandUse", "Road", "Sidewalk", "Crossing"
     }  # fmt: skip
     for one in surfaces:
         a, b, c = np.moveaxis(one.triangles, 1, 0)
-        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all(), one.kind
+        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all(), one.object_type
 
 
 def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
@@ -131,7 +133,7 @@ def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
     osm.box(0, 0, 10, 10, building="yes")
     lawn = osm.box(20, 0, 9, 9, leisure="pitch", sport="soccer")
     hard = osm.box(40, 0, 9, 9, leisure="pitch", sport="basketball")
-    found = {o.structure.name: o for o in read(osm, tmp_path).structures}
+    found = {o.structure.name: o for o in read(osm, tmp_path).objects}
     assert found[f"land_w{lawn}"].structure.semantic_class == "terrain"
     assert found[f"land_w{hard}"].structure.semantic_class == "other-ground"
 
@@ -150,7 +152,7 @@ def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
     island = [(0, -60), (20, -60), (20, -40), (0, -40)]
     osm.way(island, closed=True, natural="coastline")
     city = read(osm, tmp_path)
-    (sea,) = (o for o in city.structures if o.structure.name[:4] == "sea_")
+    (sea,) = (o for o in city.objects if o.structure.name[:4] == "sea_")
     half = 220.0 * 110.0
     expected = half - 400.0 if is_eastward else half
     assert area(sea) == pytest.approx(expected, rel=0.01)
@@ -179,7 +181,7 @@ def test_bridges_are_level_or_left_out(tmp_path):
     assert faults["bridge over a street or railway, left out"] == 1
     assert faults["tunnel, left out"] == 1
     assert not any(kind.startswith("highway=") for kind in faults)
-    (wall,) = (o for o in city.structures if o.kind == "Parapet")
+    (wall,) = (o for o in city.objects if o.object_type == "Parapet")
     x = wall.triangles[:, :, 0] - city.streets[-1].line[0, 0]
     # 0.2 m beside a carriageway of 10 m, 0.25 m thick.
     assert np.abs(x).min() == pytest.approx(5.075, abs=0.02)
@@ -210,7 +212,9 @@ def test_the_upper_one_of_two_bridges_is_left_out(tmp_path, layers, upper):
         tags = {"layer": layer} if layer is not None else {}
         names.append(osm.way(line, highway="primary", bridge="yes", **tags))
     city = read(osm, tmp_path)
-    built = {o.structure.name for o in city.structures if o.kind != "Building"}
+    built = {
+        o.structure.name for o in city.objects if o.object_type != "Building"
+    }
     (out,) = (n for n in names if f"road_w{n}" not in built)
     assert upper is None or out == names[upper]
     names.remove(out)

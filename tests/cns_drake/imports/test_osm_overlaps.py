@@ -17,7 +17,7 @@ NESTED = "building inside another one, taken as its part"
 
 def read(osm, path, dressed=True):
     city = import_openstreetmap(osm.write(path / "a.osm"), None, dressed)
-    buildings = [one for one in city.structures if one.kind == "Building"]
+    buildings = [one for one in city.objects if one.object_type == "Building"]
     kinds = {kind: (number, name) for kind, number, name in city.faults.rows()}
     return {one.structure.name: one for one in buildings}, kinds
 

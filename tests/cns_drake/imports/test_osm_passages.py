@@ -15,7 +15,7 @@ def read(osm, tmp_path, dressed=False):
         for y in (-200, 199):
             osm.box(x, y, 1, 1, building="yes")
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, dressed)
-    return city, {one.structure.name: one for one in city.structures}
+    return city, {one.structure.name: one for one in city.objects}
 
 
 def faults_of(city):

@@ -62,7 +62,7 @@ def lanes_of(path, tmp_path, side="right", added=()):
     text = lane_text_of_streets(
         city.streets,
         city.street_places,
-        city.structures,
+        city.objects,
         added,
         [drive],
         side,
@@ -85,7 +85,9 @@ def lines(graph):
 
 
 def surface(city, kind="Road"):
-    triangles = [one.triangles for one in city.structures if one.kind == kind]
+    triangles = [
+        one.triangles for one in city.objects if one.object_type == kind
+    ]
     flat = np.concatenate(triangles)[:, :, :2]
     return shapely.union_all(shapely.polygons(flat), grid_size=0.001)
 
@@ -301,7 +303,7 @@ def test_no_lanes_without_streets_near_the_drives(tmp_path):
         found = lane_text_of_streets(
             streets,
             city.street_places,
-            city.structures,
+            city.objects,
             (),
             [drive],
             "right",

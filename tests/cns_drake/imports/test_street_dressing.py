@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.models import part_triangles
 from cns_drake.city.geometry.object_models import HEADROOM
 from cns_drake.city.ground.coverings import GROUND_TAG
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing import dressed_city
 from cns_drake.imports.dressing.dressed_city import dress_city
 from cns_drake.imports.dressing.kerbs import with_kerb
@@ -55,14 +55,14 @@ def drive_of(city, y=2.25):
 
 
 def dressed(city, seed=0):
-    ground = ground_of(city.structures)
+    ground = ground_of(city.objects)
     return dress_streets(
-        city.structures,
+        city.objects,
         city.small_objects,
         city.streets,
         [drive_of(city)],
         ground,
-        ground_structures(city.structures, ground),
+        ground_structures(city.objects, ground),
         seed,
     )
 
@@ -104,7 +104,7 @@ def test_things_of_the_file_stand_at_their_place(tmp_path):
     osm.way([(-60, -8.5), (60, -8.5)], natural="tree_row")
     city = read(osm, tmp_path)
     found = dressed(city)
-    placed = {one.structure.name: one.structure for one in found.structures}
+    placed = {one.structure.name: one.structure for one in found.objects}
     at = placed[f"lamp_post_n{lamp}"]
     np.testing.assert_allclose(
         at.xyz[:2], origin(city) + np.array([10, -6]), atol=0.01
@@ -136,13 +136,13 @@ def test_things_stand_on_the_ground_below_them(tmp_path):
         osm.node(x, 6.5, amenity="bench")
         osm.node(x + 6, -4.5, amenity="waste_basket")
     city = read(osm, tmp_path)
-    ground = [one.structure for one in city.structures if one.is_ground]
-    ground += ground_structures(city.structures, ground_of(city.structures))
-    walks = [o.structure for o in city.structures if o.kind == "Sidewalk"]
+    ground = [one.structure for one in city.objects if one.is_ground]
+    ground += ground_structures(city.objects, ground_of(city.objects))
+    walks = [o.structure for o in city.objects if o.object_type == "Sidewalk"]
     check_things_stand_on_the_ground(
         [
             *(replace(one, tags=(GROUND_TAG,)) for one in [*ground, *walks]),
-            *(one.structure for one in dressed(city).structures),
+            *(one.structure for one in dressed(city).objects),
         ]
     )
 
@@ -156,10 +156,10 @@ def test_nothing_stands_in_the_way_or_in_each_other(tmp_path):
     found = dressed(city)
     path = LineString(drive_of(city).path)
     assert found.at_random["Parked vehicles"] > 5
-    for one in found.structures:
+    for one in found.objects:
         xy = corners(one.structure)
         assert min(path.distance(Point(p)) for p in xy) > 1.5
-    outlines = [one.structure.footprint_W for one in found.structures]
+    outlines = [one.structure.footprint_W for one in found.objects]
     for a, b in combinations(outlines, 2):
         assert not a.intersects(b)
 
@@ -174,7 +174,7 @@ def test_cars_park_where_they_may(tmp_path, tags, parks):
     osm = OsmWriter()
     write_street(osm, **tags)
     found = dressed(read(osm, tmp_path))
-    classes = {one.structure.semantic_class for one in found.structures}
+    classes = {one.structure.semantic_class for one in found.objects}
     assert (
         ("car" in classes) == parks == (found.at_random["Parked vehicles"] > 0)
     )
@@ -187,7 +187,7 @@ def test_a_car_park_has_cars_within_it(tmp_path):
     city = read(osm, tmp_path)
     cars = [
         one.structure
-        for one in dressed(city).structures
+        for one in dressed(city).objects
         if one.structure.semantic_class == "car"
     ]
     assert len(cars) > 5
@@ -205,7 +205,7 @@ def test_lots_do_not_depend_on_each_other(tmp_path):
     names = [
         [
             (o.structure.name, o.structure.xyz)
-            for o in dressed(city, seed).structures
+            for o in dressed(city, seed).objects
         ]
         for seed in (0, 0, 1)
     ]
@@ -220,7 +220,7 @@ def test_sidewalks_are_added_where_the_file_is_silent(tmp_path):
     osm.box(-5, 200, 9, 9, building="yes")
     city = read(osm, tmp_path)
     drives = [drive_of(city)]
-    (walk,) = missing_sidewalks(city.structures, city.streets, drives)
+    (walk,) = missing_sidewalks(city.objects, city.streets, drives)
     a, b, c = np.moveaxis(walk.triangles, 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
     # Two strips, and around both ends half a ring of 16 corners.
@@ -297,7 +297,7 @@ def test_only_cars_stand_on_another_street(tmp_path):
     on_it = osm.node(13.5, -4.2, highway="street_lamp")
     beside = osm.node(20, -5.5, highway="street_lamp")
     found = dressed(read(osm, tmp_path))
-    names = {one.structure.name for one in found.structures}
+    names = {one.structure.name for one in found.objects}
     assert f"lamp_post_n{beside}" in names
     assert f"lamp_post_n{on_it}" not in names
 
@@ -321,8 +321,8 @@ def test_terrain_of_a_dense_city_is_paved_by_default(tmp_path):
         staged = stage_city(path, found, ImportOptions())
         below = ground_of(staged.kept)
         result = dress_city(staged, found, [], below, 0).city.kept
-        (terrain,) = (o for o in result if o.kind == "TINRelief")
-        (before,) = (o for o in staged.kept if o.kind == "TINRelief")
+        (terrain,) = (o for o in result if o.object_type == "TINRelief")
+        (before,) = (o for o in staged.kept if o.object_type == "TINRelief")
         same = terrain.structure.model.parts == before.structure.model.parts
         assert same is is_told
 

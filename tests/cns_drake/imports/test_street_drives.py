@@ -224,7 +224,7 @@ def test_zebra_crossings_have_stripes(tmp_path):
     ]
     osm.way_of(nodes, highway="residential", width="7")
     city = import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
-    (one,) = (o for o in city.structures if o.kind == "Crossing")
+    (one,) = (o for o in city.objects if o.object_type == "Crossing")
     assert one.structure.semantic_class == "road"
     a, b, c = np.moveaxis(one.triangles, 1, 0)
     normals = np.cross(b - a, c - a)

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from shapely.geometry import LineString, box
 
-from cns_drake.imports.cityjson.structures import import_cityjson
+from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing.guessed_streets import guessed_streets
 from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
@@ -41,7 +41,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive().path + origin
-    found = list(paved_gaps(city.structures, [WaypointRoute(path, path)]))
+    found = list(paved_gaps(city.objects, [WaypointRoute(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     # The other walk is 4.5 m away from the carriageway.
@@ -59,7 +59,7 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
         assert one.structure.semantic_class == "sidewalk"
         np.testing.assert_allclose(one.triangles[..., 2], 0.12)
     far = path + np.array([0.0, 500.0])
-    assert not list(paved_gaps(city.structures, [WaypointRoute(far, far)]))
+    assert not list(paved_gaps(city.objects, [WaypointRoute(far, far)]))
 
 
 @pytest.mark.parametrize(("gap", "is_paved"), [(0.15, True), (0.06, False)])
@@ -73,7 +73,7 @@ def test_joints_of_walks_are_paved(tmp_path, gap, is_paved):
     city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
     origin = city.streets[0].line.mean(axis=0)
     path = straight_drive(start=-50.0, end=50.0).path + origin
-    found = list(paved_gaps(city.structures, [WaypointRoute(path, path)]))
+    found = list(paved_gaps(city.objects, [WaypointRoute(path, path)]))
     area = shapely.union_all([outline(one) for one in found])
     area = shapely.transform(area, lambda xy: xy - origin)
     joint = box(-55, 9.0, 55, 9.0 + gap)
@@ -108,15 +108,15 @@ def test_streets_are_laid_on_the_ground_below_drives(tmp_path, has_terrain):
     path = drive.path - low[:2]
     made = list(
         guessed_streets(
-            found.structures,
+            found.objects,
             [WaypointRoute(path, path)],
-            ground_of(found.structures),
+            ground_of(found.objects),
         )
     )
     by_kind = {"Road": [], "Sidewalk": []}
     for one in made:
-        by_kind[one.kind].append(one)
-        above = {"Road": 0.02, "Sidewalk": 0.12}[one.kind]
+        by_kind[one.object_type].append(one)
+        above = {"Road": 0.02, "Sidewalk": 0.12}[one.object_type]
         x, y, z = np.moveaxis(one.triangles + low, 2, 0)
         np.testing.assert_allclose(z - height(x, y), above, atol=2e-3)
         a, b, c = np.moveaxis(one.triangles, 1, 0)

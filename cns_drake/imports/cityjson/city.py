@@ -1,4 +1,4 @@
-"""Makes structures from the objects of a CityJSON file."""
+"""Imports a city from a CityJSON file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Finish
-from cns_drake.imports import colours, structures
+from cns_drake.imports import colours
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.cityjson.city_file import (
     CityFile,
@@ -23,7 +23,7 @@ from cns_drake.imports.cityjson.reading import read_cityjson
 from cns_drake.imports.faces import face_triangles, joined_triangles
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
-from cns_drake.imports.structures import ImportedStructure
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
@@ -71,7 +71,7 @@ def import_cityjson(
     low, high = city.bounds()
     origin = np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
     return ForeignCity(
-        import_structures(city, origin, lod, year_attribute),
+        import_objects(city, origin, lod, year_attribute),
         tuple(origin.tolist()),
         city.system.name,
         city.faults,
@@ -79,15 +79,15 @@ def import_cityjson(
     )
 
 
-def import_structures(
+def import_objects(
     city: CityFile,
     origin: np.ndarray,
     lod: float | None,
     year_attribute: str | None,
-) -> list[ImportedStructure]:
-    """Returns a structure for each object that has a surface.
+) -> list[ImportedObject]:
+    """Returns the objects of a file that have a surface.
 
-    A building and its parts become one structure.
+    A building and its parts become one object.
 
     Args:
         city: the content of the file.
@@ -110,16 +110,16 @@ def import_structures(
             city.faults.add(f"{kind}, left out", root)
             continue
         name = names[root]
-        semantic_class, finish = _class_of(first.kind)
+        semantic_class, finish = _class_of(first.object_type)
         years = [
             construction_year(one.attributes, year_attribute, name, city.faults)
             for one in members
         ]
         found.append(
-            structures.make_imported(
+            make_object(
                 name,
                 semantic_class,
-                first.kind,
+                first.object_type,
                 surfaces,
                 {"body": finish, "roof": colours.RED_ROOF},
                 next((year for year in years if year is not None), None),
@@ -150,7 +150,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
                 for p in city.objects[root].parents
                 if p in city.objects
                 # A group is not one structure: it may contain half a city.
-                and city.objects[p].kind != "CityObjectGroup"
+                and city.objects[p].object_type != "CityObjectGroup"
             ]
             if not parents or parents[0] in seen:
                 break
@@ -222,7 +222,7 @@ def _is_building_body(one: CityObject) -> bool:
 
     The other children of a building are installations such as balconies.
     """
-    return not one.parents or one.kind.endswith("Part")
+    return not one.parents or one.object_type.endswith("Part")
 
 
 def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:

@@ -1,4 +1,4 @@
-"""Structures that fill areas on the ground, and how they look."""
+"""Objects that fill areas on the ground, and how they look."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -11,38 +11,38 @@ from cns_drake.city.geometry import Finish
 from cns_drake.imports import faces
 from cns_drake.imports.colours import Rgb
 from cns_drake.imports.faults import ImportFaults
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.solids import extruded
-from cns_drake.imports.structures import ImportedStructure, make_imported
 
 
-class Look(NamedTuple):
+class AreaLook(NamedTuple):
     """How an area on the ground is built and looks.
 
     Attributes:
-        kind: kind of the area, such as Sidewalk.
+        object_type: type of the area, such as Sidewalk.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         rgb: colour; None for the colour of the class.
         z: height of the upper side [m].
-        narrower: what the area is, if its tags say more than `kind`, such as
+        kind: what the area is, if its tags say more than the type, such as
             `park`.
     """
 
-    kind: str
+    object_type: str
     semantic_class: str
     rgb: Rgb | None
     z: float
-    narrower: str = ""
+    kind: str = ""
 
 
-def flat_structure(
-    name: str, look: Look, areas: Iterable[Polygon], faults: ImportFaults
-) -> Iterator[ImportedStructure]:
+def flat_object(
+    name: str, look: AreaLook, areas: Iterable[Polygon], faults: ImportFaults
+) -> Iterator[ImportedObject]:
     """Yields one level surface that fills areas; nothing for empty areas.
 
     Args:
         name: name of the surface: a word, an underscore, and the id of the
             element in the file.
-        look: kind, class, colour and height of the surface.
+        look: type, class, colour and height of the surface.
         areas: the areas in W [m].
         faults: counts parts that were repaired or left out.
     """
@@ -53,20 +53,20 @@ def flat_structure(
         for polygon in faces.valid_parts(area, source, faults)
     ]
     if surface:
-        yield _structure_with_look(name, look, "surface", surface)
+        yield _object_with_look(name, look, "surface", surface)
 
 
-def raised_structure(
+def raised_object(
     name: str,
-    look: Look,
+    look: AreaLook,
     areas: Iterable[BaseGeometry],
     source: tuple[str, ImportFaults],
-) -> Iterator[ImportedStructure]:
+) -> Iterator[ImportedObject]:
     """Yields one solid on the ground that fills areas, if there are any.
 
     Args:
         name: name of the solid.
-        look: kind, class, colour and height of the solid.
+        look: type, class, colour and height of the solid.
         areas: the areas in W [m].
         source: pair of the element's id in the file, for messages, and the
             fault counter that counts invalid areas.
@@ -78,20 +78,20 @@ def raised_structure(
         for polygon in faces.valid_parts(part, *source)
     ]
     if solids:
-        yield _structure_with_look(name, look, "body", solids)
+        yield _object_with_look(name, look, "body", solids)
 
 
-def _structure_with_look(
-    name: str, look: Look, part: str, triangles: Sequence[np.ndarray]
-) -> ImportedStructure:
+def _object_with_look(
+    name: str, look: AreaLook, part: str, triangles: Sequence[np.ndarray]
+) -> ImportedObject:
     surfaces = {part: np.concatenate(triangles)}
-    material = "water" if look.kind == "WaterBody" else None
+    material = "water" if look.object_type == "WaterBody" else None
     finish = look.rgb and Finish(look.rgb, material)
-    return make_imported(
+    return make_object(
         name,
         look.semantic_class,
-        look.kind,
+        look.object_type,
         surfaces,
         {part: finish},
-        narrower=look.narrower,
+        kind=look.kind,
     )

@@ -1,4 +1,4 @@
-"""Structures made from the objects of a city's file."""
+"""The objects of an imported city, and the structures made from them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,25 +24,29 @@ _GROUND_OF_CARS = GROUND_CLASSES - {"sidewalk"}
 # Compared by identity, because there are thousands and comparing meshes takes
 # long.
 @dataclass(frozen=True, eq=False)
-class ImportedStructure:
-    """A structure of an imported city, made from an object of its file.
+class ImportedObject:
+    """An object of an imported city, with the structure made from it.
+
+    The object comes from the city's file, or is a detail that was added to the
+    city. The structure is what is written to the map.
 
     Attributes:
         structure: the structure.
-        kind: type of the object in its file, such as Building.
-        year: year in which the structure was built; None if unknown.
+        object_type: type of the object, in the words of its file, such as
+            Building or WaterBody. The structure's kind may be more specific.
+        year: year in which the object was built; None if unknown.
         triangles: (M, 3, 3) all surfaces that a car could hit or drive over, in
             W [m].
-        until: year in which the structure was demolished; None if unknown.
+        until: year in which the object was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail; 0 if unknown.
         original: name of the structure of which this structure is a variant; ""
             if this structure is not a variant.
-        is_gone: whether the structure was demolished at an unknown date.
+        is_gone: whether the object was demolished at an unknown date.
     """
 
     structure: Structure
-    kind: str
+    object_type: str
     year: int | None
     triangles: np.ndarray
     until: int | None = None
@@ -53,7 +57,7 @@ class ImportedStructure:
 
     @property
     def draw_name(self) -> str:
-        """Name on which the random numbers for the structure depend.
+        """Name on which the random numbers for the object depend.
 
         A variant of a structure has the draw name of the original.
         """
@@ -61,15 +65,15 @@ class ImportedStructure:
 
     @property
     def is_building(self) -> bool:
-        """Whether the object in the file is a building or a part of one."""
-        return self.kind.startswith("Building")
+        """Whether the object is a building or a part of one."""
+        return self.object_type.startswith("Building")
 
     @property
     def num_own_triangles(self) -> int:
-        """Number of triangles that only this structure has.
+        """Number of triangles that only this object has.
 
         A building has its own meshes, and their triangles are counted, with all
-        details. Any other structure may share its meshes, as trees do.
+        details. Any other object may share its meshes, as trees do.
         Therefore, the triangles in its attribute `triangles` are counted.
         """
         if self.is_building:
@@ -85,34 +89,34 @@ class ImportedStructure:
         return self.structure.semantic_class in _GROUND_OF_CARS
 
 
-def make_imported(
+def make_object(
     name: str,
     semantic_class: str,
-    kind: str,
+    object_type: str,
     surfaces: Mapping[str, np.ndarray],
     finishes: Mapping[str, Finish | None],
     year: int | None = None,
     until: int | None = None,
     tags: Mapping[str, str] | None = None,
     lod: float = 0.0,
-    narrower: str = "",
-) -> ImportedStructure:
-    """Returns a structure made of triangles in the world.
+    kind: str = "",
+) -> ImportedObject:
+    """Returns an object whose structure is made of triangles in the world.
 
     Args:
         name: name of the structure, unique in the city.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
-        kind: type of the object in its file.
+        object_type: type of the object.
         surfaces: part of the surface -> triangles (M, 3, 3) [m]. Empty parts
             are left out; at least one part must not be empty.
         finishes: part of the surface -> its colour and material. Parts without
             an entry have the colour and material of the class.
-        year: year in which the structure was built; None if unknown.
-        until: year in which the structure was demolished; None if unknown.
+        year: year in which the object was built; None if unknown.
+        until: year in which the object was demolished; None if unknown.
         tags: tags of the object in its file.
         lod: level of detail of the object; 0 if unknown.
-        narrower: kind of the structure, if the file is more specific than the
-            type, such as `church` for a Building.
+        kind: what the structure is, such as `church` for a Building; by default
+            the object's type.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -131,10 +135,10 @@ def make_imported(
         semantic_class,
         model,
         (0.0, 0.0, 0.0),
-        kind=kind_word(narrower or kind),
+        kind=kind_word(kind or object_type),
     )
-    return ImportedStructure(
-        structure, kind, year, triangles, until, tags or {}, lod
+    return ImportedObject(
+        structure, object_type, year, triangles, until, tags or {}, lod
     )
 
 
@@ -147,15 +151,15 @@ def kind_word(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", words).strip("_")
 
 
-def boxes_of(structures: Sequence[ImportedStructure]) -> np.ndarray:
-    """Returns the bounding boxes (N, 2, 3) of structures [m].
+def boxes_of(objects: Sequence[ImportedObject]) -> np.ndarray:
+    """Returns the bounding boxes (N, 2, 3) of objects in W [m].
 
     Each box is given by its least and its greatest coordinates.
     """
     return np.array(
         [
             (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
-            for one in structures
+            for one in objects
         ]
     )
 
