@@ -14,7 +14,7 @@ import yaml
 from cns_drake.ageing.ageing_city import AgeingCity
 from cns_drake.ageing.events import Event
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.past_city import structures_in
+from cns_drake.ageing.past_city import past_structures
 from cns_drake.ageing.stage_writer import TODAY, StageWriter
 from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.years import check_years
@@ -162,7 +162,7 @@ def _write_stages(
     events: list[Event] = []
     for stage, year in stages.items():
         if year < 0:
-            standing, passed = structures_in(world, year)
+            standing, passed = past_structures(world, year)
             events += passed if year == min(stages.values()) else []
             writing.stage(stage, year, standing)
         while (now := city.standing.year) < year:

@@ -90,7 +90,7 @@ class Buildings:
 
     def _change(self, lot: AgeingLot, name: str) -> None:
         """Samples whether and how the building of a lot changes."""
-        if kinds.is_kept(self._standing.kind(name)):
+        if kinds.is_kept(self._standing.entry(name).kind):
             return
         for event, change in (
             ("demolished", self._demolish),
@@ -134,7 +134,7 @@ class Buildings:
         near = [
             standing.footprint(name)
             for name in standing.near(plot.area.buffer(PARTY_WALL))
-            if standing.semantic_class(name) == "building"
+            if standing.entry(name).semantic_class == "building"
         ]
         banned = self._archetype(replaced) if replaced else ""
         ending = f"{standing.year:03d}y_{lot.number:03d}"
@@ -151,22 +151,22 @@ class Buildings:
             fences = [
                 part
                 for part in lot.parts
-                if standing.semantic_class(part) == "fence"
+                if standing.entry(part).semantic_class == "fence"
             ]
             self._put_part(lot, one, "site", fences)
         standing.record("site", coming.name, f"site_{ending}")
 
     def _archetype(self, name: str) -> str:
         """Returns the archetype of a building, or else its kind."""
+        entry = self._standing.entry(name)
         # Generated buildings have their district and archetype as tags.
-        _, *archetype = self._world.tags(name) or ("",)
-        return archetype[-1] if archetype else self._standing.kind(name)
+        return entry.tags[-1] if len(entry.tags) > 1 else entry.kind
 
     def _clear(self, area: BaseGeometry) -> None:
         """Removes what stands in an area, except buildings."""
         standing = self._standing
         for name in standing.near(area):
-            kind = standing.semantic_class(name)
+            kind = standing.entry(name).semantic_class
             footprint = standing.footprint(name)
             inside = footprint.intersection(area).area > 0.5 * footprint.area
             is_loose = kind in (*_PASSING, "other-object", "vegetation")
@@ -323,7 +323,7 @@ class Buildings:
             for n in standing.near(
                 standing.footprint(name).buffer(0.4), (name, *lot.parts)
             )
-            if standing.semantic_class(n)
+            if standing.entry(n).semantic_class
             in ("building", "other-structure", "fence")
         ]
         insulated = alone and rng.uniform() < _INSULATED
@@ -346,7 +346,7 @@ class Buildings:
     def _may_have_balconies(self, lot: AgeingLot, name: str) -> bool:
         return (
             not lot.has_balconies
-            and kinds.is_dwelling(self._standing.kind(name))
+            and kinds.is_dwelling(self._standing.entry(name).kind)
             and lot.height >= _LEAST_WITH_BALCONIES
         )
 

@@ -136,7 +136,7 @@ def _free_lots(
     streets = world.streets
     solid = [
         one.footprint.buffer(PARTY_WALL)
-        for one in world.things.values()
+        for one in world.geometry.values()
         if one.semantic_class in ("building", "other-structure")
     ]
     open_ground = world.open_ground.difference(shapely.union_all(solid))

@@ -38,10 +38,10 @@ from cns_drake.scene.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.scene.surfaces import LARGEST_SIZE
 from cns_drake.scene.world import load_world
 from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.loaded_structures import (
-    LoadedPart,
-    LoadedStructure,
-    read_structures,
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
+    geometry_by_structure,
     triangle_corners,
 )
 
@@ -59,9 +59,12 @@ class OldWorld:
 
     Attributes:
         columns: names of the columns of the map's structure table.
-        rows: name of a structure -> its row in this table.
-        things: name of a structure -> the structure in W.
-        visuals: name of a structure -> SDF texts of its visuals.
+        rows: name of a structure -> its row in this table, in all stages of the
+            map.
+        geometry: name of a structure of the last stage -> its geometry in W,
+            with its entry in the table.
+        visuals: name of a structure of the last stage -> SDF texts of its
+            visuals.
         built: name of a structure -> year of construction, for structures whose
             year is in the table.
         today: calendar year of the stage; None if the table has no years.
@@ -85,18 +88,15 @@ class OldWorld:
         self._read_table()
         self.visuals = _read_visuals(self.path)
         self._world = load_world(self.path)
-        self._seen = read_structures(self._world)
+        self.geometry = geometry_by_structure(self._world)
+        if self.geometry.keys() != self.visuals.keys():
+            raise InputError(_not_one_model(self.path))
         self.built = {
             name: int(row[YEAR_COLUMN])
             for name, row in self.rows.items()
             if row.get(YEAR_COLUMN)
         }
         self.today = max(self.built.values(), default=None)
-        self.things = {
-            name: one
-            for name, one in self._seen.items()
-            if name in self.visuals
-        }
 
     def _read_table(self) -> None:
         path = self.folder.structures
@@ -113,12 +113,16 @@ class OldWorld:
                 number_within(row[name], LARGEST_SIZE, f"{where}: {name}")
         self.rows = {row["name"]: row for _, row in records}
 
-    def of_class(self, *classes: str) -> list[LoadedStructure]:
-        """Returns the structures of some classes, sorted by name."""
-        return [t for t in self.things.values() if t.semantic_class in classes]
+    def of_class(self, *classes: str) -> list[StructureGeometry]:
+        """Returns the geometry of structures of some classes, by name."""
+        return [
+            one
+            for one in self.geometry.values()
+            if one.semantic_class in classes
+        ]
 
     def structure(self, name: str) -> Structure:
-        """Returns a structure in the form that the city generator uses.
+        """Returns a structure of today as a model with a pose.
 
         Its footprint is the convex hull of its parts near the ground.
 
@@ -134,8 +138,9 @@ class OldWorld:
         X_SW = RigidTransform(RollPitchYaw(0, 0, yaw), xyz).inverse()
         parts = []
         meshes = {}
-        materials = self._world.structures[name].materials
-        for one in self._seen[name].parts:
+        geometry = self.geometry[name]
+        materials = geometry.entry.materials
+        for one in geometry.parts:
             X_SG = X_SW @ one.X_WG
             shape = self._shape(one)
             if shape is None:
@@ -166,17 +171,13 @@ class OldWorld:
         model = Model(tuple(parts), meshes, ground_footprint(parts, meshes))
         return Structure(
             name,
-            row["class"],
+            geometry.semantic_class,
             model,
             xyz,
             yaw,
-            self.tags(name),
-            self._seen[name].kind,
+            geometry.entry.tags,
+            geometry.kind,
         )
-
-    def tags(self, name: str) -> tuple[str, ...]:
-        """Returns a structure's tags; empty if the table has no such row."""
-        return tuple(self.rows.get(name, {}).get("tags", "").split())
 
     @cached_property
     def shapes(self) -> dict[str, list[Shape]]:
@@ -186,10 +187,10 @@ class OldWorld:
         """
         return {
             name: [s for p in one.parts if (s := self._shape(p)) is not None]
-            for name, one in self.things.items()
+            for name, one in self.geometry.items()
         }
 
-    def _shape(self, part: LoadedPart) -> Shape | None:
+    def _shape(self, part: PartGeometry) -> Shape | None:
         """Returns a part's shape; None if the city generator lacks its kind."""
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
@@ -206,7 +207,7 @@ class OldWorld:
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
-        found = [triangle_corners(part) for part in self._seen[name].parts]
+        found = [triangle_corners(part) for part in self.geometry[name].parts]
         return np.concatenate([np.zeros((0, 3, 3)), *found])
 
     @cached_property
@@ -214,7 +215,7 @@ class OldWorld:
         """The ground below and around buildings."""
         feet = [t.footprint for t in self.of_class("building", "pole")]
         near = shapely.union_all(feet).convex_hull.buffer(_AROUND)
-        return GroundSurface(self._seen, near)
+        return GroundSurface(self.geometry, near)
 
     @cached_property
     def streets(self) -> BaseGeometry:
@@ -228,7 +229,7 @@ class OldWorld:
         """Area of the ground outside streets, parks and water, in W [m]."""
         return self.area(_is_open).difference(self.streets)
 
-    def area(self, wanted: Callable[[LoadedStructure], bool]) -> BaseGeometry:
+    def area(self, wanted: Callable[[StructureGeometry], bool]) -> BaseGeometry:
         """Returns the area that selected structures cover in W [m].
 
         The structures are seen from above.
@@ -238,7 +239,7 @@ class OldWorld:
         """
         found = [
             from_above(triangle_corners(part))
-            for one in self._seen.values()
+            for one in self.geometry.values()
             if wanted(one)
             for part in one.parts
         ]
@@ -246,7 +247,7 @@ class OldWorld:
         return joined.buffer(0.05).buffer(-0.05)
 
     @staticmethod
-    def _is_street(one: LoadedStructure) -> bool:
+    def _is_street(one: StructureGeometry) -> bool:
         is_bay = one.kind == kinds.PARKING_BAYS
         return one.semantic_class == "sidewalk" or is_bay
 
@@ -258,7 +259,7 @@ class OldWorld:
         return dict(sorted(network.junction_areas.items()))
 
 
-def _is_open(one: LoadedStructure) -> bool:
+def _is_open(one: StructureGeometry) -> bool:
     is_ground = one.semantic_class in ("terrain", "other-ground", "parking")
     return is_ground and not kinds.is_never_built_on(one.kind)
 
@@ -270,10 +271,7 @@ def _read_visuals(path: Path) -> dict[str, list[str]]:
     if len(root.findall("world/model")) != 1 or not all(
         "/" in one.get("name", "") for one in visuals
     ):
-        raise InputError(
-            f"{path}: not one model with visuals named <structure>/<part>, as "
-            "`cns-drake city` and `import` write it"
-        )
+        raise InputError(_not_one_model(path))
     for one in root.iter("uri"):
         if not _OWN_MESH.fullmatch(one.text or ""):
             raise InputError(
@@ -286,3 +284,10 @@ def _read_visuals(path: Path) -> dict[str, list[str]]:
         line = ElementTree.tostring(one, encoding="unicode").strip()
         lines.setdefault(name, []).append(line)
     return lines
+
+
+def _not_one_model(path: Path) -> str:
+    return (
+        f"{path}: not one model with visuals named <structure>/<part>, as "
+        "`cns-drake city` and `import` write it"
+    )

@@ -18,7 +18,7 @@ _GROWTH = 0.4
 _LEAST_TREE = 2.0
 
 
-def structures_in(
+def past_structures(
     world: OldWorld, year: int
 ) -> tuple[dict[str, Structure | None], list[Event]]:
     """Returns the structures of a past year, and the events since then.
@@ -38,25 +38,25 @@ def structures_in(
     assert world.today is not None
     standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
     events = []
-    for name, thing in world.things.items():
+    for name, one in world.geometry.items():
         built = world.built.get(name)
         if built is not None and built - world.today > year:
             since = built - world.today
             events.append(Event(since, "built", name))
             del standing[name]
-            for one in _objects_before(world, name, built):
-                standing[one.name] = one
+            for former in _objects_before(world, name, built):
+                standing[former.name] = former
                 events.append(
-                    Event(since, TAKEN_DOWN, one.name, detail="empty plot")
+                    Event(since, TAKEN_DOWN, former.name, detail="empty plot")
                 )
-        elif thing.semantic_class == "vegetation":
-            height = thing.top - thing.bottom
-            if height > _LEAST_TREE and thing.kind == kinds.TREE:
+        elif one.semantic_class == "vegetation":
+            height = one.top - one.bottom
+            if height > _LEAST_TREE and one.kind == kinds.TREE:
                 young = max(height + _GROWTH * year, _LEAST_TREE)
                 whole = world.structure(name)
                 model = younger_plant(whole.model, young)
                 standing[name] = replace(whole, model=model)
-    events.sort(key=lambda one: one.year)
+    events.sort(key=lambda event: event.year)
     return standing, events
 
 

@@ -19,13 +19,8 @@ from cns_drake.city.geometry import Mesh, MeshShape, Structure
 from cns_drake.scene import map_folder
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.map_folder import stage_name
-from cns_drake.scene.material_cells import (
-    material_word,
-    read_materials,
-    write_materials,
-)
+from cns_drake.scene.material_cells import material_word, read_materials
 from cns_drake.scene.materials import USUAL_MATERIALS
-from cns_drake.scene.semantics import CLASS_IDS
 
 # Name of the stage of today, which is the first.
 TODAY = "01"
@@ -142,7 +137,7 @@ class StageWriter:
             InputError: there are more structures than instance ids.
         """
         world = self._world
-        rows: list[Mapping[str, object]] = [
+        rows: list[Mapping[str, str]] = [
             {**row, "material": self._cell_of_old(row)}
             for row in world.rows.values()
         ]
@@ -155,22 +150,7 @@ class StageWriter:
                 f"instance ids can count ({MAX_INSTANCE})"
             )
         for k, one in enumerate((*new.values(), *others.values())):
-            x, y, z = (f"{value:.3f}" for value in one.xyz)
-            rows.append(
-                {
-                    "instance": first + k,
-                    "name": one.name,
-                    "class": one.semantic_class,
-                    "label": CLASS_IDS[one.semantic_class],
-                    **{"x": x, "y": y, "z": z, "yaw": f"{one.yaw:.5f}"},
-                    "tags": " ".join(one.tags),
-                    "material": write_materials(
-                        one.semantic_class,
-                        self._materials[one.name] | one.materials,
-                    ),
-                    "kind": one.kind_cell,
-                }
-            )
+            rows.append(one.row(first + k, self._materials[one.name]))
         columns = list(dict.fromkeys([*world.columns, "material"]))
         if any(row.get("kind") for row in rows):
             columns = list(dict.fromkeys([*columns, "kind"]))

@@ -12,7 +12,7 @@ from cns_drake.ageing.events import PUT_UP, TAKEN_DOWN, Event
 from cns_drake.ageing.old_world import OldWorld
 from cns_drake.city.geometry import Structure, part_triangles
 from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.transient.loaded_structures import LoadedStructure
+from cns_drake.scene.structure_table import StructureEntry
 
 
 class StandingStructures:
@@ -34,7 +34,11 @@ class StandingStructures:
         self.new: dict[str, Structure] = {}
         self.events: list[Event] = []
         self._world = world
-        self._footprints = {n: t.footprint for n, t in world.things.items()}
+        geometry = world.geometry
+        # Entries of all structures that stand or stood. New ones have no
+        # instance id yet.
+        self._entries = {name: one.entry for name, one in geometry.items()}
+        self._footprints = {n: one.footprint for n, one in geometry.items()}
         self._tree = shapely.STRtree(list(self._footprints.values()))
         self._names = list(self._footprints)
         # Footprints of structures that were added.
@@ -67,6 +71,7 @@ class StandingStructures:
         """
         self.by_name[one.name] = one
         self.new.setdefault(one.name, one)
+        self._entries[one.name] = one.entry()
         self._added[one.name] = (
             one.footprint_W if footprint is None else footprint
         )
@@ -103,19 +108,12 @@ class StandingStructures:
             name
             for name in found
             if name not in ignored
-            and self.semantic_class(name) not in GROUND_CLASSES
+            and self.entry(name).semantic_class not in GROUND_CLASSES
         ]
 
-    def kind(self, name: str) -> str:
-        """Returns the kind of a structure, which may have been removed."""
-        return self._known(name).kind
-
-    def semantic_class(self, name: str) -> str:
-        """Returns the class of a structure, which may have been removed."""
-        return self._known(name).semantic_class
-
-    def _known(self, name: str) -> Structure | LoadedStructure:
-        return self.new.get(name) or self._world.things[name]
+    def entry(self, name: str) -> StructureEntry:
+        """Returns the table entry of a structure that stands or stood."""
+        return self._entries[name]
 
     def footprint(self, name: str) -> BaseGeometry:
         """Returns the area in W [m] that a structure takes."""
@@ -134,7 +132,7 @@ class StandingStructures:
 
     def triangles(self, name: str) -> np.ndarray:
         """Returns the triangles (M, 3, 3) of a structure in W [m]."""
-        if name in self._world.things and self.by_name[name] is None:
+        if name in self._world.geometry and self.by_name[name] is None:
             return self._world.triangles(name)
         return structure_triangles(self.structure(name))
 

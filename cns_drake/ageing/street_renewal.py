@@ -1,6 +1,5 @@
 """Streets of an ageing city: furniture, kerbs and markings are renewed."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 import math
 
@@ -16,7 +15,7 @@ from cns_drake.ageing.standing_structures import StandingStructures
 from cns_drake.ageing.yearly_draws import YearlyDraws
 from cns_drake.city.geometry import Part, Structure, assemble, block
 from cns_drake.scene.materials import MATERIALS
-from cns_drake.transient.loaded_structures import LoadedStructure
+from cns_drake.transient.structure_geometry import StructureGeometry
 
 # Street furniture that moves does so by at least this distance [m].
 _LEAST_MOVE = 0.2
@@ -61,8 +60,8 @@ class StreetRenewal:
         # Name of a piece of furniture today -> the event that replaces it.
         self._furniture = {
             name: event
-            for name, one in world.things.items()
-            if (event := _replacing_event(one, world.tags(name))) is not None
+            for name, one in world.geometry.items()
+            if (event := _replacing_event(one)) is not None
         }
         # The same name -> the present name.
         self._present = {name: name for name in self._furniture}
@@ -204,20 +203,16 @@ class StreetRenewal:
                 )
 
 
-def _replacing_event(one: LoadedStructure, tags: Sequence[str]) -> str | None:
-    """Returns the event that replaces a structure; None if it is no furniture.
-
-    Args:
-        one: the structure.
-        tags: its tags.
-    """
+def _replacing_event(one: StructureGeometry) -> str | None:
+    """Returns the event that replaces a structure; None if none does."""
     if one.semantic_class == "traffic-sign":
         return "signs"
     if one.semantic_class == "pole":
         return "signals" if kinds.is_signal(one.kind) else "lamps"
-    small = one.footprint.area < 6.0 and one.top - one.bottom < 4.0
+    is_small = one.footprint.area < 6.0 and one.top - one.bottom < 4.0
     # What stands on an empty lot leaves with the lot.
-    if one.semantic_class == "other-object" and small and "lot" not in tags:
+    is_on_lot = "lot" in one.entry.tags
+    if one.semantic_class == "other-object" and is_small and not is_on_lot:
         return "benches"
     return None
 

@@ -15,7 +15,7 @@ from cns_drake.city.geometry import Structure
 from cns_drake.city.plants.plant_sizes import scaled_plant
 from cns_drake.city.plants.trees import SPECIES
 from cns_drake.imports.named_randomness import random_generator
-from cns_drake.transient.loaded_structures import LoadedStructure
+from cns_drake.transient.structure_geometry import StructureGeometry
 
 # Least and greatest growth of a tree in a year [m].
 _GROWTH = (0.3, 0.5)
@@ -156,12 +156,12 @@ def _trees_of_today(world: OldWorld, seed: int) -> Iterator[_Tree]:
         yield _Tree(one.name, whole, height, height, max(size, height), planted)
 
 
-def _about_its_foot(whole: Structure, seen: LoadedStructure) -> Structure:
+def _about_its_foot(whole: Structure, seen: StructureGeometry) -> Structure:
     """Returns a tree with the origin of its frame near its foot.
 
     Args:
         whole: the tree.
-        seen: the same tree, as Drake loaded it, in W.
+        seen: the geometry of the same tree in W.
     """
     *xy, z = whole.xyz
     is_below = seen.outline.covers(shapely.Point(xy))

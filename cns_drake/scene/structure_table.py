@@ -12,7 +12,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.number_text import to_number, whole_number
 from cns_drake.scene.labels import MAX_INSTANCE, Labels, check_count
-from cns_drake.scene.material_cells import read_materials
+from cns_drake.scene.material_cells import read_materials, write_materials
 from cns_drake.scene.materials import MATERIALS, USUAL_MATERIALS, Material
 from cns_drake.scene.semantics import CLASS_IDS, moving_id
 from cns_drake.scene.structure_names import kind_in_name
@@ -22,9 +22,14 @@ from cns_drake.scene.structure_names import kind_in_name
 class StructureEntry:
     """The entry of one structure in the structure table of a world.
 
+    The entry states what the structure is. Its shape is a
+    `cns_drake.city.geometry.Structure` before it is written to a world, and a
+    `cns_drake.transient.structure_geometry.StructureGeometry` in a world that
+    Drake has loaded.
+
     Attributes:
         instance: instance id of the structure, as in LiDAR points, from 1 to
-            65535; 0 stands for no structure.
+            65535; 0 as long as the structure has none.
         name: name of the structure.
         semantic_class: a key of `CLASS_IDS`.
         reflectivity: reflectivity of the structure's surfaces near 900 nm, from
@@ -36,6 +41,8 @@ class StructureEntry:
             have the usual material of the class.
         kind: what the structure is, such as `row_house` or `bench`; by default
             the kind with which the name begins.
+        tags: words that describe the structure, such as the name of its
+            district.
     """
 
     instance: int
@@ -45,6 +52,7 @@ class StructureEntry:
     causes: tuple[str, ...] = ()
     materials: Mapping[str, str] = field(default_factory=dict, hash=False)
     kind: str = ""
+    tags: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         kind = self.kind or kind_in_name(self.name)
@@ -58,6 +66,24 @@ class StructureEntry:
         """Returns the material of one of the structure's parts."""
         usual = self.materials.get("", USUAL_MATERIALS[self.semantic_class])
         return MATERIALS[self.materials.get(part, usual)]
+
+    def cells(self) -> dict[str, str]:
+        """Returns the entry's cells in `structures.csv`, by column.
+
+        `load_structure_table` reads these cells. Causes are not written.
+        """
+        is_in_name = self.kind == kind_in_name(self.name)
+        given = self.reflectivity
+        return {
+            "instance": str(self.instance),
+            "name": self.name,
+            "class": self.semantic_class,
+            "label": str(self.label),
+            "tags": " ".join(self.tags),
+            "reflectivity": "" if given is None else str(given),
+            "material": write_materials(self.semantic_class, self.materials),
+            "kind": "" if is_in_name else self.kind,
+        }
 
 
 class StructureTable:
@@ -121,8 +147,8 @@ class StructureTable:
 def load_structure_table(path: Path) -> StructureTable:
     """Reads a structure table: CSV with columns `instance`, `name`, `class`.
 
-    The columns `reflectivity`, `material` and `kind` are optional, and their
-    cells may be empty.
+    The columns `tags`, `reflectivity`, `material` and `kind` are optional, and
+    their cells may be empty.
 
     Raises:
         InputError: the file lacks a column or a row is not usable.
@@ -157,6 +183,7 @@ def load_structure_table(path: Path) -> StructureTable:
             _reflectivity(row.get("reflectivity", ""), where),
             materials=materials,
             kind=row.get("kind", ""),
+            tags=tuple(row.get("tags", "").split()),
         )
     return StructureTable(entries.values())
 

@@ -36,7 +36,7 @@ from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
 from cns_drake.traffic.vehicle_placement import room_for_vehicles
 from cns_drake.traffic.walkers import room_for_walkers
 from cns_drake.traffic.walkway_clearing import kept_clear
-from cns_drake.transient.loaded_structures import read_structures
+from cns_drake.transient.structure_geometry import geometry_by_structure
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
@@ -171,7 +171,7 @@ def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
     Buildings are left out, because walkways lead along them.
     """
     passed = GROUND_CLASSES | {"building"}
-    things = read_structures(
+    things = geometry_by_structure(
         world, lambda name: world.structures[name].semantic_class not in passed
     )
     return [thing.footprint for thing in things.values()]

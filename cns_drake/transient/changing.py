@@ -7,13 +7,13 @@ from cns_drake.scene.world import World
 from cns_drake.transient.furniture import move_furniture
 from cns_drake.transient.height_limit import limit_heights
 from cns_drake.transient.leaves import thin_leaves
-from cns_drake.transient.loaded_structures import read_structures
 from cns_drake.transient.parked_cars import change_parked_cars
 from cns_drake.transient.roadsides import fill_roadsides
 from cns_drake.transient.roadworks import put_up_works
 from cns_drake.transient.scaffolds import put_up_scaffolds
 from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.snow import lay_snow
+from cns_drake.transient.structure_geometry import geometry_by_structure
 from cns_drake.transient.surroundings import Surroundings
 
 
@@ -38,7 +38,7 @@ def change_world(
     """
 
     def surroundings(world: World) -> Surroundings:
-        structures = read_structures(world)
+        structures = geometry_by_structure(world)
         editing = SceneEditing(world)
         return Surroundings(editing, structures, drive, kept_free, config.seed)
 

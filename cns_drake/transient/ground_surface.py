@@ -17,9 +17,9 @@ from cns_drake.city.geometry import (
     unit_normals,
 )
 from cns_drake.scene.semantics import GROUND_CLASSES
-from cns_drake.transient.loaded_structures import (
-    LoadedPart,
-    LoadedStructure,
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
     triangle_corners,
 )
 
@@ -51,12 +51,12 @@ class GroundSurface:
     """
 
     def __init__(
-        self, structures: Mapping[str, LoadedStructure], near: BaseGeometry
+        self, structures: Mapping[str, StructureGeometry], near: BaseGeometry
     ):
         """Collects the ground in an area.
 
         Args:
-            structures: name -> structure, for all structures of the world.
+            structures: name -> geometry, for all structures of the world.
             near: area in which the ground is known, seen from above [m].
         """
         shapely.prepare(near)
@@ -70,7 +70,7 @@ class GroundSurface:
         self._roads = triangles[True]
         self._sides = {k: UpperSides(found) for k, found in triangles.items()}
 
-    def _near_triangles(self, part: LoadedPart) -> np.ndarray:
+    def _near_triangles(self, part: PartGeometry) -> np.ndarray:
         """Returns the corners (M, 3, 3) of triangles that are not steep [m]."""
         corners = turned_up(triangle_corners(part))
         middles = corners[:, :, :2].mean(axis=1)

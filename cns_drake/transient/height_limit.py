@@ -10,8 +10,11 @@ from shapely.geometry import box
 from cns_drake.city.geometry import OBJECT_MESHES, Mesh, MeshShape, Model, Part
 from cns_drake.city.growth.lowering import STOREY, lowered, top_of
 from cns_drake.scene.surfaces import tessellate
-from cns_drake.transient.loaded_structures import LoadedPart, LoadedStructure
 from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
+)
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.
@@ -61,7 +64,7 @@ def limit_heights(around: Surroundings, limit: float) -> None:
 
 
 def _as_model(
-    building: LoadedStructure, editing: SceneEditing
+    building: StructureGeometry, editing: SceneEditing
 ) -> tuple[Model, RigidTransform]:
     """Returns a model with the parts of a building, and the pose X_WS.
 
@@ -89,7 +92,7 @@ def _as_model(
     return Model(tuple(parts), meshes, box(*low, *high)), RigidTransform(p_WS)
 
 
-def _object_mesh(part: LoadedPart, editing: SceneEditing) -> str:
+def _object_mesh(part: PartGeometry, editing: SceneEditing) -> str:
     """Returns the name of a part's mesh, such as `roof_vents`.
 
     The result is "" if the mesh is none of the generator's meshes of objects.
@@ -102,7 +105,7 @@ def _object_mesh(part: LoadedPart, editing: SceneEditing) -> str:
     return ""
 
 
-def _mesh_in_S(part: LoadedPart, p_WS: np.ndarray) -> Mesh:
+def _mesh_in_S(part: PartGeometry, p_WS: np.ndarray) -> Mesh:
     """Returns the triangles of a part, in S [m]; round shapes become prisms."""
     surface = tessellate(part.geometry.surface)
     R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()

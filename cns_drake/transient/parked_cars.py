@@ -12,8 +12,8 @@ from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.models import Model, part_triangles
 from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.loaded_structures import LoadedStructure
 from cns_drake.transient.obstacles import Obstacles
+from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import Surroundings
 
 # Cause of these changes in the structure table.
@@ -56,7 +56,7 @@ class Bay:
             end of the bay [m].
     """
 
-    def __init__(self, car: LoadedStructure):
+    def __init__(self, car: StructureGeometry):
         """Makes a bay of the size of the car."""
         hull = shapely.MultiPoint(car.p_WPs[:, :2])
         corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
@@ -84,7 +84,7 @@ class Bay:
         )
 
     def grow(
-        self, car: LoadedStructure, cars: Obstacles, others: Obstacles
+        self, car: StructureGeometry, cars: Obstacles, others: Obstacles
     ) -> None:
         """Enlarges the bay up to other objects, and halfway to other cars.
 
@@ -189,7 +189,7 @@ def change_parked_cars(around: Surroundings, share: float) -> None:
 
 def _random_move(
     bay: Bay,
-    car: LoadedStructure,
+    car: StructureGeometry,
     ground: GroundSurface,
     rng: np.random.Generator,
 ) -> RigidTransform:
@@ -214,7 +214,7 @@ def _random_move(
 
 def _replace_car(
     around: Surroundings,
-    car: LoadedStructure,
+    car: StructureGeometry,
     bay: Bay,
     rng: np.random.Generator,
 ) -> None:

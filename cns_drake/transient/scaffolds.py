@@ -8,7 +8,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry import Model, Part, assemble, bar, block, post
-from cns_drake.transient.loaded_structures import LoadedStructure
+from cns_drake.transient.structure_geometry import StructureGeometry
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
 
 # Distance of a scaffold's inner uprights from the front [m].
@@ -86,7 +86,7 @@ def put_up_scaffolds(around: Surroundings, share: float) -> None:
 
 
 def _front(
-    building: LoadedStructure, drive: BaseGeometry
+    building: StructureGeometry, drive: BaseGeometry
 ) -> tuple[RigidTransform, float]:
     """Returns the pose of the front that faces a drive, and its length [m].
 

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cns_drake.base.elementary import product
 from cns_drake.city.geometry.models import Model, Part
 from cns_drake.scene.perception_geometry import GREY
+from cns_drake.scene.structure_table import StructureEntry
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.drake_shapes import (
@@ -18,14 +19,17 @@ from cns_drake.transient.drake_shapes import (
     model_shape,
     scaled_shape,
 )
-from cns_drake.transient.loaded_structures import LoadedPart, LoadedStructure
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    StructureGeometry,
+)
 from cns_drake.transient.table_changes import TableChanges
 
 # Points up to this far above a structure's lowest one belong to its foot [m].
 _FOOT = 0.05
 
 
-class Look(NamedTuple):
+class SurfaceLook(NamedTuple):
     """Colour, reflectivity and material of new surfaces.
 
     Attributes:
@@ -80,7 +84,7 @@ class SceneEditing:
         """
         self._table.add_cause(name, cause)
 
-    def remove(self, structure: LoadedStructure, cause: str) -> None:
+    def remove(self, structure: StructureGeometry, cause: str) -> None:
         """Removes a structure, and records why.
 
         Args:
@@ -94,7 +98,7 @@ class SceneEditing:
 
     def move(
         self,
-        structure: LoadedStructure,
+        structure: StructureGeometry,
         X_new: RigidTransform,
         name: str,
         cause: str,
@@ -118,14 +122,15 @@ class SceneEditing:
                 self._part_properties(part),
             )
         self.remove(structure, cause)
-        entry = structure.entry
         self._table.add_structure(
-            name, entry.semantic_class, entry.reflectivity, entry.materials
+            replace(structure.entry, name=name, causes=())
         )
         self.record_cause(name, cause)
 
-    def cover_part(self, part: LoadedPart, p_W: np.ndarray, look: Look) -> None:
-        """Moves a part by p_W (3,) [m] in W and gives it a new look."""
+    def cover_part(
+        self, part: PartGeometry, p_W: np.ndarray, look: SurfaceLook
+    ) -> None:
+        """Moves a part by p_W (3,) [m] in W and gives it another look."""
         self._add_part(
             part.geometry.structure,
             f"{part.name}_covered",
@@ -157,16 +162,16 @@ class SceneEditing:
             shape = model_shape(part.shape, model.meshes)
             X_WG = X_WS @ _pose_in_model(part)
             self._add_part(name, part.name, X_WG, shape, _look_of(part))
-        self._table.add_structure(name, semantic_class)
+        self._table.add_structure(StructureEntry(0, name, semantic_class))
         self.record_cause(name, cause)
 
-    def shape(self, part: LoadedPart) -> geometry.Shape:
+    def shape(self, part: PartGeometry) -> geometry.Shape:
         """Returns the Drake shape of a part."""
         inspector = self._world.scene_graph.model_inspector()
         return inspector.GetShape(part.geometry.geometry_id)
 
     def shrink(
-        self, structure: LoadedStructure, share: float, cause: str
+        self, structure: StructureGeometry, share: float, cause: str
     ) -> None:
         """Scales a structure down about the middle of its foot.
 
@@ -192,7 +197,7 @@ class SceneEditing:
 
     def rebuild(
         self,
-        structure: LoadedStructure,
+        structure: StructureGeometry,
         before: Model,
         after: Model,
         X_WS: RigidTransform,
@@ -235,7 +240,7 @@ class SceneEditing:
                 self._remove_part(one)
         self.record_cause(structure.name, cause)
 
-    def keep_triangles(self, part: LoadedPart, kept: np.ndarray) -> None:
+    def keep_triangles(self, part: PartGeometry, kept: np.ndarray) -> None:
         """Removes all triangles of a part except those with indices `kept`."""
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
@@ -257,11 +262,11 @@ class SceneEditing:
 
     def add_triangles(
         self,
-        part: LoadedPart,
+        part: PartGeometry,
         name: str,
         p_WVs: np.ndarray,
         triangles: np.ndarray,
-        look: Look,
+        look: SurfaceLook,
     ) -> None:
         """Adds a part made of triangles to the structure of an existing part.
 
@@ -282,7 +287,7 @@ class SceneEditing:
         semantic_class: str,
         p_WVs: np.ndarray,
         triangles: np.ndarray,
-        look: Look,
+        look: SurfaceLook,
         cause: str,
     ) -> None:
         """Adds a structure made of triangles to the world.
@@ -301,7 +306,7 @@ class SceneEditing:
         middle = np.round(p_WVs.mean(axis=0))
         mesh = memory_mesh(p_WVs - middle, triangles)
         self._add_part(name, "surface", RigidTransform(middle), mesh, look)
-        self._table.add_structure(name, semantic_class)
+        self._table.add_structure(StructureEntry(0, name, semantic_class))
         self.record_cause(name, cause)
 
     def finish(self) -> World:
@@ -322,7 +327,7 @@ class SceneEditing:
         part: str,
         X_WG: RigidTransform,
         shape: geometry.Shape,
-        look: Look,
+        look: SurfaceLook,
     ) -> None:
         """Adds a part with a new look to a structure."""
         self._register(structure, part, X_WG, shape, _look_properties(look))
@@ -330,7 +335,7 @@ class SceneEditing:
             self._table.set_material(structure, part, look.material)
 
     def _replace_part(
-        self, part: LoadedPart, X_WG: RigidTransform, shape: geometry.Shape
+        self, part: PartGeometry, X_WG: RigidTransform, shape: geometry.Shape
     ) -> None:
         """Gives a part another pose and shape; its look stays the same."""
         # The old part is removed first, since the new one may have its name.
@@ -339,14 +344,14 @@ class SceneEditing:
         structure = part.geometry.structure
         self._register(structure, part.name, X_WG, shape, properties)
 
-    def _remove_part(self, part: LoadedPart) -> None:
+    def _remove_part(self, part: PartGeometry) -> None:
         self._names.discard(part.geometry.name)
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
 
     def _part_properties(
-        self, part: LoadedPart
+        self, part: PartGeometry
     ) -> list[geometry.GeometryProperties]:
         inspector = self._world.scene_graph.model_inspector()
         geometry_id = part.geometry.geometry_id
@@ -387,11 +392,11 @@ def _pose_in_model(part: Part) -> RigidTransform:
     return RigidTransform(RollPitchYaw(*part.rpy), part.xyz)
 
 
-def _look_of(part: Part) -> Look:
-    return Look(part.rgb or GREY, material=part.material)
+def _look_of(part: Part) -> SurfaceLook:
+    return SurfaceLook(part.rgb or GREY, material=part.material)
 
 
-def _look_properties(look: Look) -> list[geometry.GeometryProperties]:
+def _look_properties(look: SurfaceLook) -> list[geometry.GeometryProperties]:
     seen = geometry.PerceptionProperties()
     shown = geometry.IllustrationProperties()
     for properties in (seen, shown):

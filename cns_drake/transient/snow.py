@@ -14,14 +14,17 @@ from cns_drake.city.geometry.triangles import (
 )
 from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.loaded_structures import LoadedPart, triangle_corners
-from cns_drake.transient.scene_editing import Look, SceneEditing
+from cns_drake.transient.scene_editing import SceneEditing, SurfaceLook
+from cns_drake.transient.structure_geometry import (
+    PartGeometry,
+    triangle_corners,
+)
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cause of these changes in the structure table.
 _CAUSE = "snow"
 # Reflectivity of snow near 900 nm: Warren, "Optical properties of snow", 1982.
-_LOOK = Look((0.93, 0.95, 0.97), 0.9, "snow")
+_LOOK = SurfaceLook((0.93, 0.95, 0.97), 0.9, "snow")
 # Snow slides off steeper surfaces: cosine of 45 degrees.
 _LEAST_UP = 0.707
 # Smaller surfaces bear no snow [m^2].
@@ -84,7 +87,7 @@ def lay_snow(around: Surroundings, ground: GroundSurface, depth: float) -> None:
         _lay_banks(around, ground, depth)
 
 
-def _is_below_road(part: LoadedPart, ground: GroundSurface) -> bool:
+def _is_below_road(part: PartGeometry, ground: GroundSurface) -> bool:
     """Returns whether a piece of ground continues below a carriageway."""
     corners = turned_up(triangle_corners(part))
     corners = corners[unit_normals(corners)[:, 2] > 0.0]
@@ -97,7 +100,7 @@ def _is_below_road(part: LoadedPart, ground: GroundSurface) -> bool:
 
 def _cover_with_snow(
     editing: SceneEditing,
-    part: LoadedPart,
+    part: PartGeometry,
     ground: GroundSurface,
     depth: float,
     is_ground: bool,

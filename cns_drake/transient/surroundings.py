@@ -10,9 +10,9 @@ import numpy as np
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.loaded_structures import LoadedStructure
 from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.structure_geometry import StructureGeometry
 
 # Fronts and kerbs farther from the drive than this get no new objects [m].
 FARTHEST = 30.0
@@ -34,7 +34,7 @@ class Surroundings:
 
     Attributes:
         editing: makes the changes in the world.
-        structures: name -> structure, for all structures of the world before
+        structures: name -> geometry, for all structures of the world before
             the changes.
         drive: path of the vehicle, seen from above [m].
         kept_free: area that must stay free of new objects, seen from above [m].
@@ -42,7 +42,7 @@ class Surroundings:
     """
 
     editing: SceneEditing
-    structures: Mapping[str, LoadedStructure]
+    structures: Mapping[str, StructureGeometry]
     drive: BaseGeometry
     kept_free: BaseGeometry
     seed: int
@@ -52,7 +52,7 @@ class Surroundings:
         """The ground near the drive."""
         return GroundSurface(self.structures, self.drive.buffer(_NEAR))
 
-    def of_classes(self, classes: Collection[str]) -> list[LoadedStructure]:
+    def of_classes(self, classes: Collection[str]) -> list[StructureGeometry]:
         """Returns the structures of some classes."""
         return [
             one
@@ -80,7 +80,7 @@ class Surroundings:
             if one.semantic_class not in ignored
         )
 
-    def _obstacles(self, standing: Iterable[LoadedStructure]) -> Obstacles:
+    def _obstacles(self, standing: Iterable[StructureGeometry]) -> Obstacles:
         feet = [(one.name, one.footprint) for one in standing]
         return Obstacles([("", self.kept_free), *feet])
 

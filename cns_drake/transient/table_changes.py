@@ -1,7 +1,6 @@
 """What the structure table must say about changes to a loaded world."""
 
 from collections import defaultdict
-from collections.abc import Mapping
 from dataclasses import replace
 
 from cns_drake.base.errors import InputError
@@ -19,32 +18,20 @@ class TableChanges:
             table: the structure table before the changes.
         """
         self._table = table
-        # Name -> class and reflectivity of a new structure.
-        self._added: dict[str, tuple[str, float | None]] = {}
+        # Name -> entry of a new structure, still without an instance id.
+        self._added: dict[str, StructureEntry] = {}
         # Name of a structure -> new part of it -> material.
         self._materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
         # Name of a structure -> part that was renamed -> its former name.
         self._renamed: defaultdict[str, dict[str, str]] = defaultdict(dict)
         self._causes: defaultdict[str, list[str]] = defaultdict(list)
 
-    def add_structure(
-        self,
-        name: str,
-        semantic_class: str,
-        reflectivity: float | None = None,
-        materials: Mapping[str, str] | None = None,
-    ) -> None:
-        """Records a new structure.
+    def add_structure(self, entry: StructureEntry) -> None:
+        """Records a new structure, which gets a free instance id.
 
-        Args:
-            name: name of the structure, unique in the world.
-            semantic_class: class of the structure.
-            reflectivity: reflectivity of its surfaces, from 0 to 1; None if it
-                follows from material and colour.
-            materials: name of a part -> name of its material.
+        The name in its entry must be unique in the world.
         """
-        self._added[name] = semantic_class, reflectivity
-        self._materials[name] |= materials or {}
+        self._added[entry.name] = entry
 
     def set_material(self, structure: str, part: str, material: str) -> None:
         """Records the material of a new part."""
@@ -75,7 +62,7 @@ class TableChanges:
         entries = [
             *self._table,
             *(
-                StructureEntry(first + k, name, *self._added[name])
+                replace(self._added[name], instance=first + k)
                 for k, name in enumerate(sorted(self._added))
             ),
         ]

@@ -10,7 +10,7 @@ from cns_drake.city.geometry.object_meshes import OBJECT_MESHES
 from cns_drake.scenarios.sections import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.loaded_structures import read_structures
+from cns_drake.transient.structure_geometry import geometry_by_structure
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -188,7 +188,7 @@ def change_maker(sdf, drive, lanes):
     def make(**switches):
         config = TransientConfig(**switches)
         world = change_world(load_world(sdf), config, drive, lanes)
-        return world, read_structures(world)
+        return world, geometry_by_structure(world)
 
     return make
 

@@ -22,8 +22,6 @@ from cns_drake.scene.map_folder import (
     STRUCTURES_NAME,
     stage_name,
 )
-from cns_drake.scene.material_cells import write_materials
-from cns_drake.scene.semantics import CLASS_IDS
 
 
 def structure_table(
@@ -41,34 +39,20 @@ def structure_table(
         versions: the structures as they are in all stages. A structure can have
             parts in one stage that it lacks in another.
     """
-    structures = list(structures)
-    names = [
-        "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags",
-        "material",
-    ]  # fmt: skip
-    with_kinds = any(one.kind_cell for one in structures)
-    if with_kinds:
-        names.append("kind")
     materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
     for one in versions:
         materials[one.name] |= one.materials
-    rows = (
-        [
-            instance,
-            one.name,
-            one.semantic_class,
-            CLASS_IDS[one.semantic_class],
-            *(f"{value:.3f}" for value in one.xyz),
-            f"{one.yaw:.5f}",
-            " ".join(one.tags),
-            write_materials(
-                one.semantic_class, materials[one.name] | one.materials
-            ),
-            *([one.kind_cell] if with_kinds else []),
-        ]
+    rows = [
+        one.row(instance, materials[one.name])
         for instance, one in enumerate(structures, start=1)
-    )
-    return csv_text(names, rows)
+    ]
+    columns = [
+        "instance", "name", "class", "label", "x", "y", "z", "yaw", "tags",
+        "material",
+    ]  # fmt: skip
+    if any(row["kind"] for row in rows):
+        columns.append("kind")
+    return csv_text(columns, ([row[name] for name in columns] for row in rows))
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 import math
 
@@ -12,19 +12,19 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.models import Model, part_mesh, rotation, triple
 from cns_drake.city.geometry.polygons import placed
+from cns_drake.scene.material_cells import shortened
 from cns_drake.scene.materials import USUAL_MATERIALS
 from cns_drake.scene.structure_names import kind_in_name
+from cns_drake.scene.structure_table import StructureEntry
 
 
 @dataclass(frozen=True)
 class Structure:
     """A named object of a city: a model, and its pose in the world W.
 
-    A generator or an import makes the structure in this form. A
-    `cns_drake.scene.structure_table.StructureEntry` is the entry of a structure
-    in the table of a world, and a
-    `cns_drake.transient.loaded_structures.LoadedStructure` is a structure that
-    Drake has loaded.
+    The generator, imports and ageing make structures in this form, and write
+    them to worlds. The method `entry` returns the structure's entry in the
+    structure table.
 
     Attributes:
         name: unique and stable name, e.g. `tower_017`.
@@ -51,15 +51,43 @@ class Structure:
         object.__setattr__(self, "kind", kind)
 
     @property
-    def kind_cell(self) -> str:
-        """The cell `kind` in a structure table; "" if the name states it."""
-        return "" if self.kind == kind_in_name(self.name) else self.kind
-
-    @property
     def materials(self) -> dict[str, str]:
         """Name of each part -> name of its material."""
         usual = USUAL_MATERIALS[self.semantic_class]
         return {part.name: part.material or usual for part in self.model.parts}
+
+    def entry(
+        self,
+        instance: int = 0,
+        other_parts: Mapping[str, str] | None = None,
+    ) -> StructureEntry:
+        """Returns the structure's entry in a structure table.
+
+        Args:
+            instance: instance id of the structure; 0 for none.
+            other_parts: name -> name of the material, for parts that the
+                structure has in other stages only.
+        """
+        return StructureEntry(
+            instance,
+            self.name,
+            self.semantic_class,
+            materials=shortened({**(other_parts or {}), **self.materials}),
+            kind=self.kind,
+            tags=self.tags,
+        )
+
+    def row(
+        self, instance: int, other_parts: Mapping[str, str]
+    ) -> dict[str, str]:
+        """Returns the structure's row in `structures.csv`, by column.
+
+        These are the cells of its entry, and those of its pose: `x`, `y` and
+        `z` [m], and `yaw` [rad]. The arguments are those of `entry`.
+        """
+        x, y, z = (f"{value:.3f}" for value in self.xyz)
+        pose = {"x": x, "y": y, "z": z, "yaw": f"{self.yaw:.5f}"}
+        return self.entry(instance, other_parts).cells() | pose
 
     @property
     def footprint_W(self) -> BaseGeometry:

@@ -13,7 +13,7 @@ import shapely
 from cns_drake.ageing.aged_map import age_map
 from cns_drake.ageing.ageing_city import AgeingCity
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.past_city import structures_in
+from cns_drake.ageing.past_city import past_structures
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
 )
@@ -26,7 +26,7 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.world import load_world
-from cns_drake.transient.loaded_structures import read_structures
+from cns_drake.transient.structure_geometry import geometry_by_structure
 
 _DRIVE = """
 map: .
@@ -149,7 +149,7 @@ def test_drives_of_an_aged_map(long):
 
 @pytest.mark.slow
 def test_nothing_stands_in_another_or_on_a_street(long):
-    things = read_structures(load_world(long / "stage_03.sdf"))
+    things = geometry_by_structure(load_world(long / "stage_03.sdf"))
     new = [
         one
         for name, one in things.items()
@@ -181,7 +181,7 @@ def test_nothing_stands_in_another_or_on_a_street(long):
 def test_new_things_stand_on_the_ground(long):
     world = OldWorld(MapFolder(long))
     checked = 0
-    for name, thing in world.things.items():
+    for name, thing in world.geometry.items():
         if not re.search(r"\d{3}y", name) or thing.footprint.is_empty:
             continue
         if re.search("balconies|storey|_frame|kerb|scaffold", name):
@@ -377,7 +377,7 @@ def test_furniture_moves_as_far_as_allowed(world, farthest, least):
         middles = (
             np.array(foot.centroid.coords[0])
             for foot in (
-                world.things[one.structure].footprint,
+                world.geometry[one.structure].footprint,
                 city.standing.new[one.successor].footprint_W,
             )
         )
@@ -408,11 +408,11 @@ def test_the_past_lacks_younger_buildings(town, tmp_path):
                 built = 2020 if row["name"] == houses[0] else 1950
             table.writerow({**row, "built": built})
     world = OldWorld(MapFolder(folder))
-    before, events = structures_in(world, -10)
+    before, events = past_structures(world, -10)
     assert houses[0] not in before
     assert houses[1] in before
     assert not events[0].year
-    after, _ = structures_in(world, 0)
+    after, _ = past_structures(world, 0)
     assert houses[0] in after
     age_map(folder, [-10, 0, 2], 1, _BUSY, tmp_path / "old")
     text = (tmp_path / "old" / "stage_02.sdf").read_text()

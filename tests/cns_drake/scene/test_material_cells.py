@@ -2,7 +2,11 @@
 
 import pytest
 
-from cns_drake.scene.material_cells import read_materials, write_materials
+from cns_drake.scene.material_cells import (
+    read_materials,
+    shortened,
+    write_materials,
+)
 from cns_drake.scene.materials import MATERIALS
 from cns_drake.scene.structure_table import StructureEntry
 
@@ -29,12 +33,19 @@ from cns_drake.scene.structure_table import StructureEntry
     ],
 )
 def test_a_cell_has_the_materials_of_all_parts(semantic_class, parts, cell):
-    assert write_materials(semantic_class, parts) == cell
+    assert write_materials(semantic_class, shortened(parts)) == cell
     entry = StructureEntry(
         1, "one", semantic_class, materials=read_materials(cell)
     )
     for part, material in parts.items():
         assert entry.material(part) is MATERIALS[material]
+
+
+@pytest.mark.parametrize(
+    "cell", ["", "brick", "pane=glass", "brick pane=glass"]
+)
+def test_a_cell_is_written_as_it_was_read(cell):
+    assert write_materials("building", read_materials(cell)) == cell
 
 
 @pytest.mark.parametrize(

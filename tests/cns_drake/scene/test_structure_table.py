@@ -46,6 +46,21 @@ def test_a_table_may_say_the_kind(tmp_path):
     assert [one.kind for one in table] == ["park", "land"]
 
 
+def test_an_entry_is_read_as_it_was_written(tmp_path):
+    entry = StructureEntry(
+        7,
+        "land_w5",
+        "terrain",
+        0.25,
+        materials={"": "paving", "edge": "kerb"},
+        kind="park",
+        tags=("old_town", "green"),
+    )
+    cells = entry.cells()
+    path = write(tmp_path, f"{','.join(cells)}\n{','.join(cells.values())}\n")
+    assert list(load_structure_table(path)) == [entry]
+
+
 def test_unlisted_structures_get_free_ids_in_order():
     table = StructureTable([StructureEntry(5, "hall", "building")])
     completed = table.completed(["b", "hall", "a", "b"])

@@ -18,8 +18,8 @@ from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.loaded_structures import read_structures
 from cns_drake.transient.parked_cars import make_bays
+from cns_drake.transient.structure_geometry import geometry_by_structure
 from cns_drake.transient.surroundings import Surroundings
 
 # The drive leads through cars and roads, below z = 2.2 m or so.
@@ -205,7 +205,7 @@ def test_the_same_twice(sdf, changed):
         load_world(sdf), TransientConfig(**switches), DRIVE, LANES
     )
     assert list(again.structures) == list(world.structures)
-    assert same(places(things), places(read_structures(again)))
+    assert same(places(things), places(geometry_by_structure(again)))
 
 
 def crown(things, name):

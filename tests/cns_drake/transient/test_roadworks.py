@@ -8,7 +8,7 @@ from cns_drake.scenarios.sections import TransientConfig
 from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.ground_surface import GroundSurface
-from cns_drake.transient.loaded_structures import read_structures
+from cns_drake.transient.structure_geometry import geometry_by_structure
 
 
 def test_roadworks_leave_the_lanes_free(changed):
@@ -52,4 +52,7 @@ def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
     config = TransientConfig(works=1.0)
     before = load_world(sdf)
     after = change_world(before, config, DRIVE, LANES)
-    assert read_structures(after).keys() == read_structures(before).keys()
+    assert (
+        geometry_by_structure(after).keys()
+        == geometry_by_structure(before).keys()
+    )

@@ -27,8 +27,10 @@ def test_each_cause_counts_once(changes):
 
 
 def test_new_structures_follow_in_the_order_of_their_names(changes):
-    changes.add_structure("shed_2", "building")
-    changes.add_structure("car_7", "car", 0.3, {"": "paint"})
+    changes.add_structure(StructureEntry(0, "shed_2", "building"))
+    changes.add_structure(
+        StructureEntry(0, "car_7", "car", 0.3, materials={"": "paint"})
+    )
     table = changes.changed_table()
     assert [(one.instance, one.name) for one in table] == [
         (4, "oak_1"),
@@ -52,6 +54,6 @@ def test_a_renamed_part_keeps_its_material(changes):
 def test_there_may_be_more_structures_than_ids():
     last = StructureEntry(MAX_INSTANCE, "oak_1", "vegetation")
     changes = TableChanges(StructureTable([last]))
-    changes.add_structure("oak_2", "vegetation")
+    changes.add_structure(StructureEntry(0, "oak_2", "vegetation"))
     with pytest.raises(InputError, match="more than instance ids can count"):
         changes.changed_table()

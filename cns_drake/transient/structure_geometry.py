@@ -1,4 +1,4 @@
-"""The structures of a loaded world, as a LiDAR sees them."""
+"""The geometry of each structure in a loaded world, as a LiDAR sees it."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -34,8 +34,8 @@ _BOX = np.array(
 
 
 @dataclass(frozen=True)
-class LoadedPart:
-    """One geometry of a structure that a LiDAR can see.
+class PartGeometry:
+    """The geometry of one part of a structure in a loaded world.
 
     Attributes:
         geometry: the geometry G.
@@ -76,19 +76,19 @@ class LoadedPart:
 
 
 @dataclass(frozen=True)
-class LoadedStructure:
-    """A structure of a loaded world, as geometries that a LiDAR can see.
+class StructureGeometry:
+    """The geometry of one structure in a loaded world.
 
-    `cns_drake.city.geometry.Structure` is a structure that is yet to be
-    written.
+    This is what a LiDAR can see of the structure. What the structure is, its
+    entry in the world's structure table says.
 
     Attributes:
         entry: entry of the structure in the world's structure table.
-        parts: geometries of the structure.
+        parts: geometry of each part of the structure.
     """
 
     entry: StructureEntry
-    parts: tuple[LoadedPart, ...]
+    parts: tuple[PartGeometry, ...]
 
     @property
     def name(self) -> str:
@@ -137,10 +137,10 @@ def _hull(p_WPs: np.ndarray) -> BaseGeometry:
     return cast(BaseGeometry, shapely.convex_hull(points))
 
 
-def read_structures(
+def geometry_by_structure(
     world: World, wanted: Callable[[str], bool] = lambda name: True
-) -> dict[str, LoadedStructure]:
-    """Returns the static structures of a world, by name.
+) -> dict[str, StructureGeometry]:
+    """Returns the geometry of a world's static structures, by name.
 
     The names are sorted.
 
@@ -170,15 +170,15 @@ def read_structures(
     ):
         X_WG = X_WFs[geometry.frame_id] @ geometry.X_FG
         entry = world.structures[geometry.structure]
-        part = LoadedPart(geometry, X_WG, entry.material(geometry.part))
+        part = PartGeometry(geometry, X_WG, entry.material(geometry.part))
         found[geometry.structure].append(part)
     return {
-        name: LoadedStructure(world.structures[name], tuple(found[name]))
+        name: StructureGeometry(world.structures[name], tuple(found[name]))
         for name in sorted(found)
     }
 
 
-def triangle_corners(part: LoadedPart) -> np.ndarray:
+def triangle_corners(part: PartGeometry) -> np.ndarray:
     """Returns the corners (M, 3, 3) of a part's triangles in W [m].
 
     A part with a curved surface has no triangles.
