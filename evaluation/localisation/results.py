@@ -29,6 +29,20 @@ _SHOWN = (
     "rotation_median_deg",
     "auroc_own_score",
 )
+# Success rate -> greatest errors of a success [m, deg].
+_SUCCESSES = {
+    "success_03m_1deg": (RIGHT_TRANSLATION, RIGHT_ROTATION_DEG),
+    "success_2m_5deg": (SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG),
+}
+# Quantile of errors -> field of `QUERY`, and share of smaller errors.
+_QUANTILES = {
+    "translation_median": ("translation_error", 0.5),
+    "translation_95": ("translation_error", 0.95),
+    "rotation_median_deg": ("rotation_error_deg", 0.5),
+    "rotation_95_deg": ("rotation_error_deg", 0.95),
+}
+# Directions of the car, in which errors are measured.
+_DIRECTIONS = ("along", "across", "up")
 # Share of the right results whose scores pass the suggested threshold.
 _BELIEVED = 0.95
 # One row per query: its frame and time; the start's offset in W [m], and its
@@ -103,14 +117,6 @@ def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
         )
 
 
-def _believed_threshold(rows: np.ndarray) -> float:
-    """Returns the score that 95 % of the right results reach, or NaN."""
-    scores = rows["own_score"][is_right(rows)]
-    if len(scores) == 0:
-        return math.nan
-    return float(np.quantile(scores, 1.0 - _BELIEVED, method="lower"))
-
-
 def summary(rows: np.ndarray) -> dict[str, float | int | None]:
     """Returns a summary of localised scans, for JSON.
 
@@ -118,51 +124,99 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
 
     Args:
         rows: (K,) results, records of `QUERY`.
+
+    Returns:
+        Name -> number; None for a number that is undefined:
+
+        - `queries`, `without_pose`: numbers of queries, and of those without a
+          pose.
+        - `success_...`: shares of queries within the errors in the name.
+        - `translation_...` [m], `rotation_...` [deg]: quantiles of the errors.
+        - `along_median`, `std_along_median`: median error along the car, and
+          median of the standard deviation that the estimator states [m]; the
+          same `across` the car and `up`.
+        - `auroc_...`: how well a score tells right from wrong results.
+        - `believed_from`: threshold of trust, which most right results reach.
+        - `confident_wrong`, `confident_of_wrong`: wrong results with a score of
+          at least this threshold, as a share of all and of the wrong results.
+        - `unmapped_mean`: mean share of a scan that the map lacks.
+        - `seconds_mean`: mean CPU time [s].
     """
-    right = is_right(rows)
-    posed = rows[~np.isnan(rows["translation_error"])]
+    is_posed = ~np.isnan(rows["translation_error"])
+    found: dict[str, float | int | None] = {
+        "queries": len(rows),
+        "without_pose": len(rows) - int(is_posed.sum()),
+    }
+    for name, limits in _SUCCESSES.items():
+        found[name] = float(is_right(rows, *limits).mean())
+    found |= _error_quantiles(rows[is_posed])
+    found |= _score_aurocs(rows)
+    found |= _confidence(rows)
+    known = rows["unmapped"][~np.isnan(rows["unmapped"])]
+    found["unmapped_mean"] = float(known.mean()) if len(known) else None
+    found["seconds_mean"] = float(rows["seconds"].mean())
+    return json_values(found)
+
+
+def _error_quantiles(posed: np.ndarray) -> dict[str, float | None]:
+    """Returns the quantiles of errors in `summary`.
+
+    Args:
+        posed: (K,) results with a pose, records of `QUERY`.
+    """
 
     def quantile(name: str, part: float) -> float | None:
         values = np.abs(posed[name])
         return float(np.quantile(values, part)) if len(values) else None
 
-    least = _believed_threshold(rows)
-    believed = rows["own_score"] >= least
-    near = is_right(rows, SUCCESS_TRANSLATION, SUCCESS_ROTATION_DEG)
-    found: dict[str, float | int | None] = {
-        "queries": len(rows),
-        "without_pose": len(rows) - len(posed),
-        "success_03m_1deg": float(right.mean()),
-        "success_2m_5deg": float(near.mean()),
-        "translation_median": quantile("translation_error", 0.5),
-        "translation_95": quantile("translation_error", 0.95),
-        "rotation_median_deg": quantile("rotation_error_deg", 0.5),
-        "rotation_95_deg": quantile("rotation_error_deg", 0.95),
-    }
-    for name in ("along", "across", "up"):
+    found = {name: quantile(*of) for name, of in _QUANTILES.items()}
+    for name in _DIRECTIONS:
         found[f"{name}_median"] = quantile(name, 0.5)
         found[f"std_{name}_median"] = quantile(f"std_{name}", 0.5)
+    return found
+
+
+def _score_aurocs(rows: np.ndarray) -> dict[str, float]:
+    """Returns how well each score tells right from wrong results (AUROC).
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+    """
+    right = is_right(rows)
     # A small residual, or a small deviation, is a high score.
-    deviation = np.max(
-        [rows[f"std_{name}"] for name in ("along", "across", "up")], axis=0
-    )
-    for name, scores in (
-        ("own_score", rows["own_score"]),
-        ("fit", rows["fit"]),
-        ("residual", -rows["residual"]),
-        ("hessian", -deviation),
-    ):
-        found[f"auroc_{name}"] = auroc(scores, right)
-    found["believed_from"] = least
-    # Without a right result, there is no threshold.
-    harmful = float((believed & ~right).sum()) if right.any() else math.nan
+    deviation = np.max([rows[f"std_{name}"] for name in _DIRECTIONS], axis=0)
+    scores = {
+        "own_score": rows["own_score"],
+        "fit": rows["fit"],
+        "residual": -rows["residual"],
+        "hessian": -deviation,
+    }
+    return {f"auroc_{name}": auroc(s, right) for name, s in scores.items()}
+
+
+def _confidence(rows: np.ndarray) -> dict[str, float | None]:
+    """Returns the threshold of confident results, and how many are wrong.
+
+    The threshold is the score that a share `_BELIEVED` of the right results
+    reaches. Without a right result, it and the shares of wrong results are NaN.
+
+    Args:
+        rows: (K,) results, records of `QUERY`.
+    """
+    right = is_right(rows)
     wrong = int((~right).sum())
-    found["confident_wrong"] = harmful / len(rows)
-    found["confident_of_wrong"] = harmful / wrong if wrong else None
-    known = rows["unmapped"][~np.isnan(rows["unmapped"])]
-    found["unmapped_mean"] = float(known.mean()) if len(known) else None
-    found["seconds_mean"] = float(rows["seconds"].mean())
-    return json_values(found)
+    least = harmful = math.nan
+    if right.any():
+        scores = rows["own_score"]
+        least = float(
+            np.quantile(scores[right], 1.0 - _BELIEVED, method="lower")
+        )
+        harmful = float(((scores >= least) & ~right).sum())
+    return {
+        "believed_from": least,
+        "confident_wrong": harmful / len(rows),
+        "confident_of_wrong": harmful / wrong if wrong else None,
+    }
 
 
 def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
