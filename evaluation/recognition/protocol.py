@@ -49,8 +49,8 @@ class RetrievalProtocol:
             described cloud; by default, each method uses its own number.
         place: which of the merged scans determines the pose of the place:
             `middle`; or `first`, as in the paper. A method's own parameter
-            `place` overrides this value. With one scan per place, the value
-            becomes None.
+            `place` overrides this value. With one scan per place there is no
+            choice, and the value becomes None.
         exclude_recent: how long before a query the drive must have passed a
             place, so that the query is compared with this place [s]. None if
             two drives are compared.
@@ -96,22 +96,36 @@ class RetrievalProtocol:
     def __post_init__(self) -> None:
         for name in _POSITIVE:
             value = getattr(self, name)
-            if value is not None and not 0.0 < value < math.inf:
-                option = name.replace("_", "-")
-                raise InputError(f"--{option}: {value} is not positive")
+            self._check(
+                name, value is None or 0.0 < value < math.inf, "not positive"
+            )
         if self.scans_per_place == 1:
+            # A single scan is the first and the middle one. Protocols that
+            # differ only in this choice are equal, and have the same digest.
             object.__setattr__(self, "place", None)
-        if not 0.0 <= self.tilt_queries <= 90.0:
-            raise InputError(
-                f"--tilt-queries: {self.tilt_queries} is not from 0 to 90 deg"
-            )
-        if not 0.0 <= self.hide_sector < 360.0:
-            raise InputError(
-                f"--hide-sector: {self.hide_sector} is not from 0 to below"
-                " 360 deg"
-            )
-        if self.seed < 0:
-            raise InputError(f"--seed: {self.seed} is negative")
+        self._check(
+            "tilt_queries",
+            0.0 <= self.tilt_queries <= 90.0,
+            "not from 0 to 90 deg",
+        )
+        self._check(
+            "hide_sector",
+            0.0 <= self.hide_sector < 360.0,
+            "not from 0 to below 360 deg",
+        )
+        self._check("seed", self.seed >= 0, "negative")
+
+    def _check(self, name: str, is_valid: bool, fault: str) -> None:
+        """Refuses a value that is out of range.
+
+        Args:
+            name: name of the field, from which that of the option follows.
+            is_valid: whether its value is in range.
+            fault: what the value is otherwise, for the message.
+        """
+        if not is_valid:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: {getattr(self, name)} is {fault}")
 
     def scans(self, method: Method) -> int:
         """Returns how many scans are merged for one place.
