@@ -104,16 +104,18 @@ def _lacking_in(
 ) -> frozenset[str]:
     """Returns the structures of a stage that another stage lacks.
 
+    Args:
+        base: a drive through any stage of the map.
+        stage: the stage with the structures.
+        other: the other stage.
+        source: file and section of the losses, for error messages.
+
     Raises:
         InputError: a stage does not exist, or the other stage lacks nothing.
     """
-    names = []
-    for one in (stage, other):
-        scenario = base.replaced(stage=one)
-        scenario_files.check_files(scenario, source)
-        world = load_world(scenario.world_file)
-        names.append(structures_in(world))
-    difference = names[0] - names[1]
+    difference = _structures_of(base, stage, source) - _structures_of(
+        base, other, source
+    )
     if not difference:
         raise InputError(
             f"{source}: towards: stage {other} lacks nothing of stage {stage}"
@@ -121,10 +123,39 @@ def _lacking_in(
     return frozenset(difference)
 
 
+def _structures_of(base: Scenario, stage: str, source: str) -> set[str]:
+    """Returns the names of the structures in a stage.
+
+    Args:
+        base: a drive through any stage of the map.
+        stage: the stage.
+        source: file and section of the losses, for error messages.
+
+    Raises:
+        InputError: the stage does not exist.
+    """
+    scenario = base.replaced(stage=stage)
+    scenario_files.check_files(scenario, source)
+    return structures_in(load_world(scenario.world_file))
+
+
 def _removal_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
-    """Returns structures that can be missing, in the order of removal."""
+    """Returns structures that can be missing, in the order of removal.
+
+    Structures nearest to a random place are removed first.
+
+    Args:
+        table: the map's table of structures.
+        seed: seed of the random place.
+        removable: the structures that can be missing; None for all buildings
+            and plants except those that wait on a lot for a building.
+
+    Raises:
+        InputError: no structure can be missing, or a place in the table is not
+            a number.
+    """
     rows = [
         row
         for _, row in read_records(table, ("name", "class"))
@@ -161,8 +192,16 @@ def _scattered_losses(
 ) -> frozenset[str]:
     """Returns a random share of the structures of each class.
 
-    `shares` maps classes to shares from 0 to 1. A greater share contains all
-    structures of a smaller share.
+    A greater share contains all structures of a smaller share.
+
+    Args:
+        table: the map's table of structures.
+        shares: class -> share of its structures, from 0 to 1.
+        seed: seed of the random choice.
+        source: file and section of the losses, for error messages.
+
+    Raises:
+        InputError: the table has no structure of a class.
     """
     records = [row for _, row in read_records(table, ("name", "class"))]
     rows = [row for row in records if not _is_on_a_lot(row)]
