@@ -9,13 +9,21 @@ from cns_drake.base.jobs.step import Reporter
 from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.scores import score
-from evaluation.map_update.sessions import read_labels, read_pair, read_truth
+from evaluation.map_update.sessions import (
+    Pair as MapPair,
+    read_labels,
+    read_pair,
+    read_truth,
+)
 from evaluation.map_update.structures import class_names
 from evaluation.recognition.result_number import Number
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Task, check_positive
 
+# Scores of a detector that go into a table of results: IoUs, precisions and
+# recalls by points; shares of the points and of the structures that it calls
+# gone or new; and share of the structures whose verdict is right.
 _SCORES = (
     "miou",
     *(f"iou_{name}" for name in ("kept", "gone", "new", "unobserved")),
@@ -85,7 +93,7 @@ class LabelledMapTask(MapTask):
     def __init__(
         self, maps: Path, methods: Sequence[str], given: Sequence[Path] = ()
     ):
-        """Takes the folder.
+        """Sets up the task for two maps; their files are not read yet.
 
         Args:
             maps: folder with the maps of two drives and their exact labels.
@@ -131,17 +139,34 @@ def score_methods(
     }
     found = {}
     for method in (*methods, *((GIVEN,) if given else ())):
-        if method == GIVEN:
-            labels = PairLabels(
-                *(
-                    read_labels(path, session, truth=False)
-                    for path, session in zip(given, pair, strict=True)
-                )
-            )
-        elif method == TRUTH:
-            labels = truth
-        else:
-            labels = run_baseline(method, pair)
+        labels = _choose_labels(method, pair, truth, given)
         scores = score(pair, truth, labels, class_names(maps))
         found[method] = MapScores(scores, **number, labels=labels)
     return found
+
+
+def _choose_labels(
+    method: str, pair: MapPair, truth: PairLabels, given: Sequence[Path]
+) -> PairLabels:
+    """Returns the labels that are scored under the name of a method.
+
+    Args:
+        method: name of a change detector, `TRUTH` or `GIVEN`.
+        pair: the two maps.
+        truth: the exact labels of these maps.
+        given: files with the labels for `GIVEN`, of the older and of the newer
+            map.
+
+    Raises:
+        InputError: a file cannot be read, or the detector cannot run.
+    """
+    if method == TRUTH:
+        return truth
+    if method == GIVEN:
+        return PairLabels(
+            *(
+                read_labels(path, session, truth=False)
+                for path, session in zip(given, pair, strict=True)
+            )
+        )
+    return run_baseline(method, pair)
