@@ -11,6 +11,8 @@ from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
     Pair as MapPair,
+)
+from evaluation.map_update.sessions import (
     read_labels,
     read_pair,
     read_truth,
