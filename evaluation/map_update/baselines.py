@@ -23,7 +23,7 @@ from cns_drake.base.progress import track
 from evaluation.map_update.free_space import by_free_space
 from evaluation.map_update.labels import SIDES, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
-from evaluation.map_update.sessions import Pair, Session
+from evaluation.map_update.sessions import Session, SessionPair
 
 # Threshold of the baseline `distance` [m].
 _APART = 0.5
@@ -39,7 +39,7 @@ _LEAST_CHANGE = 0.1
 _CHUNK = 50_000
 
 
-def run_baseline(name: str, pair: Pair) -> PairLabels:
+def run_baseline(name: str, pair: SessionPair) -> PairLabels:
     """Returns the labels of both maps by a shipped change detector.
 
     Args:

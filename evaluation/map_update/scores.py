@@ -35,7 +35,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
 from evaluation.map_update.labels import SIDES, Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
-from evaluation.map_update.sessions import Pair
+from evaluation.map_update.sessions import SessionPair
 from evaluation.map_update.structures import verdicts
 
 _CLASSES = {
@@ -51,7 +51,7 @@ _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
 
 
 def score(
-    pair: Pair,
+    pair: SessionPair,
     truth: PairLabels,
     predicted: PairLabels,
     names: Mapping[int, str],
@@ -98,7 +98,7 @@ def score(
 class _Labelled(NamedTuple):
     """Both maps with their labels, and masks of the points that count."""
 
-    pair: Pair
+    pair: SessionPair
     truth: PairLabels
     predicted: PairLabels
     counted: list[np.ndarray]

@@ -278,14 +278,14 @@ def _g2o_poses(X: np.ndarray) -> Iterable[str]:
     return [" ".join(map(repr, row)) for row in numbers]
 
 
-class Pair(NamedTuple):
+class SessionPair(NamedTuple):
     """The two sessions of a folder: the older drive A and the newer drive B."""
 
     A: Session
     B: Session
 
 
-def read_pair(folder: Path) -> Pair:
+def read_pair(folder: Path) -> SessionPair:
     """Returns the sessions of the two drives in a folder, with their maps.
 
     The drives are in the subfolders A and B.
@@ -299,10 +299,10 @@ def read_pair(folder: Path) -> Pair:
                 f"{folder}: no folder {side}; cns-drake export --format"
                 " map-truth makes both"
             )
-    return Pair(*(read_session(folder / side) for side in SIDES))
+    return SessionPair(*(read_session(folder / side) for side in SIDES))
 
 
-def read_truth(pair: Pair) -> list[np.ndarray]:
+def read_truth(pair: SessionPair) -> list[np.ndarray]:
     """Returns the ground-truth labels of both maps, (N,) and (M,) uint8.
 
     Raises:

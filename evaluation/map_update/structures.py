@@ -10,7 +10,7 @@ from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.files import is_there
 from cns_drake.base.number_text import whole_number
 from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
-from evaluation.map_update.sessions import Pair
+from evaluation.map_update.sessions import SessionPair
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def verdicts(
 
 
 def structure_changes(
-    pair: Pair,
+    pair: SessionPair,
     truth: Sequence[np.ndarray],
     tables: Sequence[Mapping[int, Mapping]],
     present: Sequence[Collection[str]],

@@ -18,7 +18,7 @@ import numpy as np
 from evaluation.map_update.baselines import BASELINES
 from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.map_builder import CELL
-from evaluation.map_update.sessions import Pair, Session, scan_path
+from evaluation.map_update.sessions import Session, SessionPair, scan_path
 from evaluation.maps.grid_cells import cell_keys
 
 # No map is updated: all drives are merged.
@@ -33,7 +33,7 @@ _CUBE = 0.4
 
 # A change detector: labels the points of the map so far and of the next drive's
 # map.
-Detect = Callable[[Pair], PairLabels]
+Detect = Callable[[SessionPair], PairLabels]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class UpkeptMap:
             self._is_added = np.zeros(len(session.points), bool)
             points, X_WS = session.points, session.X_WS
         else:
-            labels = detect(Pair(self._map, session))
+            labels = detect(SessionPair(self._map, session))
             stays = labels.A != Label.GONE
             old = self._map.points
             self._gone.append(old[~stays])

@@ -14,7 +14,7 @@ from cns_drake.studies.ground_truth.map_truth_page import write_page
 from evaluation.map_update.labels import SIDES
 from evaluation.map_update.sessions import (
     SPACING,
-    Pair,
+    SessionPair,
     write_labels,
     write_session,
 )
@@ -67,7 +67,7 @@ def write_truth(
             session, taken = write_session(one.drive, draft / side, spacing)
             sessions.append(session)
             frames.append(taken)
-        pair = Pair(*sessions)
+        pair = SessionPair(*sessions)
         truth = (
             label_points(pair.A, b, frames[1]),
             label_points(pair.B, a, frames[0]),

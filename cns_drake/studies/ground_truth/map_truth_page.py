@@ -10,7 +10,7 @@ import numpy as np
 
 from cns_drake.base.complete_files import write_text
 from evaluation.map_update.labels import Label
-from evaluation.map_update.sessions import Pair
+from evaluation.map_update.sessions import SessionPair
 from evaluation.map_update.structures import StructureChange
 from evaluation.results.styles import GONE, NEW
 
@@ -39,7 +39,7 @@ _MOST_ROWS = 200
 
 def write_page(
     path: Path,
-    pair: Pair,
+    pair: SessionPair,
     truth: Sequence[np.ndarray],
     table: Sequence[StructureChange],
     names: tuple[str, str],
@@ -81,7 +81,9 @@ def write_page(
     write_text(path, f"{text}\n")
 
 
-def _picture_frame(pair: Pair) -> tuple[np.ndarray, float, tuple[int, int]]:
+def _picture_frame(
+    pair: SessionPair,
+) -> tuple[np.ndarray, float, tuple[int, int]]:
     """Returns the corner [m], pixel side [m], rows and columns of a picture."""
     points = np.concatenate([one.points[:, :2] for one in pair])
     if len(points) == 0:

@@ -18,7 +18,7 @@ from cns_drake.studies.ground_truth.labelled_drive import (
 from evaluation.map_update.baselines import run_baseline
 from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.nearest_points import nearest_distances
-from evaluation.map_update.sessions import Pair, write_session
+from evaluation.map_update.sessions import SessionPair, write_session
 from evaluation.map_update.upkeep import TRUTH, Updates, UpkeptMap
 from evaluation.map_update.upkept_drive import UpkeptDrive
 from evaluation.study.sources import DriveSource
@@ -96,7 +96,7 @@ def _on_still_surfaces(
 
 
 def _exact_labels(
-    pair: Pair, *, drive: LabelledDrive, frames: np.ndarray
+    pair: SessionPair, *, drive: LabelledDrive, frames: np.ndarray
 ) -> PairLabels:
     """Returns the exact labels of the map so far and of the next drive's map.
 

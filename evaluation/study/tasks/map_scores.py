@@ -10,9 +10,7 @@ from evaluation.map_update.baselines import BASELINES, run_baseline
 from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
-    Pair as MapPair,
-)
-from evaluation.map_update.sessions import (
+    SessionPair,
     read_labels,
     read_pair,
     read_truth,
@@ -148,7 +146,7 @@ def score_methods(
 
 
 def _choose_labels(
-    method: str, pair: MapPair, truth: PairLabels, given: Sequence[Path]
+    method: str, pair: SessionPair, truth: PairLabels, given: Sequence[Path]
 ) -> PairLabels:
     """Returns the labels that are scored under the name of a method.
 

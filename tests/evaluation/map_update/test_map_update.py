@@ -17,7 +17,7 @@ from evaluation.map_update.labels import Label, PairLabels
 from evaluation.map_update.map_builder import CELL, MapBuilder
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import (
-    Pair,
+    SessionPair,
     read_labels,
     read_pair,
     read_session,
@@ -89,7 +89,7 @@ def test_each_mean_leaves_out_what_its_own_part_lacks(tmp_path):
     classes = np.where(cars, 10, 40).astype(np.uint16)
     poses = np.tile(np.eye(4), (1, 1, 1))
     poses[0, :3, 3] = 4.5, 4.5, 30.0
-    pair = Pair(*(replace(s, classes=classes, X_WS=poses) for s in pair))
+    pair = SessionPair(*(replace(s, classes=classes, X_WS=poses) for s in pair))
     found = score(pair, truth, guess, {})
 
     def mean_iou(parts):
@@ -235,7 +235,7 @@ def test_structures_that_one_world_has_need_no_point(tmp_path):
     tables = table, table
     path = tmp_path / "structures.csv"
     present = {"house"}, {"house", "car", "shed"}
-    rows = structure_changes(Pair(a, b), truth, tables, present)
+    rows = structure_changes(SessionPair(a, b), truth, tables, present)
     write_structures(path, rows)
     found = [(r.side, r.structure, r.points, r.alone, r.moves) for r in rows]
     assert found == [
