@@ -35,7 +35,12 @@ from evaluation.clouds.cloud_files import read_blocks, read_cloud
 from evaluation.clouds.npy_files import read_npy
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.trajectories import read_poses
-from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
+from evaluation.map_update.labels import (
+    MOVING_CLASSES,
+    SIDES,
+    Label,
+    PairLabels,
+)
 from evaluation.map_update.map_builder import MapBuilder
 
 # Distance driven between two scans [m].
@@ -302,12 +307,15 @@ def read_pair(folder: Path) -> SessionPair:
     return SessionPair(*(read_session(folder / side) for side in SIDES))
 
 
-def read_truth(pair: SessionPair) -> list[np.ndarray]:
-    """Returns the ground-truth labels of both maps, (N,) and (M,) uint8.
+def read_truth(pair: SessionPair) -> PairLabels:
+    """Returns the ground-truth labels of both maps.
 
     Raises:
         InputError: see `read_labels`.
     """
-    return [
-        read_labels(one.folder / "truth.npy", one, truth=True) for one in pair
-    ]
+    return PairLabels(
+        *(
+            read_labels(one.folder / "truth.npy", one, truth=True)
+            for one in pair
+        )
+    )

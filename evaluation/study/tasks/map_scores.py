@@ -132,7 +132,7 @@ def score_methods(
         InputError: the folder cannot be read, or a detector cannot run.
     """
     pair = read_pair(maps)
-    truth = PairLabels(*read_truth(pair))
+    truth = read_truth(pair)
     number = {
         "gone": int((truth.A == Label.GONE).sum()),
         "new": int((truth.B == Label.NEW).sum()),

@@ -24,7 +24,7 @@ from cns_drake.studies.ground_truth.labelled_drive import (
 )
 from cns_drake.studies.ground_truth.map_truth import write_truth
 from cns_drake.studies.tasks.map_task import TRUTH, measure_maps
-from evaluation.map_update.labels import Label, PairLabels
+from evaluation.map_update.labels import Label
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_pair, read_truth
 
@@ -43,7 +43,7 @@ def label(tmp_path, before, after, **options):
     output = tmp_path / "truth"
     write_truth(*labelled, output)
     pair = read_pair(output)
-    return pair, PairLabels(*read_truth(pair))
+    return pair, read_truth(pair)
 
 
 def on(session, name):
