@@ -13,7 +13,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.shared_options import Jobs, Scheduler
 
 
-class Part(str, Enum):
+class Variation(str, Enum):
     """Kinds of variation that can be left out of a training."""
 
     CHANGE = "change"
@@ -28,7 +28,7 @@ def train(
     cities: Annotated[int | None, typer.Option(min=1, max=1000)] = None,
     steps: Annotated[int | None, typer.Option(min=1)] = None,
     seed: Annotated[int, typer.Option(min=0, max=10_000)] = 1,
-    without: list[Part] | None = None,
+    without: list[Variation] | None = None,
     drawn_streets: Annotated[bool, typer.Option("--drawn-streets")] = False,
     graded: Annotated[bool, typer.Option("--graded")] = False,
     jobs: Jobs = None,

@@ -21,7 +21,7 @@ _HEIGHT_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True)
-class Part:
+class ColouredPart:
     """A part of a structure that has one colour.
 
     Attributes:
@@ -57,13 +57,13 @@ class StageDifference:
             the other stage, with the shape in the other stage.
     """
 
-    common: list[Part] = field(default_factory=list)
-    additional: list[Part] = field(default_factory=list)
-    absent: list[Part] = field(default_factory=list)
-    lower: list[Part] = field(default_factory=list)
+    common: list[ColouredPart] = field(default_factory=list)
+    additional: list[ColouredPart] = field(default_factory=list)
+    absent: list[ColouredPart] = field(default_factory=list)
+    lower: list[ColouredPart] = field(default_factory=list)
 
 
-def read_parts(world: World) -> dict[str, list[Part]]:
+def read_parts(world: World) -> dict[str, list[ColouredPart]]:
     """Returns the parts of structures that cannot move, by structure."""
     plant = world.plant
     context = plant.CreateDefaultContext()
@@ -80,11 +80,11 @@ def read_parts(world: World) -> dict[str, list[Part]]:
         )
         for frame_id in {geometry.frame_id for geometry in geometries}
     }
-    parts: dict[str, list[Part]] = {}
+    parts: dict[str, list[ColouredPart]] = {}
     for geometry in geometries:
         semantic_class = structures[geometry.structure].semantic_class
         parts.setdefault(geometry.structure, []).append(
-            Part(
+            ColouredPart(
                 semantic_class,
                 geometry.rgb or CLASS_RGB[semantic_class],
                 merge_surfaces([geometry], X_WFs.__getitem__),
@@ -94,7 +94,8 @@ def read_parts(world: World) -> dict[str, list[Part]]:
 
 
 def compare_parts(
-    own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
+    own: Mapping[str, Sequence[ColouredPart]],
+    other: Mapping[str, Sequence[ColouredPart]],
 ) -> StageDifference:
     """Returns the differences between the structures of two stages, by part.
 
@@ -125,19 +126,19 @@ def compare_parts(
     return difference
 
 
-def _top(parts: Sequence[Part]) -> float:
+def _top(parts: Sequence[ColouredPart]) -> float:
     return max(part.top() for part in parts)
 
 
 def _split_at_height(
-    parts: Sequence[Part], height: float
-) -> tuple[list[Part], list[Part]]:
+    parts: Sequence[ColouredPart], height: float
+) -> tuple[list[ColouredPart], list[ColouredPart]]:
     """Returns the parts below a height, and the parts above it [m].
 
     No triangle is cut.
     """
-    below: list[Part] = []
-    above: list[Part] = []
+    below: list[ColouredPart] = []
+    above: list[ColouredPart] = []
     for part in parts:
         surface = part.surface
         reaches = (surface.p_GVset[surface.triangles, 2] > height).any(axis=1)

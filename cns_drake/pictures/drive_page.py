@@ -13,7 +13,11 @@ from pydrake.geometry import FrameId, MeshcatParams
 from pydrake.math import RigidTransform
 
 from cns_drake.pictures import meshcat_drawing as drawing
-from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
+from cns_drake.pictures.city_parts import (
+    ColouredPart,
+    compare_parts,
+    read_parts,
+)
 from cns_drake.pictures.drive_record import DriveRecord
 from cns_drake.pictures.page_panel import (
     CHANGE_RGB,
@@ -127,7 +131,7 @@ def _draw_city(
 
 
 def _draw_missing(
-    meshcat: geometry.Meshcat, name: str, parts: Sequence[Part]
+    meshcat: geometry.Meshcat, name: str, parts: Sequence[ColouredPart]
 ) -> None:
     """Draws parts that only the other stage has; they are hidden at first."""
     if not parts:

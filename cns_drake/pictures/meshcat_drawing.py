@@ -8,7 +8,7 @@ from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
-from cns_drake.pictures.city_parts import DEFAULT_RGB, Part
+from cns_drake.pictures.city_parts import DEFAULT_RGB, ColouredPart
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     merge_surfaces,
@@ -49,7 +49,10 @@ _WHITE = [1.0, 1.0, 1.0, 1.0]
 
 
 def draw_parts(
-    meshcat: Meshcat, path: str, parts: Iterable[Part], rgba: Rgba | None = None
+    meshcat: Meshcat,
+    path: str,
+    parts: Iterable[ColouredPart],
+    rgba: Rgba | None = None,
 ) -> None:
     """Draws parts of a city as one mesh per class, named `<path>/<class>`.
 
@@ -59,7 +62,7 @@ def draw_parts(
         parts: the parts.
         rgba: colour of all parts; None for their own colours.
     """
-    by_class: dict[str, list[Part]] = {}
+    by_class: dict[str, list[ColouredPart]] = {}
     for part in parts:
         by_class.setdefault(part.semantic_class, []).append(part)
     for semantic_class, members in sorted(by_class.items()):

@@ -41,7 +41,7 @@ from evaluation.study.tasks.pair import USUAL_LENGTH
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedDrives:
     """The drives of the database and the query drive of one condition.
 
     Attributes:
@@ -167,7 +167,7 @@ class PairMaker:
             for side, drive in plain.items()
         }
 
-    def build(self, condition: Condition, seed: int) -> Compared:
+    def build(self, condition: Condition, seed: int) -> ComparedDrives:
         """Returns the database drive and the query drive under a condition.
 
         Args:
@@ -215,7 +215,7 @@ class PairMaker:
             f"{where}.maintain",
         )
         oldest, *beside = drives
-        return Compared(
+        return ComparedDrives(
             oldest.drive,
             query_drive,
             protocol,

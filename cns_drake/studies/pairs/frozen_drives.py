@@ -9,7 +9,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.number_text import whole_number
 from cns_drake.scenarios.provenance import combined_digest, digest_inputs
 from cns_drake.scenarios.shipped import worlds_folder
-from cns_drake.studies.pairs.comparisons import Compared
+from cns_drake.studies.pairs.comparisons import ComparedDrives
 
 # Columns of a table of frozen drives.
 _FROZEN = ("map", "level", "drives")
@@ -38,7 +38,9 @@ def frozen_drives(table: str) -> dict[tuple[str, int], str]:
     }
 
 
-def drives_fingerprint(compared: Compared, worlds: dict[Path, str]) -> str:
+def drives_fingerprint(
+    compared: ComparedDrives, worlds: dict[Path, str]
+) -> str:
     """Returns a hash of all drives and of the cities along these drives.
 
     Args:

@@ -15,7 +15,7 @@ from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
 from cns_drake.studies.maps.experiment_maps import MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
-from cns_drake.studies.pairs.comparisons import Compared, PairMaker
+from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recordings.recording import is_recorded
 from evaluation.map_update.upkeep import NOT_MAINTAINED
@@ -44,7 +44,7 @@ class ChangedPair(NamedTuple):
 
     names: tuple[str, str]
     query: Scenario
-    compared: Compared
+    compared: ComparedDrives
     condition: Condition
     seed: int
 
@@ -93,7 +93,7 @@ class SimulatedPairs:
         for one in self.changed(some, made=False):
             condition_protocol(one.condition, self._source)
 
-    def pairs(self, some: MapPairs) -> Iterator[tuple[Pair, Compared]]:
+    def pairs(self, some: MapPairs) -> Iterator[tuple[Pair, ComparedDrives]]:
         """Yields the pairs of a map in all conditions possible on the map.
 
         Each item is a pair to measure, and the changed drives of the pair.
@@ -155,7 +155,9 @@ class SimulatedPairs:
         for text in noted if made else ():
             self._on_note(f"{some.map_name}: {text}")
 
-    def _pair(self, compared: Compared, query: Scenario, **shown: Any) -> Pair:
+    def _pair(
+        self, compared: ComparedDrives, query: Scenario, **shown: Any
+    ) -> Pair:
         """Returns a pair of drives, which tables show with given fields."""
         *drives, asked = (
             replace(self.named_drive(drive), length=length)

@@ -1,7 +1,11 @@
 import numpy as np
 import pytest
 
-from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
+from cns_drake.pictures.city_parts import (
+    ColouredPart,
+    compare_parts,
+    read_parts,
+)
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import load_world
@@ -20,7 +24,7 @@ def house(*levels, x=0.0):
         for i in range(4):
             a, b = 4 * k + i, 4 * k + (i + 1) % 4
             triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
-    return Part(
+    return ColouredPart(
         "building",
         (0.7, 0.3, 0.2),
         TriangleSurface(np.array(vertices), np.array(triangles, np.int32)),

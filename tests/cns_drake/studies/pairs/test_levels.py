@@ -12,7 +12,7 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.studies.experiments.experiment_files import load_experiment
-from cns_drake.studies.pairs.comparisons import Compared
+from cns_drake.studies.pairs.comparisons import ComparedDrives
 from cns_drake.studies.pairs.frozen_drives import (
     check_frozen,
     drives_fingerprint,
@@ -80,7 +80,7 @@ def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
 def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     values = scenario_values(write_small_map(tmp_path / "small"))
     drive = make_scenario(values, "test")
-    compared = Compared(drive, drive, RECORDED_PROTOCOL)
+    compared = ComparedDrives(drive, drive, RECORDED_PROTOCOL)
     before = drives_fingerprint(compared, {})
     assert drives_fingerprint(compared, {}) == before
     known = compared.fingerprint()
@@ -91,7 +91,7 @@ def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):
     assert compared.fingerprint() == known
     # Neither does the city of another session hide behind the first one's.
     former = drive.replaced(stage="01" if drive.stage != "01" else "04")
-    several = Compared(drive, drive, RECORDED_PROTOCOL, beside=(former,))
+    several = ComparedDrives(drive, drive, RECORDED_PROTOCOL, beside=(former,))
     before = drives_fingerprint(several, {})
     world = former.world_file
     assert world != drive.world_file
