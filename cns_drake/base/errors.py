@@ -92,6 +92,30 @@ def errors_at(place: object, instead_of: str = "") -> Iterator[None]:
         raise InputError(f"{place}: {fault}") from error
 
 
+@contextlib.contextmanager
+def errors_at_option(option: str, argument: str) -> Iterator[None]:
+    """Names the option of a command where an InputError names an argument.
+
+    A message of the `with` block that begins with the argument, such as
+    `name: missing`, then begins with the option, as in `--method: missing`.
+    All other messages stay as they are.
+
+    Args:
+        option: the option, with its dashes.
+        argument: name of the argument that gets the option's value.
+
+    Raises:
+        InputError: if the block raises InputError.
+    """
+    try:
+        yield
+    except InputError as error:
+        place, colon, fault = str(error).partition(": ")
+        if not colon or place != argument:
+            raise
+        raise InputError(f"{option}: {fault}") from error
+
+
 def one_line(message: object) -> str:
     """Returns a message as one printable line of bounded length.
 

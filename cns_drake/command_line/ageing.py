@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError, did_you_mean
+from cns_drake.base.errors import InputError, did_you_mean, errors_at_option
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.number_text import whole_number
 from cns_drake.base.terminal import show
@@ -117,16 +117,17 @@ def age(
             f"{maps[0]}: neither a shipped map ({', '.join(shipped_maps())}) "
             f"nor a folder{did_you_mean(maps[0], shipped_maps())}"
         )
-    aged = age_map(
-        folder,
-        wanted,
-        seed,
-        read_rates(rates, rate),
-        output,
-        finish=lambda draft, one: (
-            draw_pictures(draft, one) if pictures else None
-        ),
-    )
+    with errors_at_option("--output", "output"):
+        aged = age_map(
+            folder,
+            wanted,
+            seed,
+            read_rates(rates, rate),
+            output,
+            finish=lambda draft, one: (
+                draw_pictures(draft, one) if pictures else None
+            ),
+        )
     rows = [
         (f"stage {stage}", f"year {year}" if year else "today")
         for stage, year in aged.years.items()

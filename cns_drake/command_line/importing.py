@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base import shared_options
-from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError, errors_at_option
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.listing import natural_key
 from cns_drake.base.number_text import whole_number
@@ -117,12 +117,13 @@ def import_city(
         from cns_drake.imports import import_map
         from cns_drake.scenarios.drive_table import write_table
 
-    report = import_map.import_city(
-        path,
-        output,
-        options,
-        finish=write_table,
-    )
+    with errors_at_option("--output", "output"):
+        report = import_map.import_city(
+            path,
+            output,
+            options,
+            finish=write_table,
+        )
     for line in _shortcomings(report, output, options):
         note(f"{output}: {line}")
     values = {

@@ -140,6 +140,6 @@ def check_new_map(output: Path) -> None:
     name = output.resolve().name
     if not re.fullmatch(r"\w+", name, re.ASCII):
         raise InputError(
-            f"--output: {name!r}: the folder's name may have letters, digits "
+            f"output: {name!r}: the folder's name may have letters, digits "
             "and underscores only"
         )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base.errors import InputError, errors_at_option
 from cns_drake.base.terminal import number_text
 from evaluation.command_line import options
 from evaluation.command_line.printed_text import NOT_FINITE, interval_text
@@ -116,7 +117,8 @@ def pr(
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)
         choice = _choice_of(method, parameter).at_height(sensor_height)
-        _write_scores(choice.make(), database, query, scores, protocol, columns)
+        chosen = _made(choice)
+        _write_scores(chosen, database, query, scores, protocol, columns)
         return
     from cns_drake.base import files
     from evaluation.drives import check_same_world
@@ -143,7 +145,7 @@ def pr(
         files.make_folder(output)
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
-    chosen = choice.make()
+    chosen = _made(choice)
     drives = options.aligned(
         options.open_noted(database, query, lidar=lidar, columns=columns),
         align,
@@ -216,7 +218,6 @@ def _check_together(
         InputError: an option needs another one, or a file cannot be used.
     """
     from cns_drake.base import complete_files, files
-    from cns_drake.base.errors import InputError
 
     for option, file in (
         ("--overlaps", overlaps),
@@ -291,6 +292,16 @@ def _choice_of(name: str, assignments: list[str] | None) -> MethodChoice:
         name, file = load_method(file).name, file.absolute()
     settings = method_settings(assignments or [], [name])[name]
     return MethodChoice(name, file, tuple(settings.items()))
+
+
+def _made(choice: MethodChoice) -> Method:
+    """Returns a chosen method.
+
+    Raises:
+        InputError: the method or a setting is unknown, or a value does not fit.
+    """
+    with errors_at_option("--method", "name"):
+        return choice.make()
 
 
 def _recognition_rows(

@@ -104,7 +104,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     if name not in _METHODS:
         known = known_methods()
         raise InputError(
-            f"--method: no method {name!r} (known: {', '.join(known)})"
+            f"name: no method {name!r} (known: {', '.join(known)})"
             f"{did_you_mean(name, known)}"
         )
     method = _METHODS[name]

@@ -299,6 +299,14 @@ def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):
     assert not output.exists()
 
 
+@pytest.mark.parametrize(
+    "arguments", [["age", "suburbia", "--years", "1"], ["import", "a.xodr"]]
+)
+def test_the_name_of_a_new_map(tmp_path, capfd, arguments):
+    result = run_here(capfd, *arguments, "--output", tmp_path / "my town")
+    assert_one_line(result, "--output: 'my town': the folder's name may have")
+
+
 @pytest.mark.parametrize("command", ["simulate", "export", "scan", "generate"])
 def test_output_that_cannot_be_written(files, capfd, command):
     arguments = {

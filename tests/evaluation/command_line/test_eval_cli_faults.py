@@ -15,7 +15,8 @@ def test_bad_usage(capsys, towns):
     assert_refused(capsys, ["tcr", town, town, "--colour"], "--colour")
     assert_refused(capsys, ["pr", town, town], "Missing option '--method'")
     pr = ["pr", town, town, "--method"]
-    assert_refused(capsys, [*pr, "bow"], "'bow'", "known: ", "scan-context++")
+    fault = "--method: no method 'bow' (known: "
+    assert_refused(capsys, [*pr, "bow"], fault, "scan-context++")
     pr.append("scan-context++")
     assert_refused(capsys, [*pr, "--mode", "some"], "some", "filtered")
     assert_refused(capsys, [*pr, "--set", "candidates"], "is not NAME=VALUE")
