@@ -38,14 +38,19 @@ from evaluation.map_update.nearest_points import nearest_distances
 from evaluation.map_update.sessions import SessionPair
 from evaluation.map_update.structures import verdicts
 
+# Class of a point -> its labels in both maps.
 _CLASSES = {
     "kept": (Label.KEPT,),
     "gone": (Label.GONE,),
     "new": (Label.NEW,),
     "unobserved": (Label.UNOBSERVED, Label.NEWLY_SEEN),
 }
+# Class of a changed point -> the side of its map, and its label there.
 _CHANGES = {"gone": ("A", Label.GONE), "new": ("B", Label.NEW)}
+# Key of scores -> distance within which changed points are compared [m].
 _TOLERANCES = {"within_02m": 0.2, "within_05m": 0.5}
+# A point of the updated map agrees with B's map within this distance [m].
+_AGREES_WITHIN = 0.2
 # Limits of the classes of distance from the other drive [m].
 _DISTANCES = (0.0, 10.0, 20.0, 40.0, math.inf)
 
@@ -96,7 +101,14 @@ def score(
 
 
 class _Labelled(NamedTuple):
-    """Both maps with their labels, and masks of the points that count."""
+    """Both maps with their labels, and masks of the points that count.
+
+    Attributes:
+        pair: the older map of N points and the newer map of M points.
+        truth: their ground-truth labels.
+        predicted: their predicted labels.
+        counted: (N,) and (M,) bool, which points are scored.
+    """
 
     pair: SessionPair
     truth: PairLabels
@@ -104,6 +116,11 @@ class _Labelled(NamedTuple):
     counted: list[np.ndarray]
 
     def only(self, kept: list[np.ndarray]) -> _Labelled:
+        """Returns the same maps with fewer points that are scored.
+
+        Args:
+            kept: (N,) and (M,) bool; only points of these masks still count.
+        """
         rows = zip(self.counted, kept, strict=True)
         return self._replace(counted=[one & other for one, other in rows])
 
@@ -114,17 +131,7 @@ def _scores_by_points(both: _Labelled) -> dict[str, float]:
     The IoU is NaN for a class that occurs neither in the ground truth nor by
     prediction.
     """
-    code = np.zeros(256, np.int64)
-    for k, labels in enumerate(_CLASSES.values()):
-        code[list(labels)] = k
-    size = len(_CLASSES)
-    cells = np.zeros(size * size, np.int64)
-    for true, found, rows in zip(*both[1:], strict=True):
-        cells += np.bincount(
-            size * code[true[rows]] + code[found[rows]], minlength=size * size
-        )
-    # Rows: truth; columns: prediction.
-    table = cells.reshape(size, size)
+    table = _confusion(both)
     right = np.diag(table)
     true = table.sum(axis=1)
     found = table.sum(axis=0)
@@ -141,6 +148,27 @@ def _scores_by_points(both: _Labelled) -> dict[str, float]:
         result[f"precision_{name}"] = _ratio(right[k], found[k])
         result[f"recall_{name}"] = _ratio(right[k], true[k])
     return result
+
+
+def _confusion(both: _Labelled) -> np.ndarray:
+    """Returns how many points of each true class have each predicted class.
+
+    Returns:
+        (4, 4) counts; rows are true classes, columns are predicted classes,
+        both in the order of `_CLASSES`.
+    """
+    # Label -> number of its class.
+    class_of = np.zeros(256, np.int64)
+    for k, labels in enumerate(_CLASSES.values()):
+        class_of[list(labels)] = k
+    size = len(_CLASSES)
+    cells = np.zeros(size * size, np.int64)
+    for true, found, rows in zip(*both[1:], strict=True):
+        cells += np.bincount(
+            size * class_of[true[rows]] + class_of[found[rows]],
+            minlength=size * size,
+        )
+    return cells.reshape(size, size)
 
 
 def _scores_within(both: _Labelled, distance: float) -> dict[str, float]:
@@ -180,7 +208,9 @@ def _scores_by_structure(both: _Labelled) -> dict[str, float]:
     found = {}
     for k, (name, (side, label)) in enumerate(_CHANGES.items()):
         true, guessed = (
-            verdicts(pair[k].instances[counted[k]], one[k][counted[k]], side)[2]
+            verdicts(
+                pair[k].instances[counted[k]], one[k][counted[k]], side
+            ).labels
             == label
             for one in (truth, predicted)
         )
@@ -202,7 +232,7 @@ def _predicted_shares(both: _Labelled) -> dict[str, float]:
         unobserved, _, changed = SIDES[session.side]
         points.append(found[rows] == changed)
         is_true, is_found = (
-            verdicts(session.instances[rows], labels[rows], session.side)[2]
+            verdicts(session.instances[rows], labels[rows], session.side).labels
             for labels in (true, found)
         )
         structures.append(is_found == changed)
@@ -241,13 +271,12 @@ def _scores_of_updated_map(both: _Labelled) -> dict[str, float]:
         ]
     )
     other = nearest_distances(pair.B.points[counted[1]], updated)
-    tolerance = _TOLERANCES["within_02m"]
     if len(own) == 0 or len(other) == 0:
         return dict.fromkeys(("completeness", "accuracy", "chamfer"), math.nan)
     chamfer = 0.5 * (own.mean() + other.mean())
     return {
-        "completeness": float(np.mean(other <= tolerance)),
-        "accuracy": float(np.mean(own <= tolerance)),
+        "completeness": float(np.mean(other <= _AGREES_WITHIN)),
+        "accuracy": float(np.mean(own <= _AGREES_WITHIN)),
         "chamfer": float(chamfer) if math.isfinite(chamfer) else math.nan,
     }
 

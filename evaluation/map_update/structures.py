@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,9 +52,22 @@ class StructureChange:
         return self.label in MOVING_CLASSES
 
 
-def verdicts(
-    instances: np.ndarray, labels: np.ndarray, side: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class Verdicts(NamedTuple):
+    """Verdicts on the S structures of a map, in ascending order of numbers.
+
+    Attributes:
+        numbers: (S,) numbers of the structures.
+        counts: (S, 3) how many points each structure has, how many of them are
+            observed, and how many have changed.
+        labels: (S,) verdict on each structure, as a `Label`.
+    """
+
+    numbers: np.ndarray
+    counts: np.ndarray
+    labels: np.ndarray
+
+
+def verdicts(instances: np.ndarray, labels: np.ndarray, side: str) -> Verdicts:
     """Returns a verdict on each structure of a map, such as kept, gone or new.
 
     A structure is gone or new if more than half of its observed points are gone
@@ -64,11 +78,6 @@ def verdicts(
         labels: (N,) label of each point, see
             `evaluation.map_update.labels.Label`.
         side: `A` for the older map, `B` for the newer map.
-
-    Returns:
-        (S,) numbers of the S structures; (S, 3) how many points each structure
-        has, how many of them are observed, and how many have changed; (S,)
-        verdict on each structure, as a `Label`.
     """
     unobserved, kept, changed = SIDES[side]
     rows = np.flatnonzero(instances)
@@ -83,7 +92,9 @@ def verdicts(
         axis=1,
     )
     found = np.where(2 * count[:, 2] > count[:, 1], changed, kept)
-    return numbers, count, np.where(count[:, 1] == 0, unobserved, found)
+    return Verdicts(
+        numbers, count, np.where(count[:, 1] == 0, unobserved, found)
+    )
 
 
 def structure_changes(
