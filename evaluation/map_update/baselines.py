@@ -50,10 +50,8 @@ def run_baseline(name: str, pair: SessionPair) -> PairLabels:
         InputError: the sessions lack data that the detector needs, or its
             package is not installed.
     """
-    label = BASELINES[name]
-    return PairLabels(
-        *(label(mine, theirs) for mine, theirs in (pair, (pair.B, pair.A)))
-    )
+    find_labels = BASELINES[name]
+    return PairLabels(find_labels(pair.A, pair.B), find_labels(pair.B, pair.A))
 
 
 def by_distance(mine: Session, theirs: Session) -> np.ndarray:
@@ -106,6 +104,7 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     return labels.astype(np.uint8)
 
 
+# Name of a detector -> function that labels the first map by the second.
 BASELINES: dict[str, Callable[[Session, Session], np.ndarray]] = {
     "free-space": by_free_space,
     "distance": by_distance,

@@ -15,6 +15,7 @@ paths hardly meet, and Suburbia after five years.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,8 @@ _PAST = 0.5
 _SHOWN_WITHIN = 0.2
 # Distance driven between two scans [m].
 _SPACING = 2.0
+# At least this many scans, spread over the drive, show the field of view.
+_FIELD_SCANS = 20
 # Number of the lowest, highest and farthest returns that do not count for the
 # field of view, since a few may come from a bird or a reflection. A ring of
 # beams has many more returns.
@@ -53,6 +56,25 @@ _CHANGED_SHARE = 0.2
 # A point of such a cube is still kept if a point of the other map is within
 # this distance [m].
 _STILL_KEPT_WITHIN = 0.12
+# Least horizontal distance from which a slope is computed [m].
+_TINY = 1e-9
+
+
+class _Views(NamedTuple):
+    """How many scans see past N points, show them, or hide them.
+
+    The module's docstring says when a scan sees past a point, and when it shows
+    a point. A scan hides a point if a surface lies in front of it.
+
+    Attributes:
+        past: (N,) number of scans that see past each point.
+        shown: (N,) number of scans that show it.
+        hidden: (N,) number of scans that hide it.
+    """
+
+    past: np.ndarray
+    shown: np.ndarray
+    hidden: np.ndarray
 
 
 def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
@@ -68,30 +90,45 @@ def by_free_space(mine: Session, theirs: Session) -> np.ndarray:
     Returns:
         (N,) uint8, values of `evaluation.map_update.labels.Label`.
     """
-    unobserved, kept, changed = SIDES[mine.side]
+    _, kept, changed = SIDES[mine.side]
     _check_scans(theirs)
     labels = np.full(len(mine.points), kept, np.uint8)
     distances = nearest_distances(mine.points, theirs.points, _KEPT_WITHIN)
     far = np.isinf(distances)
-    points = mine.points[far]
-    cells = np.floor(points / _CELL).astype(np.int64)
-    _, first, cell_of = np.unique(
-        cells, axis=0, return_index=True, return_inverse=True
-    )
-    past, shown, hidden = _count_views(points[first], theirs)
-    needed = np.minimum(_SHOWN_SHARE * hidden, _ENOUGH)
-    is_shown = (shown > 0) & (shown >= needed)
-    found = np.where(is_shown, kept, unobserved)
-    found = np.where(past > 0, changed, found)
-    labels[far] = found[cell_of.ravel()]
+    labels[far] = _label_by_scans(mine.points[far], mine.side, theirs)
+    # A new object may pass near to one that is gone.
     known = np.flatnonzero((labels == changed) | (labels == kept))
     shares = _changed_shares(mine.points[known], labels[known] == changed)
     is_beside = (shares > _CHANGED_SHARE) & (
         distances[known] > _STILL_KEPT_WITHIN
     )
-    # A new object may pass near to one that is gone.
     labels[known[is_beside]] = changed
     return labels
+
+
+def _label_by_scans(
+    points: np.ndarray, side: str, theirs: Session
+) -> np.ndarray:
+    """Returns the labels of points by the scans of the other drive, (N,).
+
+    All points of a cell have the label of the cell's first point.
+
+    Args:
+        points: (N, 3) points of a map in W [m].
+        side: side of this map, `A` or `B`.
+        theirs: the other drive.
+    """
+    unobserved, kept, changed = SIDES[side]
+    cells = np.floor(points / _CELL).astype(np.int64)
+    _, first, cell_of = np.unique(
+        cells, axis=0, return_index=True, return_inverse=True
+    )
+    views = _count_views(points[first], theirs)
+    needed = np.minimum(_SHOWN_SHARE * views.hidden, _ENOUGH)
+    is_shown = (views.shown > 0) & (views.shown >= needed)
+    found = np.where(is_shown, kept, unobserved)
+    found = np.where(views.past > 0, changed, found)
+    return found[cell_of.ravel()]
 
 
 def _changed_shares(points: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
@@ -110,25 +147,24 @@ def _changed_shares(points: np.ndarray, is_changed: np.ndarray) -> np.ndarray:
     return (np.bincount(cube_of, is_changed) / np.bincount(cube_of))[cube_of]
 
 
-def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
+def _count_views(points: np.ndarray, other: Session) -> _Views:
     """Returns how many scans see past each point, show it, or hide it.
 
-    The module's docstring says when a scan sees past a point, and when it shows
-    a point. A scan hides a point if a surface lies in front of it.
-
-    Returns:
-        (3, N) counts for the points (N, 3).
+    Args:
+        points: (N, 3) points in W [m].
+        other: the drive with the scans.
     """
     counts = np.zeros((3, len(points)), np.int32)
     chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
-    some = chosen[:: max(len(chosen) // 20, 1)]
+    some = chosen[:: max(len(chosen) // _FIELD_SCANS, 1)]
     scans = [other.scan(number) for number in some]
     returns = np.concatenate([np.zeros((0, 3)), *scans])
     if len(returns) == 0:
-        return counts
+        return _Views(*counts)
     low, high, reach = _field_of_view(returns)
 
     def look(number: int) -> list[np.ndarray]:
+        """Returns which points a scan sees past, shows and hides."""
         X_WS = other.X_WS[number]
         offsets = points - X_WS[:3, 3]
         squares = np.einsum("ij,ij->i", offsets, offsets)
@@ -150,7 +186,7 @@ def _count_views(points: np.ndarray, other: Session) -> np.ndarray:
         for kinds in track(found, what, len(chosen), "views"):
             for count, rows in zip(counts, kinds, strict=True):
                 count[rows] += 1
-    return counts
+    return _Views(*counts)
 
 
 def _field_of_view(p_S: np.ndarray) -> tuple[float, float, float]:
@@ -170,10 +206,16 @@ def _field_of_view(p_S: np.ndarray) -> tuple[float, float, float]:
 
 
 def _slopes(p_S: np.ndarray) -> np.ndarray:
-    return p_S[:, 2] / np.maximum(np.hypot(p_S[:, 0], p_S[:, 1]), 1e-9)
+    """Returns height over horizontal distance of points (N, 3), (N,)."""
+    return p_S[:, 2] / np.maximum(np.hypot(p_S[:, 0], p_S[:, 1]), _TINY)
 
 
 def _check_scans(session: Session) -> None:
+    """Checks that a session has scans with poses.
+
+    Raises:
+        InputError: it has none.
+    """
     if len(session.X_WS) == 0:
         raise InputError(
             f"{session.folder}: no poses.txt and Scans; this baseline needs "
