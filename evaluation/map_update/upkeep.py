@@ -71,9 +71,13 @@ class UpkeptMap:
         """
         self._folder = folder
         self._map: Session | None = None
+        # For each point of the map, the number of the drive that it comes from,
+        # and whether the drive added it as new.
         self._drive_of = np.zeros(0, np.int16)
         self._is_added = np.zeros(0, bool)
+        # Points in W that were removed from the map, or not added to it [m].
         self._gone: list[np.ndarray] = []
+        # Number of drives so far.
         self._number = 0
 
     def add(self, session: Session, stands: np.ndarray, detect: Detect) -> None:
@@ -100,29 +104,43 @@ class UpkeptMap:
             points, X_WS = session.points, session.X_WS
         else:
             labels = detect(SessionPair(self._map, session))
-            stays = labels.A != Label.GONE
-            old = self._map.points
-            self._gone.append(old[~stays])
-            old = old[stays]
-            is_free = ~_in_cells_of(session.points, old)
-            is_new = np.isin(labels.B, (Label.NEW, Label.NEWLY_SEEN))
-            points = np.concatenate([old, session.points[is_free]])
-            self._drive_of = np.concatenate(
-                [
-                    self._drive_of[stays],
-                    np.full(int(is_free.sum()), self._number, np.int16),
-                ]
-            )
-            self._is_added = np.concatenate(
-                [self._is_added[stays], is_new[is_free]]
-            )
+            points = self._merge(self._map.points, session.points, labels)
             X_WS = np.concatenate([self._map.X_WS, session.X_WS])
         self._move_scans(session)
         nothing = np.zeros(len(points), np.uint16)
         self._map = Session(self._folder, points, nothing, nothing, X_WS)
         self._number += 1
 
+    def _merge(
+        self, old: np.ndarray, new: np.ndarray, labels: PairLabels
+    ) -> np.ndarray:
+        """Returns the points of the map after a drive, (K, 3) [m].
+
+        What is known of each point is updated alike. Points of the drive in
+        cells that the map occupies are left out.
+
+        Args:
+            old: (N, 3) points of the map so far in W [m].
+            new: (M, 3) points of the drive's map in W [m].
+            labels: labels of both.
+        """
+        stays = labels.A != Label.GONE
+        self._gone.append(old[~stays])
+        is_free = ~_in_cells_of(new, old[stays])
+        is_new = np.isin(labels.B, (Label.NEW, Label.NEWLY_SEEN))
+        self._drive_of = np.concatenate(
+            [
+                self._drive_of[stays],
+                np.full(int(is_free.sum()), self._number, np.int16),
+            ]
+        )
+        self._is_added = np.concatenate(
+            [self._is_added[stays], is_new[is_free]]
+        )
+        return np.concatenate([old[stays], new[is_free]])
+
     def _move_scans(self, session: Session) -> None:
+        """Moves a drive's scans behind the scans in the folder of the map."""
         first = 0 if self._map is None else len(self._map.X_WS)
         scan_path(self._folder, first).parent.mkdir(parents=True, exist_ok=True)
         for number in range(len(session.X_WS)):
@@ -130,24 +148,40 @@ class UpkeptMap:
             scan_path(session.folder, number).rename(target)
 
     def finish(self) -> Updates:
-        """Returns what the drives changed."""
+        """Returns what the drives changed; at least one has been added."""
         assert self._map is not None
         points = self._map.points
         gone = np.concatenate([np.zeros((0, 3)), *self._gone])
-        every = np.concatenate([points, gone])
-        cubes = np.floor(every / _CUBE)
-        corner = cubes.min(axis=0, initial=0.0)
-        keys, _ = cell_keys(cubes - corner)
-        is_gone = np.arange(len(every)) >= len(points)
-        numbers, cube_of = np.unique(keys, return_inverse=True)
-        share = np.bincount(cube_of.ravel(), is_gone) / np.maximum(
-            np.bincount(cube_of.ravel()), 1
-        )
+        corner, cubes = _gone_cubes(points, gone)
         added = [
             points[self._is_added & (self._drive_of == k)]
             for k in range(self._number)
         ]
-        return Updates(corner, numbers[share > 0.5], added)
+        return Updates(corner, cubes, added)
+
+
+def _gone_cubes(
+    points: np.ndarray, gone: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the cubes of which most points are gone.
+
+    Args:
+        points: (N, 3) points of the updated map in W [m].
+        gone: (M, 3) points that are gone in W [m].
+
+    Returns:
+        See `Updates.corner` and `Updates.gone`.
+    """
+    every = np.concatenate([points, gone])
+    cubes = np.floor(every / _CUBE)
+    corner = cubes.min(axis=0, initial=0.0)
+    keys, _ = cell_keys(cubes - corner)
+    is_gone = np.arange(len(every)) >= len(points)
+    numbers, cube_of = np.unique(keys, return_inverse=True)
+    share = np.bincount(cube_of.ravel(), is_gone) / np.maximum(
+        np.bincount(cube_of.ravel()), 1
+    )
+    return corner, numbers[share > 0.5]
 
 
 def _in_cells_of(points: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -56,7 +56,15 @@ class UpkeptDrive(MovedDrive):
         return np.concatenate([kept, more])
 
     def _new_points(self, X_WS: np.ndarray, p_S: np.ndarray) -> np.ndarray:
-        """Returns the later drives' new points within range, in S."""
+        """Returns the later drives' new points within the range of a scan.
+
+        Args:
+            X_WS: (4, 4) pose of the sensor.
+            p_S: (N, 3) points of the scan [m].
+
+        Returns:
+            (M, 3) points in S [m].
+        """
         if len(self._added) == 0 or len(p_S) == 0:
             return np.zeros((0, 3))
         reach = float(np.nanmax(np.linalg.norm(p_S, axis=1)))
@@ -99,4 +107,5 @@ def visible_points(
 
 
 def _elevations(p_S: np.ndarray) -> np.ndarray:
+    """Returns the elevations of points (N, 3), (N,) [rad]."""
     return np.arctan2(p_S[:, 2], np.hypot(p_S[:, 0], p_S[:, 1]))
