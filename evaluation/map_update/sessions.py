@@ -45,6 +45,10 @@ from evaluation.map_update.map_builder import MapBuilder
 
 # Distance driven between two scans [m].
 SPACING = 1.0
+# Names of the files in the folder of a session.
+_MAP_FILE = "map.ply"
+_SCANS_FOLDER = "Scans"
+# NumPy's name of a type -> PLY's name.
 _PLY_TYPES = {"f8": "double", "u2": "ushort"}
 
 
@@ -108,7 +112,7 @@ def write_session(
     X_WS = drive.X_WS[frames]
     builder = MapBuilder(X_WS[0, :3, 3])
     with user_errors(folder):
-        (folder / "Scans").mkdir(parents=True)
+        (folder / _SCANS_FOLDER).mkdir(parents=True)
         for number, frame in enumerate(
             track(
                 frames.tolist(), f"mapping {drive.name}", len(frames), "scans"
@@ -125,7 +129,7 @@ def write_session(
         )
         (folder / "singlesession_posegraph.g2o").write_text(_g2o(X_WS))
         points = builder.points()
-        _write_ply(folder / "map.ply", points)
+        _write_ply(folder / _MAP_FILE, points)
     return _session_of(folder, points, X_WS), frames
 
 
@@ -135,7 +139,7 @@ def read_session(folder: Path) -> Session:
     Raises:
         InputError: there is no map, or a file cannot be read.
     """
-    path = folder / "map.ply"
+    path = folder / _MAP_FILE
     if not path.is_file():
         raise InputError(f"{path}: no such file; a session needs its map")
     points = np.concatenate(list(read_blocks(path)))
@@ -145,9 +149,9 @@ def read_session(folder: Path) -> Session:
     X_WS = np.zeros((0, 4, 4))
     if is_there(file):
         X_WS = read_poses(file)
-        scans = len(listed(folder / "Scans", "*.pcd"))
-        if scans != len(X_WS):
-            raise InputError(f"{file}: {len(X_WS)} poses for {scans} scans")
+        number = len(listed(folder / _SCANS_FOLDER, "*.pcd"))
+        if number != len(X_WS):
+            raise InputError(f"{file}: {len(X_WS)} poses for {number} scans")
     return _session_of(folder, points, X_WS)
 
 
@@ -174,7 +178,7 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     if len(labels) != count:
         raise InputError(
             f"{path}: {len(labels)} labels for the {count} points of "
-            f"{session.folder / 'map.ply'}"
+            f"{session.folder / _MAP_FILE}"
         )
     allowed = [*SIDES[session.side], *([Label.IGNORED] if truth else [])]
     wrong = ~np.isin(labels, allowed)
@@ -195,6 +199,11 @@ def write_labels(path: Path, labels: np.ndarray) -> None:
 
 
 def _read_any_labels(path: Path) -> np.ndarray:
+    """Returns the array of labels in a file, of any shape and type.
+
+    Raises:
+        InputError: the file cannot be read, or is a cloud without labels.
+    """
     if path.suffix == ".ply":
         points = np.concatenate(list(read_blocks(path)))
         if "prediction" not in (points.dtype.names or ()):
@@ -204,11 +213,21 @@ def _read_any_labels(path: Path) -> np.ndarray:
 
 
 def _session_of(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
+    """Returns a session, with zeros for a label or instance that is missing.
+
+    Args:
+        folder: folder of the session's files.
+        points: structured array (N,) of the map's points.
+        X_WS: (K, 4, 4) poses of the scans.
+
+    Raises:
+        InputError: a label or an instance is no number of 16 bits.
+    """
     columns = {}
     for name in ("label", "instance"):
         columns[name] = np.zeros(len(points), np.uint16)
         if name in (points.dtype.names or ()):
-            columns[name] = _as_uint16(folder / "map.ply", points, name)
+            columns[name] = _as_uint16(folder / _MAP_FILE, points, name)
     return Session(
         folder, xyz(points), columns["label"], columns["instance"], X_WS
     )
@@ -216,6 +235,11 @@ def _session_of(folder: Path, points: np.ndarray, X_WS: np.ndarray) -> Session:
 
 def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
     """Returns a column of a map as (N,) uint16.
+
+    Args:
+        path: file of the map, for error messages.
+        points: structured array (N,) of the map's points.
+        name: name of the column.
 
     Raises:
         InputError: a value is no whole number from 0 to 65535.
@@ -234,10 +258,11 @@ def _as_uint16(path: Path, points: np.ndarray, name: str) -> np.ndarray:
 
 def scan_path(folder: Path, number: int) -> Path:
     """Returns the path of a scan in the folder of a session."""
-    return folder / "Scans" / f"{number:06d}.pcd"
+    return folder / _SCANS_FOLDER / f"{number:06d}.pcd"
 
 
 def _without_intensity(scan: np.ndarray) -> np.ndarray:
+    """Returns a scan that has no intensity as x, y, z and intensity 0, (N,)."""
     plain = np.zeros(len(scan), [(n, "<f4") for n in (*"xyz", "intensity")])
     for name in "xyz":
         plain[name] = scan[name]
@@ -245,6 +270,7 @@ def _without_intensity(scan: np.ndarray) -> np.ndarray:
 
 
 def _write_ply(path: Path, points: np.ndarray) -> None:
+    """Writes a structured array (N,) as a binary PLY file."""
     lines = ["ply", "format binary_little_endian 1.0"]
     lines.append(f"element vertex {len(points)}")
     for name in points.dtype.names or ():
@@ -262,6 +288,7 @@ def _g2o(X_WS: np.ndarray) -> str:
     Each edge is the motion from one pose to the next.
     """
     steps = poses.inverse(X_WS[:-1]) @ X_WS[1:]
+    # The upper triangle of a unit matrix, 6 x 6.
     information = " ".join(
         "1" if i == j else "0" for i in range(6) for j in range(i, 6)
     )
@@ -276,6 +303,7 @@ def _g2o(X_WS: np.ndarray) -> str:
 
 
 def _g2o_poses(X: np.ndarray) -> Iterable[str]:
+    """Returns poses (K, 4, 4) as K texts: position, and quaternion x y z w."""
     if len(X) == 0:
         return []
     quat_xyzw = Rotation.from_matrix(X[:, :3, :3]).as_quat(canonical=True)
