@@ -17,6 +17,7 @@ from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.path_obstacles import obstacles_beside
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 
@@ -29,9 +30,15 @@ class DrivePlan:
 
     Attributes:
         scenario: the scenario.
+
+    Raises:
+        InputError: a file of the scenario does not exist.
     """
 
     scenario: Scenario
+
+    def __post_init__(self) -> None:
+        check_files(self.scenario)
 
     @cached_property
     def network(self) -> RoadNetwork | None:

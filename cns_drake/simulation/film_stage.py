@@ -13,6 +13,7 @@ from pydrake.systems.sensors import CameraInfo
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
 from cns_drake.pictures.meshcat_drawing import height_rgb
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.config import CameraSection
@@ -55,7 +56,7 @@ class FilmStage(Step):
             if scenario.stage is None
             else f"{scenario.folder.name.capitalize()}, stage {scenario.stage}"
         )
-        drive = load_drive(scenario)
+        drive = load_drive(DrivePlan(scenario))
         for text in drive.world.notes:
             reporter.note(text)
         diagram = make_station(drive, cameras_see_vehicle=True)

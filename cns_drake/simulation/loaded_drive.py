@@ -11,7 +11,6 @@ from cns_drake.base.progress import doing
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scene.world import World
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.simulation.recording_schedule import (
@@ -19,7 +18,7 @@ from cns_drake.simulation.recording_schedule import (
     plan_recording,
 )
 from cns_drake.simulation.scenario_traffic import (
-    plan_scenario_traffic,
+    plan_traffic_of_drive,
     with_traffic,
 )
 from cns_drake.simulation.stage_loading import load_stage
@@ -82,8 +81,8 @@ class LoadedDrive:
         return {name: sensor_pose(lidar) for name, lidar in lidars.items()}
 
 
-def load_drive(scenario: Scenario) -> LoadedDrive:
-    """Plans the drive of a scenario and its traffic, and loads its stage.
+def load_drive(plan: DrivePlan) -> LoadedDrive:
+    """Plans the traffic of a drive, and loads its stage.
 
     If the vehicle keeps its distance to the vehicle ahead (field
     `driver.follows`), the drive is slower than planned without traffic.
@@ -91,9 +90,8 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     Raises:
         InputError: the scenario cannot be run.
     """
-    check_files(scenario)
+    scenario = plan.scenario
     doing("planning the drive")
-    plan = DrivePlan(scenario)
     trajectory = plan.trajectory
     if not scenario.driver.follows:
         count_frames(scenario, trajectory)  # An error comes at once.
@@ -101,7 +99,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     traffic = None
     if not scenario.traffic.is_off:
         doing("planning the traffic")
-        traffic = plan_scenario_traffic(scenario, trajectory, world)
+        traffic = plan_traffic_of_drive(plan, trajectory, world)
         world = with_traffic(world, traffic)
         if traffic.positions is not None:
             trajectory = plan.trajectory_at(traffic.positions)

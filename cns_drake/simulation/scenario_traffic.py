@@ -16,7 +16,6 @@ from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files
 from cns_drake.scenarios.sections import TrafficConfig
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.semantics import GROUND_CLASSES
@@ -69,9 +68,18 @@ def plan_scenario_traffic(
         scenario = load_scenario("metropolis_04").with_traffic(60)
         plan = plan_scenario_traffic(scenario, plan_drive(scenario))
     """
+    return plan_traffic_of_drive(DrivePlan(scenario), trajectory, world)
+
+
+def plan_traffic_of_drive(
+    drive: DrivePlan, trajectory: Trajectory, world: World | None = None
+) -> TrafficPlan:
+    """Returns the motion of all vehicles and pedestrians of a planned drive.
+
+    The other arguments, and the errors, are those of `plan_scenario_traffic`.
+    """
+    scenario = drive.scenario
     wanted = scenario.traffic
-    if world is None:
-        check_files(scenario)
     graph, walkways, _ = load_ways(scenario.folder)
     ego = _ego_path(trajectory)
     if wanted.fcd is not None:
@@ -98,7 +106,7 @@ def plan_scenario_traffic(
         )
     _check_room(wanted, _error_source(scenario), graph, walkways)
     if wanted.walkers:
-        world = world or load_stage(DrivePlan(scenario), with_vehicle=False)
+        world = world or load_stage(drive, with_vehicle=False)
         things = _sidewalk_obstacles(world)
         walkways = kept_clear(walkways, things)
         graph, walkways = with_unmarked_crossings(graph, walkways, things)

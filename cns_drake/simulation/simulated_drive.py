@@ -25,6 +25,7 @@ from cns_drake.motion.trajectory import pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.messages import to_quat_xyzw
 from cns_drake.recording.schedule import frame_stamp_ns
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import describe_scenario
@@ -82,7 +83,7 @@ class SimulatedDrive(Drive):
         Raises:
             InputError: the scenario cannot be run.
         """
-        drive = load_drive(scenario)
+        drive = load_drive(DrivePlan(scenario))
         world, trajectory = drive.world, drive.trajectory
         self.name = scenario.name
         self.world_frame = MAP_FRAME

@@ -26,7 +26,7 @@ from cns_drake.recording.schedule import START_NS, frames_within
 from cns_drake.scenarios import provenance
 from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import check_files, describe_scenario
+from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scene.file_watch import FileWatch
 from cns_drake.sensors.camera.camera import optical_pose
 from cns_drake.sensors.camera.renderer import check_renderer
@@ -132,13 +132,13 @@ def simulate(
             if file is not None:
                 check_writable(file)
         RecordingFolder(folder).check(overwrite)
-        check_files(scenario)
+        plan = DrivePlan(scenario)
         if scenario.cameras:
             check_renderer()
         doing("reading the files of the drive")
         watch = FileWatch()
         inputs = provenance.digest_inputs(scenario, watch)
-        drive = load_drive(scenario)
+        drive = load_drive(plan)
         changed = watch.changed()
         if changed is not None:
             raise InputError(f"{changed}: changed while it was being read")

@@ -18,6 +18,7 @@ from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.schedule import START_NS
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.camera.camera import add_cameras
 from cns_drake.sensors.camera.camera_scene import CameraScene
@@ -83,7 +84,7 @@ def make_station(
         scan = diagram.GetOutputPort("lidar_scan").Eval(context)
     """
     if isinstance(drive, Scenario):
-        drive = load_drive(drive)
+        drive = load_drive(DrivePlan(drive))
     scenario, world = drive.scenario, drive.world
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)

@@ -32,7 +32,7 @@ from processes import in_process
 
 from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import collect_garbage_seldom
-from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.planning import DrivePlan, count_frames, plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 from cns_drake.sensors.lidar.config import WeatherConfig
@@ -194,7 +194,7 @@ def print_loading(drive: str, loads: int) -> None:
     for _ in range(loads + 1):
         for name, scenario in variants.items():
             start = time.process_time()
-            load_drive(scenario)
+            load_drive(DrivePlan(scenario))
             spent[name].append(time.process_time() - start)
     for name, times in spent.items():
         print(f"  loading {name:<8} {np.median(times[1:]):6.2f} s", flush=True)

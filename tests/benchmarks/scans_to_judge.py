@@ -24,6 +24,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.points import encode_bin
 from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 from cns_drake.simulation.loaded_drive import load_drive
@@ -90,7 +91,7 @@ def undistorted(
 def write_scans(name: str, out: Path, number: int, *, is_full: bool) -> None:
     """Writes scans of a drive, ring by ring as KITTI's."""
     scenario = judged(name, is_full=is_full)
-    loaded = load_drive(scenario)
+    loaded = load_drive(DrivePlan(scenario))
     trajectory = loaded.trajectory
     diagram = make_station(loaded)
     context = diagram.CreateDefaultContext()

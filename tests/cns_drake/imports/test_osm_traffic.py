@@ -14,7 +14,7 @@ from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.openstreetmap.traffic import lane_text_of_streets
 from cns_drake.imports.options import ImportOptions
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.planning import DrivePlan, plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scene.structure_names import structure_name
 from cns_drake.simulation.loaded_drive import load_drive
@@ -394,7 +394,7 @@ def test_things_in_the_lanes_give_way_to_traffic(tmp_path):
     assert file.in_the_way
     scenario = load_scenario(folder / "sequence_01.yaml")
     plain, busy = (
-        _names(load_drive(one).world)
+        _names(load_drive(DrivePlan(one)).world)
         for one in (scenario, scenario.with_traffic(5))
     )
     assert plain - busy == set(file.in_the_way)

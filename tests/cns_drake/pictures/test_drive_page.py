@@ -17,6 +17,7 @@ from cns_drake.pictures.meshcat_recorder import (
 )
 from cns_drake.pictures.page_panel import ShownStages
 from cns_drake.recording.schedule import FRAME_PERIOD
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scene.world import load_world
 from cns_drake.simulation.loaded_drive import load_drive
 
@@ -125,7 +126,7 @@ def test_without_another_stage_nothing_is_said_of_change(tmp_path):
 def test_page_of_a_shipped_drive_is_small():
     """With as many scans and points as a page shows, hard to compress."""
     scenario = load_scenario("downtown_01")  # It has the largest page.
-    loaded = load_drive(scenario)
+    loaded = load_drive(DrivePlan(scenario))
     world, trajectory = loaded.world, loaded.trajectory
     X_WBs = [
         trajectory.pose(frame * FRAME_PERIOD)

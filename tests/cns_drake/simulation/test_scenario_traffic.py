@@ -8,7 +8,7 @@ from helpers.tiny_drive import tiny_scenario, write_scenario
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.planning import DrivePlan, plan_drive
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.sections import TrafficConfig
 from cns_drake.simulation.loaded_drive import load_drive
@@ -31,7 +31,7 @@ def fault(scenario, **traffic):
     """Returns the one line that refuses so much traffic."""
     wanted = TrafficConfig(**traffic)
     with pytest.raises(InputError) as error:
-        load_drive(scenario.model_copy(update={"traffic": wanted}))
+        load_drive(DrivePlan(scenario.model_copy(update={"traffic": wanted})))
     assert "\n" not in str(error.value)
     return str(error.value)
 

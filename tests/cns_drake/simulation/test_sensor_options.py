@@ -8,7 +8,7 @@ import pytest
 from scipy.special import lambertw
 
 from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.planning import DrivePlan, plan_drive
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.sensors.carriers import sensor_pose
@@ -60,7 +60,7 @@ def to_world(scan, trajectory, X_BS, time):
 
 def distance_to_geometry(scenario, p_W):
     """Returns the distances of points from the small map's nearest box."""
-    world = load_drive(scenario).world
+    world = load_drive(DrivePlan(scenario)).world
     inspector = world.scene_graph.model_inspector()
     nearest = np.full(len(p_W), np.inf)
     for geometry in inspector.GetAllGeometryIds():

@@ -13,6 +13,7 @@ import pytest
 from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.export.marked_drive import MarkedDrive
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import describe_scenario, make_scenario
 from cns_drake.simulation.loaded_drive import load_drive
@@ -89,7 +90,7 @@ def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
         [
             entry.instance
             for entry in load_drive(
-                scenario.with_transient(parked_cars=1.0)
+                DrivePlan(scenario.with_transient(parked_cars=1.0))
             ).world.structures
             if entry.causes
         ]

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
 from cns_drake.recording.schedule import FRAME_PERIOD
+from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.carriers import sensor_pose
 from cns_drake.simulation.loaded_drive import load_drive
@@ -80,7 +81,7 @@ def test_vehicle_is_invisible_and_on_the_ground(small_map):
 
 
 def test_a_page_has_the_poses_of_the_scene_graph(scenario):
-    drive = load_drive(scenario)
+    drive = load_drive(DrivePlan(scenario))
     page = MeshcatRecorder(
         drive.world, X_BSs={"lidar": RigidTransform()}, period=FRAME_PERIOD
     )
