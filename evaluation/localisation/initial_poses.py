@@ -2,13 +2,58 @@
 
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 
 # Greatest distance of a start [m]; beyond it lies place recognition.
 FARTHEST_START = 50.0
+
+
+class InitialPose(NamedTuple):
+    """An initial pose of the LiDAR, and how it differs from the ground truth.
+
+    Attributes:
+        X_WS: (4, 4) the initial pose.
+        offset: (3,) vector from the ground-truth to the initial position, in W
+            [m].
+        turn: (3,) rotation vector from the ground-truth to the initial
+            orientation, in S [rad].
+    """
+
+    X_WS: np.ndarray
+    offset: np.ndarray
+    turn: np.ndarray
+
+    @classmethod
+    def moved(
+        cls, X_WS: np.ndarray, offset: np.ndarray, turn: np.ndarray
+    ) -> "InitialPose":
+        """Returns the initial pose with a given error.
+
+        Args:
+            X_WS: (4, 4) ground-truth pose.
+            offset, turn: the error; see `InitialPose`.
+        """
+        R = Rotation.from_rotvec(turn).as_matrix()
+        X = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
+        return cls(X, offset, turn)
+
+    @classmethod
+    def compared(cls, X_WS0: np.ndarray, X_WS: np.ndarray) -> "InitialPose":
+        """Returns a given initial pose, with its error.
+
+        Args:
+            X_WS0: (4, 4) the initial pose.
+            X_WS: (4, 4) ground-truth pose.
+        """
+        R = X_WS[:3, :3].T @ X_WS0[:3, :3]
+        turn = Rotation.from_matrix(R).as_rotvec()
+        return cls(X_WS0, X_WS0[:3, 3] - X_WS[:3, 3], turn)
 
 
 @dataclass(frozen=True)

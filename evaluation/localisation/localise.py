@@ -13,7 +13,6 @@ from pathlib import Path
 import time
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
@@ -24,12 +23,12 @@ from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cropped
 from evaluation.localisation.estimators import Estimator
 from evaluation.localisation.fit import fit_at
-from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import (
     FEWEST_POINTS,
     LocalisationMap,
 )
-from evaluation.localisation.results import COLUMNS, QUERY
+from evaluation.localisation.results import MEASURED, QUERY
 from evaluation.localisation.settings import MAX_RANGE, Settings
 from evaluation.maps.voxel_maps import downsample
 from evaluation.recognition.pose_errors import pose_error
@@ -39,6 +38,10 @@ from evaluation.recognition.pose_errors import pose_error
 NEAR = 7.5
 # Number of queries that wait, per process.
 _WAITING = 4
+# A sensor that moves less than this between two frames stands [m].
+_STANDS = 1e-3
+# Least horizontal share of the direction of a path that is not straight up.
+_STEEP = 1e-6
 
 
 def mapped_frames(
@@ -87,12 +90,12 @@ def path_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
     along = np.zeros_like(p_WS)
     if len(p_WS) > 1:
         along = np.gradient(p_WS, axis=0)
-    stands = np.linalg.norm(along, axis=1) < 1e-3
+    stands = np.linalg.norm(along, axis=1) < _STANDS
     along[stands] = X_WS[stands, :3, 0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     left = np.cross([0.0, 0.0, 1.0], along)
     # A path straight up has no direction to the left.
-    steep = np.linalg.norm(left, axis=1) < 1e-6
+    steep = np.linalg.norm(left, axis=1) < _STEEP
     left[steep] = X_WS[steep, :3, 1]
     left /= np.linalg.norm(left, axis=1, keepdims=True)
     return np.stack([along, left, np.cross(along, left)], axis=2)
@@ -120,9 +123,7 @@ class Localiser:
         scan: np.ndarray,
         X_WS: np.ndarray,
         R_WT: np.ndarray,
-        offset: np.ndarray,
-        turn: np.ndarray,
-        X_WS0: np.ndarray | None = None,
+        initial: InitialPose,
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """Localises one scan and compares the result with the ground truth.
 
@@ -132,27 +133,21 @@ class Localiser:
             scan: structured array, in S.
             X_WS: (4, 4) ground-truth pose.
             R_WT: (3, 3) axes of the path: along, to the left, and up.
-            offset: (3,) vector from the ground-truth to the initial position,
-                in W [m].
-            turn: (3,) rotation vector from the ground-truth to the initial
-                orientation, in S [rad].
-            X_WS0: the initial pose; by default it follows from `offset` and
-                `turn`.
+            initial: the initial pose.
 
         Returns:
             A record of `QUERY`; and the estimated pose X_WS (4, 4), or None. A
             scan with too few points has no pose.
         """
-        if X_WS0 is None:
-            R = Rotation.from_rotvec(turn).as_matrix()
-            X_WS0 = poses.make_pose(X_WS[:3, :3] @ R, X_WS[:3, 3] + offset)
         measured = cropped(scan, MAX_RANGE)
         points = downsample(measured, self.settings.scan_voxel)
-        row = _record_of_start(frame, stamp_ns, offset, turn)
+        row = _record_of_start(frame, stamp_ns, initial)
         if len(points) < FEWEST_POINTS:
             return row, None
         begin = time.process_time()
-        found = self.estimator(self.surroundings, points, measured, X_WS0)
+        found = self.estimator(
+            self.surroundings, points, measured, initial.X_WS
+        )
         row["seconds"] = time.process_time() - begin
         row["iterations"], end = found.iterations, found.X_WS
         far = self.surroundings.distances(poses.transform(X_WS, points))
@@ -166,23 +161,24 @@ class Localiser:
 
 
 def _record_of_start(
-    frame: int, stamp_ns: int, offset: np.ndarray, turn: np.ndarray
+    frame: int, stamp_ns: int, initial: InitialPose
 ) -> np.ndarray:
     """Returns a record of `QUERY` in which only the initial pose is known.
 
     Args:
         frame: number of the scan.
         stamp_ns: time of the scan [ns].
-        offset: (3,) offset of the initial position in W [m].
-        turn: (3,) rotation vector of the initial orientation in S [rad].
+        initial: the initial pose.
     """
     row = np.zeros((), QUERY)
-    for name in COLUMNS[8:-2]:
+    for name in MEASURED:
         row[name] = np.nan
     row["own_score"] = row["fit"] = -math.inf
     row["frame"], row["stamp_ns"] = frame, stamp_ns
-    for axis, o, t in zip("xyz", offset, np.degrees(turn), strict=True):
-        row[f"start_{axis}"], row[f"start_turn_{axis}_deg"] = o, t
+    turn_deg = np.degrees(initial.turn)
+    for k, axis in enumerate("xyz"):
+        row[f"start_{axis}"] = initial.offset[k]
+        row[f"start_turn_{axis}_deg"] = turn_deg[k]
     return row
 
 
@@ -224,12 +220,19 @@ def _localise_from_all_starts(
     X_WS: np.ndarray,
     R_WT: np.ndarray,
 ) -> list[np.ndarray]:
-    """Returns a record for each localiser and each initial pose of a scan."""
+    """Returns a record for each localiser and each initial pose of a scan.
+
+    The localisers are those of the process. For the other arguments, see
+    `Localiser.query`.
+
+    Args:
+        starts: how the initial poses are sampled.
+    """
     found = []
     for localiser in _localisers:
         for some in starts:
-            drawn = some.draw(frame)
-            row, _ = localiser.query(frame, stamp_ns, scan, X_WS, R_WT, *drawn)
+            initial = InitialPose.moved(X_WS, *some.draw(frame))
+            row, _ = localiser.query(frame, stamp_ns, scan, X_WS, R_WT, initial)
             found.append(row)
     return found
 
@@ -266,6 +269,7 @@ def localise(
     jobs = max(1, min(jobs, len(frames)))
 
     def arguments(frame: int) -> tuple:
+        """Returns what `_localise_from_all_starts` needs for a frame."""
         scan = query.scan(frame)
         # Only the coordinates are passed on: a scan would be copied to the
         # process with all its fields.
@@ -274,6 +278,7 @@ def localise(
         return starts, frame, stamp_ns, scan, X_WS[frame], R_WT[frame]
 
     def rows() -> Iterator[list[np.ndarray]]:
+        """Yields the records of each frame, in order."""
         if jobs == 1 or "fork" not in multiprocessing.get_all_start_methods():
             for frame in frames:
                 yield _localise_from_all_starts(*arguments(frame))

@@ -45,38 +45,33 @@ _QUANTILES = {
 _DIRECTIONS = ("along", "across", "up")
 # Share of the right results whose scores pass the suggested threshold.
 _BELIEVED = 0.95
-# One row per query: its frame and time; the start's offset in W [m], and its
-# turn as a rotation vector in S; errors of the result; scores; standard
-# deviations of the result from its covariance [m]; the share of the scan that,
-# at the ground-truth pose, has no point of the map within a voxel, NaN if the
-# scan has too few points to be aligned; number of steps, and CPU time [s].
+# Fields of an initial pose: its offset in W [m], and its turn as a rotation
+# vector in S.
+_INITIAL = (
+    *(f"start_{axis}" for axis in "xyz"),
+    *(f"start_turn_{axis}_deg" for axis in "xyz"),
+)
+# Fields that are measured: errors of the result; scores; standard deviations of
+# the result from its covariance [m]; the share of the scan that, at the
+# ground-truth pose, has no point of the map within a voxel, NaN if the scan has
+# too few points to be aligned.
+MEASURED = (
+    "translation_error",
+    "rotation_error_deg",
+    *_DIRECTIONS,
+    "own_score",
+    "fit",
+    "residual",
+    *(f"std_{name}" for name in _DIRECTIONS),
+    "unmapped",
+)
+# One row per query: its frame and time, its initial pose, what is measured, the
+# number of steps, and CPU time [s].
 QUERY = np.dtype(
     [
         ("frame", "<i8"),
         ("stamp_ns", "<i8"),
-        *(
-            (name, "<f8")
-            for name in (
-                "start_x",
-                "start_y",
-                "start_z",
-                "start_turn_x_deg",
-                "start_turn_y_deg",
-                "start_turn_z_deg",
-                "translation_error",
-                "rotation_error_deg",
-                "along",
-                "across",
-                "up",
-                "own_score",
-                "fit",
-                "residual",
-                "std_along",
-                "std_across",
-                "std_up",
-                "unmapped",
-            )
-        ),
+        *((name, "<f8") for name in (*_INITIAL, *MEASURED)),
         ("iterations", "<i8"),
         ("seconds", "<f8"),
     ]

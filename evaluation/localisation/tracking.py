@@ -10,7 +10,7 @@ from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
 from evaluation.drives.sampling import sample_frames, travelled
-from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localise import Localiser, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
 from evaluation.recognition.result_number import Number
@@ -121,30 +121,23 @@ def track_drive(
     ):
         frame = int(frames[k])
         is_first = k == 0 or stretches[k] != stretches[k - 1]
-        offset = turn = np.zeros(3)
-        start = None
         if is_first or last is None:
-            offset, turn = starts.draw(frame)
+            initial = InitialPose.moved(X_WS[frame], *starts.draw(frame))
         else:
-            start = last @ steps[k - 1]
-            offset, turn = _offset_and_turn(start, X_WS[frame])
+            initial = InitialPose.compared(last @ steps[k - 1], X_WS[frame])
         row, end = localiser.query(
             frame,
             int(query.stamps_ns[frame]),
             query.scan(frame),
             X_WS[frame],
             R_WT[frame],
-            offset,
-            turn,
-            start,
+            initial,
         )
         last = end
         if last is None:
             # The estimate continues by odometry.
-            R = Rotation.from_rotvec(turn).as_matrix()
-            last = poses.make_pose(
-                X_WS[frame, :3, :3] @ R, X_WS[frame, :3, 3] + offset
-            )
+            _, offset, turn = initial
+            last = InitialPose.moved(X_WS[frame], offset, turn).X_WS
         for name in COLUMNS:
             rows[name][k] = row[name]
         rows["track_error"][k] = np.linalg.norm(
@@ -153,23 +146,6 @@ def track_drive(
         rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
         rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
     return rows
-
-
-def _offset_and_turn(
-    X_WS0: np.ndarray, X_WS: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how an initial pose differs from the ground truth.
-
-    Args:
-        X_WS0: (4, 4) initial pose.
-        X_WS: (4, 4) ground-truth pose.
-
-    Returns:
-        (3,) offset of the position in W [m]; (3,) rotation vector in S [rad].
-    """
-    R = X_WS[:3, :3].T @ X_WS0[:3, :3]
-    turn = Rotation.from_matrix(R).as_rotvec()
-    return X_WS0[:3, 3] - X_WS[:3, 3], turn
 
 
 def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:

@@ -13,7 +13,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
 from evaluation.localisation import localise, results, tracking
 from evaluation.localisation.estimators import make_estimator
-from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import (
     LocalisationMap,
     make_map,
@@ -309,9 +309,8 @@ def localise_among_others(
         for estimator, settings in made:
             one = localise.Localiser(surroundings, estimator, settings)
             for some in starts:
-                row, _ = one.query(
-                    k, stamp_ns, scan, X_WS[k], R_WT[k], *some.draw(k)
-                )
+                initial = InitialPose.moved(X_WS[k], *some.draw(k))
+                row, _ = one.query(k, stamp_ns, scan, X_WS[k], R_WT[k], initial)
                 next(ends).append(row)
     number = len(found[0])
     if number < len(drive):

@@ -22,7 +22,7 @@ from evaluation.drives import open_drive
 from evaluation.localisation import robust_icp
 from evaluation.localisation.estimators import Estimate, make_estimator
 from evaluation.localisation.fit import fit_at
-from evaluation.localisation.initial_poses import Starts
+from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import make_map, map_of
 from evaluation.localisation.localise import (
     Localiser,
@@ -83,7 +83,8 @@ def localiser(points, method, settings=EXACT):
 def one_query(found, X_WS, scan_W, offset, turn, R_WT=None):
     scan = from_xyz(poses.transform(poses.inverse(X_WS), scan_W))
     R_WT = np.eye(3) if R_WT is None else R_WT
-    return found.query(3, 0, scan, X_WS, R_WT, offset, turn)[0]
+    initial = InitialPose.moved(X_WS, offset, turn)
+    return found.query(3, 0, scan, X_WS, R_WT, initial)[0]
 
 
 def a_pose(*p, far=0.0):
