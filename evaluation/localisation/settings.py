@@ -66,27 +66,48 @@ class Settings:
                     f"--set: {method} has no setting {name!r} (known:"
                     f" {', '.join(known)})"
                 )
-            try:
-                value = known[name](text)
-            except (TypeError, ValueError):
-                value = math.nan
-            least = 0.0 if name == "last_width" else 1e-3
-            least = 4.0 if name == "neighbours" else least
-            if not least <= value <= 1000.0:
-                raise InputError(
-                    f"--set: {name}: {text!r} is no number from {least:g} to"
-                    " 1000"
-                )
-            found[name] = value
+            found[name] = _parse(name, known[name], text)
         return replace(self, **found)
 
 
+def _parse(name: str, kind: Callable, text: Any) -> Any:
+    """Returns the value of a setting.
+
+    Args:
+        name: name of the setting.
+        kind: its type, int or float.
+        text: the value, a number or text.
+
+    Raises:
+        InputError: the value is no number in the range of the setting.
+    """
+    try:
+        value = kind(text)
+    except (TypeError, ValueError):
+        value = math.nan
+    least = _LEAST.get(name, _LEAST_LENGTH)
+    if not least <= value <= _GREATEST:
+        raise InputError(
+            f"--set: {name}: {text!r} is no number from {least:g} to"
+            f" {_GREATEST:g}"
+        )
+    return value
+
+
+# Least values of settings that are not lengths above 0, or may be 0.
+_LEAST = {"last_width": 0.0, "neighbours": 4.0}
+# Least value of all other settings.
+_LEAST_LENGTH = 1e-3
+# Greatest value of all settings.
+_GREATEST = 1000.0
+# Name of a method -> small_gicp's name of its algorithm.
 SMALL_GICP_KINDS = {
     "icp": "ICP",
     "plane-icp": "PLANE_ICP",
     "gicp": "GICP",
     "vgicp": "VGICP",
 }
+# Name of a robust estimator -> name of the algorithm with the same errors.
 ROBUST_KINDS = {"robust-plane-icp": "PLANE_ICP", "robust-gicp": "GICP"}
 KISS_MATCHER = "kiss-matcher"
 METHODS = (*SMALL_GICP_KINDS, *ROBUST_KINDS, KISS_MATCHER)
