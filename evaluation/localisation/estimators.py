@@ -41,8 +41,9 @@ from evaluation.localisation.settings import (
 )
 from evaluation.methods.own_files import run_module, with_named_faults
 
-# An alignment ends when a step is below these [m, rad].
-_STILL = (1e-4, 1e-5)
+# An alignment ends when a step is below both of these [m, rad].
+_LEAST_MOVE = 1e-4
+_LEAST_TURN = 1e-5
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,14 @@ def _by_small_gicp(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
+    """Aligns a scan by small_gicp, once or twice; see `Estimator`.
+
+    Args:
+        kind: small_gicp's name of the algorithm.
+        settings: its settings.
+        surroundings, scan, measured, start: the arguments of any estimator; the
+            scan as measured is not used.
+    """
     source = small_gicp.PointCloud(scan)
     surface = surroundings.surface
     X_VW = np.eye(4)
@@ -97,8 +106,8 @@ def _by_small_gicp(
             init_T_target_source=X,
             max_correspondence_distance=width,
             max_iterations=settings.iterations,
-            translation_epsilon=_STILL[0],
-            rotation_epsilon=_STILL[1],
+            translation_epsilon=_LEAST_MOVE,
+            rotation_epsilon=_LEAST_TURN,
             **options,
         )
         iterations += found.iterations + 1
@@ -115,6 +124,14 @@ def _by_robust(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
+    """Aligns a scan by an estimator with a robust kernel; see `Estimator`.
+
+    Args:
+        kind: `PLANE_ICP` or `GICP`.
+        settings: settings of the estimator.
+        surroundings, scan, measured, start: the arguments of any estimator; the
+            scan as measured is not used.
+    """
     spread = None
     if kind == "GICP":
         source = small_gicp.PointCloud(scan)
@@ -128,7 +145,7 @@ def _by_robust(
         start,
         (settings.width, settings.last_width or settings.width),
         settings.iterations,
-        _STILL,
+        (_LEAST_MOVE, _LEAST_TURN),
         spread,
     )
     return Estimate(X, None, iterations)
@@ -142,6 +159,15 @@ def _by_kiss_matcher(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
+    """Registers a scan by KISS-Matcher; see `Estimator`.
+
+    Args:
+        package: the package `kiss_matcher`.
+        settings: settings of the estimator.
+        surroundings, scan, measured, start: the arguments of any estimator; the
+            downsampled scan is not used, and of the initial pose only the
+            position.
+    """
     # Its numbers are float32: far coordinates would lose decimals.
     p_WS = start[:3, 3]
     target = surroundings.around(p_WS, MAX_RANGE) - p_WS
@@ -170,6 +196,17 @@ def _by_own(
     measured: np.ndarray,
     start: np.ndarray,
 ) -> Estimate:
+    """Registers a scan by a function of the user; see `Estimator`.
+
+    Args:
+        function: the user's function.
+        path: its file, for error messages.
+        surroundings, scan, measured, start: the arguments of any estimator; the
+            downsampled scan is not used.
+
+    Raises:
+        InputError: the function does not return a pose and a score.
+    """
     nearby = surroundings.around(start[:3, 3], MAX_RANGE)
     answer = function(nearby, measured.copy(), start.copy())
     try:
@@ -186,7 +223,8 @@ def _by_own(
             f"{path}: returned no pose: (4, 4) with a rotation and a last row"
             " 0 0 0 1"
         )
-    return Estimate(X, score if score == score else -math.inf)
+    # NaN is the lowest score.
+    return Estimate(X, -math.inf if math.isnan(score) else score)
 
 
 def make_estimator(method: str, settings: Settings) -> Estimator:

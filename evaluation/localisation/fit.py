@@ -14,6 +14,11 @@ _FIT = 0.15
 _PAIR = 1.0
 # Least standard deviation from a plane [m], even where a scan fits exactly.
 _ROUGHNESS = 0.01
+# Standard deviation of a plane's distance if no point of the map is near [m].
+_UNKNOWN = 1.0
+# Least eigenvalue of a Hessian: directions without constraints get a standard
+# deviation of 100 m or rad.
+_LEAST_EIGENVALUE = 1e-4
 # Normals are exact to 3 deg. This is the square of the component along the
 # surface that such an error produces; uncorrected, it would seem to constrain a
 # scan along the surface.
@@ -55,29 +60,44 @@ def fit_at(surface: Surface, scan: np.ndarray, X_WS: np.ndarray) -> Fit:
     n_W = surface.normals[nearest]
     off = np.einsum("ni,ni->n", n_W, p_W[is_pair] - surface.points[nearest])
     arms = p_W[is_pair] - X_WS[:3, 3]
-    H = _point_to_plane_hessian(arms, n_W)
+    residual, sigma = math.nan, _UNKNOWN
+    if len(off):
+        residual = math.sqrt(np.mean(off**2))
+        sigma = max(residual, _ROUGHNESS)
+    return Fit(
+        float(np.count_nonzero(np.abs(off) < _FIT) / len(scan)),
+        residual,
+        _bounded_inverse(_corrected_hessian(arms, n_W) / sigma**2),
+    )
+
+
+def _corrected_hessian(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Returns the point-to-plane Hessian (6, 6) without the noise of normals.
+
+    Args:
+        arms: (N, 3) vectors from the LiDAR to the points, in W [m].
+        normals: (N, 3) unit normals of the planes at the points, in W.
+    """
+    H = _point_to_plane_hessian(arms, normals)
     for axis in np.eye(3):
         H -= _NORMAL_NOISE * _point_to_plane_hessian(
             arms, np.broadcast_to(axis, arms.shape)
         )
-    residual = math.sqrt(np.mean(off**2)) if len(off) else math.nan
-    sigma = max(residual, _ROUGHNESS) if len(off) else 1.0
-    return Fit(
-        float(np.count_nonzero(np.abs(off) < _FIT) / len(scan)),
-        residual,
-        _bounded_inverse(H / sigma**2),
-    )
+    return H
 
 
 def _point_to_plane_hessian(
     arms: np.ndarray, normals: np.ndarray
 ) -> np.ndarray:
-    """Returns the point-to-plane Hessian (6, 6) over turn, then move."""
+    """Returns the point-to-plane Hessian (6, 6) over turn, then move.
+
+    For the arguments, see `_corrected_hessian`.
+    """
     J = np.concatenate([np.cross(arms, normals), normals], axis=1)
     return J.T @ J
 
 
 def _bounded_inverse(H: np.ndarray) -> np.ndarray:
+    """Returns the inverse of a Hessian (6, 6), with bounded eigenvalues."""
     values, vectors = np.linalg.eigh(H)
-    # Directions without constraints get a standard deviation of 100 m or rad.
-    return vectors / np.maximum(values, 1e-4) @ vectors.T
+    return vectors / np.maximum(values, _LEAST_EIGENVALUE) @ vectors.T

@@ -26,6 +26,15 @@ from evaluation.localisation.settings import MAX_RANGE
 # Sum of two points' variances across the plane in small_gicp's covariances;
 # along the plane the variance is a thousand times as large.
 _ACROSS = 2e-3
+# The search width is this many times s, see above.
+_WIDTH_PER_MOTION = 3.0
+# The search width is this many times the kernel's k, because k is s / 3.
+_WIDTH_PER_KERNEL = 9.0
+# An alignment has at most this share of the previous alignment's width.
+_SHRINKING = 0.5
+# Added to the diagonal of the Hessian, so that it can be inverted where pairs
+# do not determine a motion.
+_DAMPING = 1e-6
 # An alignment ends if there are fewer pairs, which do not determine a pose.
 _FEWEST_PAIRS = 6
 
@@ -60,26 +69,61 @@ def align_robustly(
     Returns:
         The estimated X_WS, and the number of steps.
     """
-    X = start.copy()
-    width = widths[0]
+    X = start
+    width, last_width = widths
     total = 0
     while True:
         begin = X
-        for _ in range(iterations):
-            total += 1
-            step = _gauss_newton_step(surface, scan, X, width, covariances)
-            R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
-            X = poses.make_pose(R, X[:3, 3] + step[3:])
-            move, turn = (np.linalg.norm(step[k : k + 3]) for k in (3, 0))
-            if move < still[0] and turn < still[1]:
-                break
-        if width <= widths[1]:
+        X, number = _align(
+            surface, scan, begin, width, iterations, still, covariances
+        )
+        total += number
+        if width <= last_width:
             return X, total
-        difference = poses.inverse(begin) @ X
-        turn = Rotation.from_matrix(difference[:3, :3]).magnitude()
-        deviation = 2.0 * MAX_RANGE * math.sin(turn / 2.0)
-        deviation += float(np.linalg.norm(difference[:3, 3]))
-        width = max(widths[1], min(3.0 * deviation, width / 2.0))
+        wanted = _WIDTH_PER_MOTION * _greatest_motion(begin, X)
+        width = max(last_width, min(wanted, _SHRINKING * width))
+
+
+def _align(
+    surface: Surface,
+    scan: np.ndarray,
+    start: np.ndarray,
+    width: float,
+    iterations: int,
+    still: tuple[float, float],
+    covariances: np.ndarray | None,
+) -> tuple[np.ndarray, int]:
+    """Registers a scan with one search width.
+
+    Args:
+        width: greatest distance between paired points [m].
+        surface, scan, start, iterations, still, covariances: see
+            `align_robustly`.
+
+    Returns:
+        The estimated X_WS, and the number of steps.
+    """
+    X = start
+    least_move, least_turn = still
+    for number in range(1, iterations + 1):
+        step = _gauss_newton_step(surface, scan, X, width, covariances)
+        R = Rotation.from_rotvec(step[:3]).as_matrix() @ X[:3, :3]
+        X = poses.make_pose(R, X[:3, 3] + step[3:])
+        move, turn = np.linalg.norm(step[3:]), np.linalg.norm(step[:3])
+        if move < least_move and turn < least_turn:
+            return X, number
+    return X, iterations
+
+
+def _greatest_motion(X_WA: np.ndarray, X_WB: np.ndarray) -> float:
+    """Returns how far a point of a scan moves at most from pose A to B [m].
+
+    A rotation counts by how far it moves a point at the greatest range.
+    """
+    X_AB = poses.inverse(X_WA) @ X_WB
+    turn = Rotation.from_matrix(X_AB[:3, :3]).magnitude()
+    by_turn = 2.0 * MAX_RANGE * math.sin(turn / 2.0)
+    return by_turn + float(np.linalg.norm(X_AB[:3, 3]))
 
 
 def _gauss_newton_step(
@@ -92,6 +136,15 @@ def _gauss_newton_step(
     """Returns a Gauss-Newton step (6,) in W.
 
     The step is a rotation vector about the LiDAR [rad], then a translation [m].
+    It is 0 with too few pairs.
+
+    Args:
+        surface: the map.
+        scan: (N, 3) in S [m].
+        X_WS: (4, 4) pose before the step.
+        width: greatest distance between paired points [m].
+        covariances: (N, 3, 3) covariances of the scan's points in S, for GICP;
+            None for point-to-plane ICP.
     """
     arms = scan @ X_WS[:3, :3].T
     found, squares = surface.tree.batch_nearest_neighbor_search(
@@ -111,7 +164,7 @@ def _gauss_newton_step(
         spread = surface.covariances[nearest] + R @ covariances[near] @ R.T
         omega = _ACROSS * np.linalg.inv(spread)
     pull = np.einsum("nij,nj->ni", omega, off)
-    kernel = width / 9.0
+    kernel = width / _WIDTH_PER_KERNEL
     squares = np.einsum("ni,ni->n", off, pull)
     weights = (kernel / (kernel + squares)) ** 2
     # A small turn w moves a point by w x arm.
@@ -119,6 +172,6 @@ def _gauss_newton_step(
     J[:, :, :3] = np.cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
     J[:, :, 3:] = np.eye(3)
     weighted = (J.transpose(0, 2, 1) @ omega) * weights[:, None, None]
-    H = np.einsum("nij,njk->ik", weighted, J) + 1e-6 * np.eye(6)
+    H = np.einsum("nij,njk->ik", weighted, J) + _DAMPING * np.eye(6)
     g = np.einsum("nij,nj->i", weighted, off)
     return np.linalg.solve(H, -g)
