@@ -28,6 +28,8 @@ from cns_drake.imports.streets import SIDEWALK_WIDTH
 _PARAPET_FROM_EDGE = 0.2
 _PARAPET_THICKNESS = 0.25
 _PARAPET_HEIGHT = 1.0
+# Layer of a bridge whose tags name none.
+_USUAL_LAYER = 1.0
 _PARAPET = AreaLook("Parapet", "fence", (0.62, 0.60, 0.57), _PARAPET_HEIGHT)
 
 
@@ -96,7 +98,7 @@ def _height_rank(way: OsmWay) -> tuple[float, str]:
     if not has_tag(way.tags, "bridge"):
         return -math.inf, ""
     layer = re.fullmatch(r"[+-]?\d+(\.\d+)?", way.tags.get("layer", ""))
-    return float(layer[0]) if layer else 1.0, way.name
+    return float(layer[0]) if layer else _USUAL_LAYER, way.name
 
 
 def parapets(
@@ -112,11 +114,13 @@ def parapets(
             continue
         course = LineString(local(line))
         strips = []
-        for side, walk in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
+        for side, has_sidewalk in zip(
+            (1.0, -1.0), sidewalk_sides(tags), strict=True
+        ):
             aside = (
                 width / 2.0
                 + _PARAPET_FROM_EDGE
-                + (SIDEWALK_WIDTH if walk else 0.0)
+                + (SIDEWALK_WIDTH if has_sidewalk else 0.0)
             )
             edge = course.offset_curve(side * aside)
             strips.append(

@@ -64,14 +64,17 @@ from cns_drake.imports.streets import Street
 
 # Greatest height of a barrier or a tree [m].
 _TALLEST = 150.0
+# A car can hit this part of a tree: radius and height of the trunk [m].
+_TRUNK_RADIUS = 0.3
+_TRUNK_HEIGHT = 2.0
 # Width and usual height of a hedge [m].
 _HEDGE = (0.8, 1.2)
 # Width and usual height of a wall [m].
 _WALL = (0.2, 1.6)
 # How far the sea extends beyond the buildings [m].
-_SEA = 60.0
-# Larger areas, such as whole countries, are refused.
-_LARGEST = 20_000.0  # [m]
+_SEA_MARGIN = 60.0
+# Wider areas, such as whole countries, are refused [m].
+_WIDEST = 20_000.0
 
 
 def import_openstreetmap(
@@ -104,19 +107,20 @@ def import_openstreetmap(
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
     local = LocalMetres(longitude, latitude)
-    size = local.metres(high - low)
-    if size.max() > _LARGEST:
+    width = local.metres(high - low).max()
+    if width > _WIDEST:
         raise InputError(
-            f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
-            f" most {_LARGEST / 1000:.0f} km"
+            f"{path}: {width / 1000:.0f} km across; cut out a piece of at most"
+            f" {_WIDEST / 1000:.0f} km"
         )
     bridges = bridges_of(features.ways, local) if dressed else Bridges()
     coasts = coasts_of(features.ways) if dressed else []
-    limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
+    outwards = np.array([[-1.0], [1.0]])
+    sea_limits = local(np.array([low, high])) + _SEA_MARGIN * outwards
     passages = passages_of(features.ways, local, faults)
     driven = streets.drivable_streets(features.ways, local, bridges)
     _count_walled_up(driven, buildings, local, passages, faults)
-    found = [
+    objects = [
         *make_buildings(
             buildings,
             local,
@@ -128,15 +132,15 @@ def import_openstreetmap(
         *streets.street_surfaces(features, local, bridges),
         *crossing_stripes(features, local),
         *ground_areas(features, local, dressed),
-        *sea(coasts, local, limits, faults),
+        *sea(coasts, local, sea_limits, faults),
         *parapets(features.ways, bridges, local),
         *_barriers(features, local),
         *_trees(features, local),
     ]
-    also = bridges.left_out | {way.name for way in coasts}
-    _count_unused(features, found, also)
+    counted = bridges.left_out | {way.name for way in coasts}
+    _count_unused(features, objects, counted)
     return ForeignCity(
-        found,
+        objects,
         (latitude, longitude),
         "WGS 84",
         faults,
@@ -154,9 +158,9 @@ def _used_buildings(features: OsmFeatures, dressed: bool) -> list[OsmArea]:
     unknown date.
     """
     areas = [
-        one
-        for one in features.areas
-        if is_building(one.tags) or (dressed and was_building(one.tags))
+        area
+        for area in features.areas
+        if is_building(area.tags) or (dressed and was_building(area.tags))
     ]
     standing = standing_buildings(areas, features.faults, dressed)
     return list(_without_outers(standing, features))
@@ -171,12 +175,12 @@ def _count_walled_up(
 ) -> None:
     """Counts streets that lead through buildings without a passage."""
     count_walled_up(
-        [(one.name, LineString(one.line)) for one in driven],
+        [(street.name, LineString(street.line)) for street in driven],
         [
-            (local.polygon(polygon), heights(one.tags).low)
-            for one in buildings
-            if not is_gone(one.tags)
-            for polygon in one.polygons
+            (local.polygon(polygon), heights(building.tags).low)
+            for building in buildings
+            if not is_gone(building.tags)
+            for polygon in building.polygons
         ],
         passages,
         faults,
@@ -192,13 +196,13 @@ def _without_outers(
     the way would fill the courtyards of the multipolygon.
     """
     buildings = list(buildings)
-    names = {one.name for one in buildings}
-    for one in buildings:
-        is_outline = features.outers.get(one.name) in names
-        if is_outline and not has_tag(one.tags, "building:part"):
-            features.faults.add(TWICE, one.name)
+    names = {building.name for building in buildings}
+    for building in buildings:
+        is_outline = features.outers.get(building.name) in names
+        if is_outline and not has_tag(building.tags, "building:part"):
+            features.faults.add(TWICE, building.name)
         else:
-            yield one
+            yield building
 
 
 def _no_buildings(faults: ImportFaults) -> str:
@@ -221,7 +225,7 @@ def _bounds(
     If the area crosses the 180th meridian, longitudes continue beyond 180.
     """
     places = shapely.get_coordinates(
-        [polygon for one in buildings for polygon in one.polygons]
+        [polygon for building in buildings for polygon in building.polygons]
     )
     if np.ptp(places[:, 0]) > 180.0:
         places[:, 0] %= 360.0
@@ -230,27 +234,32 @@ def _bounds(
 
 def _count_unused(
     features: OsmFeatures,
-    found: Iterable[ImportedObject],
-    also: AbstractSet[str],
+    objects: Iterable[ImportedObject],
+    counted: AbstractSet[str],
 ) -> None:
-    """Counts, by kind, the objects of the file that the city does not use.
+    """Counts, by kind, the tags and objects that the city does not use.
 
-    Buildings that are left out, and the ids in `also`, are counted elsewhere.
+    Args:
+        features: content of the file, whose faults are added to.
+        objects: objects of the city. The names of their structures contain the
+            ids of the file's objects from which they were made.
+        counted: ids of objects that are counted elsewhere, as are the buildings
+            that are left out.
     """
-    used = {
-        name
-        for one in found
-        for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
-    }
-    used |= {one.name for one in features.areas if is_building(one.tags)}
-    used |= also
-    tagged = {one.name: one.tags for one in features.ways}
-    tagged |= {one.name: one.tags for one in features.areas}
-    tagged |= {name: tags for name, tags, _ in features.trees}
+    tagged = {way.name: way.tags for way in features.ways}
+    tagged |= {area.name: area.tags for area in features.areas}
+    tagged |= {tree.name: tree.tags for tree in features.trees}
     for name, tags in tagged.items():
         for key, usual in TABLES["unread"].items():
             if tags.get(key, "") not in ("", *usual):
                 features.faults.add(f"tag {key}, not read", name)
+    used = {
+        name
+        for one in objects
+        for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
+    }
+    used |= {area.name for area in features.areas if is_building(area.tags)}
+    used |= counted
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
         if name not in used and not is_relation_of_parts:
@@ -262,6 +271,10 @@ def _count_unused(
 def _barriers(
     features: OsmFeatures, local: LocalMetres
 ) -> Iterator[ImportedObject]:
+    """Yields hedges, walls and fences, with openings where ways lead through.
+
+    `local` converts longitudes and latitudes to coordinates in metres.
+    """
     openings = WayOpenings(features.ways, local)
     for way in features.ways:
         name, tags, line, _ = way
@@ -286,6 +299,10 @@ def _barriers(
 def _trees(
     features: OsmFeatures, local: LocalMetres
 ) -> Iterator[ImportedObject]:
+    """Yields the trees of a file that are not inside a building.
+
+    `local` converts longitudes and latitudes to coordinates in metres.
+    """
     for name, tags, place in features.trees:
         if is_inside(tags):
             continue
@@ -302,6 +319,6 @@ def _trees(
         )
         place_W = (round(x, 3), round(y, 3), 0.0)
         structure = Structure(f"tree_{name}", "vegetation", model, place_W)
-        trunk = Point(x, y).buffer(0.3, 2)
-        walls, _ = extruded(trunk, 0.0, 2.0, name, ImportFaults())
+        trunk = Point(x, y).buffer(_TRUNK_RADIUS, quad_segs=2)
+        walls, _ = extruded(trunk, 0.0, _TRUNK_HEIGHT, name, ImportFaults())
         yield ImportedObject(structure, "Tree", None, walls)

@@ -10,8 +10,20 @@ from shapely.geometry import Polygon
 from cns_drake.imports.faults import ImportFaults
 
 Tags = Mapping[str, str]
-# A node: its id, tags and place [deg].
-OsmNode = tuple[str, Tags, tuple[float, float]]
+
+
+class OsmNode(NamedTuple):
+    """A node of an OpenStreetMap file, such as a tree.
+
+    Attributes:
+        name: id of the node, such as `n123`.
+        tags: tags of the node.
+        place: longitude and latitude [deg].
+    """
+
+    name: str
+    tags: Tags
+    place: tuple[float, float]
 
 
 class OsmWay(NamedTuple):

@@ -17,8 +17,12 @@ from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
 _SAND: Rgb = (0.76, 0.68, 0.51)
 _GRAVEL: Rgb = (0.50, 0.47, 0.43)
 _TARTAN: Rgb = (0.60, 0.34, 0.28)
-_GROUND_LEVEL = -0.05  # [m]
-_PITCH = AreaLook("Pitch", "other-ground", _TARTAN, -0.035)
+# Heights of areas [m]. Where areas overlap, the higher one is seen: car parks
+# on pitches, pitches on lawns, and streets, at height 0, on all of them.
+_GROUND_LEVEL = -0.05
+_PITCH_LEVEL = -0.035
+_PARKING_LEVEL = -0.03
+_PITCH = AreaLook("Pitch", "other-ground", _TARTAN, _PITCH_LEVEL)
 _GRASS_SURFACES = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACE_COLOURS = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
@@ -27,6 +31,7 @@ _NOT_ON_GROUND = ("underground", "multi-storey", "rooftop")
 
 
 def _look_of(entry: list) -> AreaLook:
+    """Returns the look in an entry of the table: type, class, colour, z."""
     object_type, semantic_class, (red, green, blue), z = entry
     return AreaLook(object_type, semantic_class, (red, green, blue), z)
 
@@ -57,10 +62,10 @@ def ground_areas(
 
 
 def _plain_look(tags: Tags) -> AreaLook | None:
-    found = area_kind(tags)
-    if found is None:
+    type_and_class = area_kind(tags)
+    if type_and_class is None:
         return None
-    object_type, semantic_class = found
+    object_type, semantic_class = type_and_class
     colours = {"WaterBody": WATER, "LandUse": LAWN}
     kind = green_kind(tags) if object_type == "LandUse" else ""
     return AreaLook(
@@ -80,7 +85,7 @@ def _detailed_look(tags: Tags) -> AreaLook | None:
     if tags.get("amenity") == "parking":
         if tags.get("parking") in _NOT_ON_GROUND:
             return None
-        return AreaLook("Parking", "parking", None, -0.03)
+        return AreaLook("Parking", "parking", None, _PARKING_LEVEL)
     for look, entry in _LOOKS:
         if any(
             tags.get(key) in values.split()
@@ -95,7 +100,7 @@ def _pitch_look(tags: Tags) -> AreaLook:
     surface = tags.get("surface")
     sports = tags.get("sport", "").split(";")
     is_grass = surface in _GRASS_SURFACES or (
-        surface is None and any(one in _SPORTS_ON_GRASS for one in sports)
+        surface is None and any(sport in _SPORTS_ON_GRASS for sport in sports)
     )
     rgb = LAWN if is_grass else _SURFACE_COLOURS.get(surface or "", _TARTAN)
     return _PITCH._replace(

@@ -69,6 +69,7 @@ class Passage(NamedTuple):
 
 
 def _is_on_the_ground(tags: Tags) -> bool:
+    """Returns whether a way is outdoors, at or near the level of the ground."""
     is_above = not re.fullmatch(r"-?0*|.*;.*", tags.get("level", "0"))
     return not (is_tunnel(tags) or is_inside(tags) or is_above)
 
@@ -82,7 +83,7 @@ def passages_of(
     lines or areas on the ground. `local` converts longitudes and latitudes to
     coordinates in metres, and `faults` counts tags that cannot be read.
     """
-    found = []
+    passages = []
     for name, tags, line, _ in ways:
         is_passage = has_tag(tags, "tunnel") or has_tag(tags, "covered")
         width = way_width(tags)
@@ -105,8 +106,8 @@ def passages_of(
         else:
             half = width / 2.0 + _BESIDE_WAY
             area = _extended_line(course).buffer(half, cap_style="flat")
-        found.append(Passage(name, course, area, clear or usual))
-    return found
+        passages.append(Passage(name, course, area, clear or usual))
+    return passages
 
 
 def _extended_line(course: LineString) -> LineString:
@@ -125,7 +126,7 @@ class Passages:
 
     def __init__(self, passages: Sequence[Passage]):
         self._passages = passages
-        self._tree = STRtree([one.course for one in passages])
+        self._tree = STRtree([passage.course for passage in passages])
 
     def through(
         self, polygon: Polygon, low: float
@@ -140,16 +141,16 @@ class Passages:
             The area in W [m] and the height above the ground [m]; None if no
             way leads through the solid.
         """
-        found = [
-            one
+        passages = [
+            passage
             for k in self._tree.query(polygon, "intersects")
-            if (one := self._passages[k]).height > low
-            and one.course.intersection(polygon).length > _THROUGH
+            if (passage := self._passages[k]).height > low
+            and passage.course.intersection(polygon).length > _THROUGH
         ]
-        if not found:
+        if not passages:
             return None
-        area = shapely.union_all([one.area for one in found])
-        return area, max(one.height for one in found)
+        area = shapely.union_all([passage.area for passage in passages])
+        return area, max(passage.height for passage in passages)
 
 
 def count_walled_up(
@@ -169,7 +170,7 @@ def count_walled_up(
     """
     low = [polygon for polygon, begin in solids if begin < _HEADROOM]
     tree = STRtree(low)
-    open_ways = {one.name for one in passages}
+    open_ways = {passage.name for passage in passages}
     for name, line in streets:
         if name not in open_ways and any(
             low[k].intersection(line).length > _THROUGH
@@ -211,14 +212,14 @@ class WayOpenings:
         `faults` counts the openings, and also the ways that cross the barrier
         without a common node. `course` is the line of the barrier in W [m].
         """
-        on_it = self._crossed_nodes(barrier, shapely.get_coordinates(course))
+        crossed = self._crossed_nodes(barrier, shapely.get_coordinates(course))
         edges = {frozenset(pair) for pair in pairwise(barrier.nodes)}
         areas = []
         for k in self._tree.query(course, "intersects"):
             way, line = self._ways[k], self._lines[k]
             if edges & {frozenset(pair) for pair in pairwise(way.nodes)}:
                 continue  # It leads along the barrier.
-            if on_it & {*way.nodes}:
+            if crossed & {*way.nodes}:
                 half = (way_width(way.tags) or 0.0) / 2.0 + _BESIDE_WAY
                 areas.append(line.buffer(half, cap_style="square"))
             elif line.crosses(course):
@@ -233,7 +234,7 @@ class WayOpenings:
         At an end of the barrier, where another barrier may begin, any two ways
         are enough. `places` (N, 2) are the places of the nodes in W [m].
         """
-        found = set()
+        crossed = set()
         last = len(places) - 1
         is_closed = barrier.nodes[0] == barrier.nodes[-1]
         for k, node in enumerate(barrier.nodes):
@@ -241,7 +242,7 @@ class WayOpenings:
             if len(arms) < 2:
                 continue
             if k in (0, last) and not is_closed:
-                found.add(node)
+                crossed.add(node)
                 continue
             before = places[k - 1 if k else last - 1]
             after = places[k + 1 if k < last else 1]
@@ -251,8 +252,8 @@ class WayOpenings:
                 for arm in arms
             }
             if len(sides) > 1:
-                found.add(node)
-        return found
+                crossed.add(node)
+        return crossed
 
 
 def _angle_between(

@@ -1,6 +1,7 @@
 """Reads the parts of an OpenStreetMap file that make up a city."""
 
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
 import contextlib
 from pathlib import Path
 import tempfile
@@ -20,6 +21,7 @@ from cns_drake.imports.openstreetmap.element_kinds import (
 from cns_drake.imports.openstreetmap.features import (
     OsmArea,
     OsmFeatures,
+    OsmNode,
     OsmWay,
     Tags,
 )
@@ -34,16 +36,18 @@ _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 
 
 def read_openstreetmap(path: Path) -> OsmFeatures:
-    """Reads an OpenStreetMap file.
+    """Returns the content of an OpenStreetMap file.
+
+    Buildings without an area are left out and counted as faults.
 
     Raises:
-        InputError: if it cannot be read.
+        InputError: if the file cannot be read.
     """
     import osmium
 
     features = OsmFeatures()
     check_regular(path)
-    buildings: dict[str, None] = {}
+    buildings: list[str] = []
     flat: set[str] = set()
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -51,10 +55,10 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     ):
         source = sorted_file(path, Path(folder), features.faults)
         reader = osmium.FileProcessor(str(source)).with_locations().with_areas()
-        for one in reader:
-            tags = {tag.k: tag.v for tag in one.tags}
-            if isinstance(one, osmium.osm.Area):
-                area = _area_of(one, tags)
+        for element in reader:
+            tags = {tag.k: tag.v for tag in element.tags}
+            if isinstance(element, osmium.osm.Area):
+                area = _area_of(element, tags)
                 if not area.polygons:
                     continue
                 if is_building(tags) and _has_no_area(area.polygons):
@@ -62,32 +66,47 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 else:
                     features.areas.append(area)
                 continue
-            name = f"{_LETTERS[type(one).__name__]}{number_in_file(one.id)}"
+            letter = _LETTERS[type(element).__name__]
+            name = f"{letter}{number_in_file(element.id)}"
             if tags:
                 features.kinds[name] = element_kind(tags)
-            if isinstance(one, osmium.osm.Way) and tags:
+            if isinstance(element, osmium.osm.Way) and tags:
                 if is_building(tags):
-                    buildings[name] = None
-                _add_way(one, name, tags, features)
-            elif isinstance(one, osmium.osm.Relation):
+                    buildings.append(name)
+                _add_way(element, name, tags, features)
+            elif isinstance(element, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
-                    buildings[name] = None
+                    buildings.append(name)
                     features.outers |= {
                         f"w{number_in_file(member.ref)}": name
-                        for member in one.members
+                        for member in element.members
                         if member.type == "w" and member.role != "inner"
                     }
-            elif isinstance(one, osmium.osm.Node) and one.location.valid():
-                _add_node(one, name, tags, features)
-    closed = {name for name, _, _ in features.areas}
+            elif (
+                isinstance(element, osmium.osm.Node)
+                and element.location.valid()
+            ):
+                _add_node(element, name, tags, features)
+    _count_without_area(buildings, flat, features)
+    return features
+
+
+def _count_without_area(
+    buildings: Iterable[str], flat: AbstractSet[str], features: OsmFeatures
+) -> None:
+    """Counts the buildings of a file that are none of the features' areas.
+
+    `buildings` contains the ids of all buildings, and `flat` the ids of those
+    whose outline closes, but has no area.
+    """
+    areas = {area.name for area in features.areas}
     ways = {way.name: way for way in features.ways}
     for name in buildings:
-        if name not in closed:
+        if name not in areas:
             fault = (
                 _WITHOUT_AREA if name in flat else _why_no_area(ways.get(name))
             )
             features.faults.add(f"building {fault}, left out", name)
-    return features
 
 
 def _area_of(area: Any, tags: Tags) -> OsmArea:
@@ -98,7 +117,11 @@ def _area_of(area: Any, tags: Tags) -> OsmArea:
 
 
 def _add_way(way: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
-    """Adds an osmium way to the features, if two or more nodes have places."""
+    """Adds an osmium way to the features, if two or more nodes have places.
+
+    Nodes without a place are left out, and counted unless the way is a
+    building.
+    """
     nodes = [node for node in way.nodes if node.location.valid()]
     missing = len(way.nodes) - len(nodes)
     if missing and not is_building(tags):
@@ -117,7 +140,7 @@ def _add_node(node: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
         features.crossings.append((node.id, tags))
     elif tags:
         nodes = features.trees if is_tree else features.nodes
-        nodes.append((name, tags, (node.lon, node.lat)))
+        nodes.append(OsmNode(name, tags, (node.lon, node.lat)))
 
 
 def _why_no_area(way: OsmWay | None) -> str:
@@ -154,13 +177,14 @@ def _reader_errors(path: Path) -> Iterator[None]:
 
 
 def _polygons_of(area: Any) -> list[Polygon]:
-    found = []
+    """Returns the polygons of an osmium area [deg]."""
+    polygons = []
     for outer in area.outer_rings():
         holes = [
             [(n.lon, n.lat) for n in inner] for inner in area.inner_rings(outer)
         ]
-        found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
-    return found
+        polygons.append(Polygon([(n.lon, n.lat) for n in outer], holes))
+    return polygons
 
 
 def _has_no_area(outlines: Iterable[BaseGeometry]) -> bool:

@@ -67,10 +67,10 @@ def _extended_within(line: LineString, whole: BaseGeometry) -> LineString:
         return line
     for end, before in ((0, 1), (-1, -2)):
         if whole.contains(Point(points[end])):
-            way = points[end] - points[before]
-            if not way.any():
+            ahead = points[end] - points[before]
+            if not ahead.any():
                 continue
-            far = points[end] + _COAST_EXTENSION * way / np.hypot(*way)
+            far = points[end] + _COAST_EXTENSION * ahead / np.hypot(*ahead)
             points = (
                 np.vstack([far, points])
                 if end == 0
@@ -82,6 +82,8 @@ def _extended_within(line: LineString, whole: BaseGeometry) -> LineString:
 def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
     """Returns whether an area is on the right of most of its coastline."""
     shapely.prepare(area)
+    # Length of coast that has the area on its right, minus the length that has
+    # it on its left.
     right = 0.0
     for coast in coasts:
         points = np.array(coast.coords)

@@ -23,7 +23,8 @@ _COMPASS = (
 # post of its own. With other values, such as `wall_mounted`, another structure
 # carries the object.
 _POSTS = ("pole", "straight_mast", "bent_mast", "mast")
-_TREE_DISTANCE = 8.0  # [m]
+# Distance between the trees of a tree row [m].
+_TREE_SPACING = 8.0
 
 
 def object_kind(tags: Tags) -> str | None:
@@ -32,21 +33,20 @@ def object_kind(tags: Tags) -> str | None:
     The kind is a key of `cns_drake.city.placement.objects.OBJECTS`, or None for
     a node without such an object.
     """
-    found = [
-        name
-        for key, value, name in TABLES["objects"]
+    kinds: list[str] = [
+        kind
+        for key, value, kind in TABLES["objects"]
         if has_tag(tags, key) and value in ("", tags[key])
     ]
-    if not found:
+    if not kinds:
         return None
-    name: str = found[0]
     if tags.get("fire_hydrant:type", "pillar") != "pillar":
         return None
     if tags.get("lamp_mount", tags.get("support", "pole")) not in _POSTS:
         return None
-    if name == "bus_shelter" and tags.get("shelter") != "yes":
+    if kinds[0] == "bus_shelter" and tags.get("shelter") != "yes":
         return "sign_rectangular"
-    return name
+    return kinds[0]
 
 
 def make_small_objects(
@@ -61,13 +61,13 @@ def make_small_objects(
         kind = object_kind(tags)
         if kind is not None and not is_inside(tags):
             x, y = local(np.array([place]))[0].tolist()
-            direction = _direction(tags)
-            yield SmallObject(name, elements[name], kind, (x, y), direction)
+            heading = _heading(tags)
+            yield SmallObject(name, elements[name], kind, (x, y), heading)
     for name, tags, line, _ in features.ways:
         if tags.get("natural") == "tree_row":
             needles = tags.get("leaf_type") == "needleleaved"
             course = LineString(local(line))
-            count = max(1, round(course.length / _TREE_DISTANCE))
+            count = max(1, round(course.length / _TREE_SPACING))
             steps = (np.arange(count) + 0.5) / count
             points = shapely.line_interpolate_point(
                 course, steps, normalized=True
@@ -77,11 +77,13 @@ def make_small_objects(
                 yield SmallObject(name, elements[name], kind, (x, y), None)
 
 
-def _direction(tags: Tags) -> float | None:
-    """Returns the heading in a thing's tags [rad]; None if they have none."""
+def _heading(tags: Tags) -> float | None:
+    """Returns the heading in an object's tags [rad]; None if there is none."""
     text = tags.get("direction", "")
     if text.upper() in _COMPASS:
-        text = str(22.5 * _COMPASS.index(text.upper()))
+        text = str(360.0 / len(_COMPASS) * _COMPASS.index(text.upper()))
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
         return None
+    # The file counts directions clockwise from north, a heading is counted
+    # counter-clockwise from east.
     return float(np.radians(90.0 - float(text)))

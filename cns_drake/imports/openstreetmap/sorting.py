@@ -23,6 +23,8 @@ _WAY = 1
 _Key = tuple[int, int]
 # Number of bytes of a file that are searched at a time.
 _CHUNK_SIZE = 1 << 24
+# Greatest length of a word that is searched in a file [bytes].
+_LONGEST_WORD = 8
 
 
 def number_in_file(number: int) -> int:
@@ -87,26 +89,35 @@ def _newest_versions(
     """
     versions: dict[_Key, _Version] = {}
     places: dict[int, tuple[float, float]] = {}
-    for one in _objects_in(path):
-        key = _key_of(one)
-        is_there = one.visible and key not in deleted
-        made = _Version(one.version, is_there, dict(one.tags), _content(one))
+    for element in _objects_in(path):
+        key = _key_of(element)
+        is_there = element.visible and key not in deleted
+        version = _Version(
+            element.version, is_there, dict(element.tags), _content(element)
+        )
         if key[0] == _WAY:
             places |= {
-                n.ref: (n.lon, n.lat) for n in one.nodes if n.location.valid()
+                node.ref: (node.lon, node.lat)
+                for node in element.nodes
+                if node.location.valid()
             }
         known = versions.get(key)
         if known is not None:
             faults.add("thing that is there twice, taken once", _name_of(key))
-            if (known.version, len(known.tags)) >= (
-                one.version,
-                len(made.tags),
-            ):
+            if _newness(known) >= _newness(version):
                 continue
-        versions[key] = made
+        versions[key] = version
     for number, place in places.items():
         versions.setdefault((_NODE, number), _Version(0, True, {}, place))
     return versions
+
+
+def _newness(version: _Version) -> tuple[int, int]:
+    """Returns a pair that is greater for the newer of two versions.
+
+    Of copies of one version, the copy with more tags counts as newer.
+    """
+    return version.version, len(version.tags)
 
 
 def _write_object(writer: Any, key: _Key, version: _Version) -> None:
@@ -129,8 +140,8 @@ def _write_object(writer: Any, key: _Key, version: _Version) -> None:
         writer.add_relation(mutable.Relation(members=members, **common))
 
 
-def _key_of(one: Any) -> _Key:
-    return _KINDS.index(type(one).__name__), one.id
+def _key_of(element: Any) -> _Key:
+    return _KINDS.index(type(element).__name__), element.id
 
 
 def _name_of(key: _Key) -> str:
@@ -148,23 +159,31 @@ def _positive_id(number: int) -> int:
     return number if number > 0 else _FIRST_NEW - number
 
 
-def _content(one: Any) -> Any:
-    kind = type(one).__name__
+def _content(element: Any) -> Any:
+    """Returns the content of an object of osmium, as in `_Version`."""
+    kind = type(element).__name__
     if kind == "Node":
-        return (one.lon, one.lat) if one.location.valid() else None
+        is_placed = element.location.valid()
+        return (element.lon, element.lat) if is_placed else None
     if kind == "Way":
-        return [n.ref for n in one.nodes]
-    return [(m.type, m.ref, m.role) for m in one.members]
+        return [node.ref for node in element.nodes]
+    return [(m.type, m.ref, m.role) for m in element.members]
 
 
 def _is_sorted(path: Path) -> bool:
-    """Returns whether objects are in order, and ways have only node ids."""
+    """Returns whether the reader can take a file as it is.
+
+    The objects must be in order, exist, and have positive ids. The places of
+    nodes must be in the nodes only, and not in the ways.
+    """
     last = 0, 0
-    for one in _objects_in(path):
-        key = _key_of(one)
-        if key <= last or one.id <= 0 or not one.visible:
+    for element in _objects_in(path):
+        key = _key_of(element)
+        if key <= last or element.id <= 0 or not element.visible:
             return False
-        if key[0] == _WAY and any(n.location.valid() for n in one.nodes):
+        if key[0] == _WAY and any(
+            node.location.valid() for node in element.nodes
+        ):
             return False
         last = key
     return True
@@ -176,7 +195,7 @@ def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
     A remark by Overpass, such as that it ran out of time, is counted as a
     fault.
     """
-    found: set[_Key] = set()
+    deleted: set[_Key] = set()
     remark: list[str] = []
     is_open = False
 
@@ -185,7 +204,7 @@ def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
         is_open = tag == "remark"
         kind = tag.capitalize()
         if kind in _KINDS and attributes.get("action") == "delete":
-            found.add((_KINDS.index(kind), int(attributes.get("id", "0"))))
+            deleted.add((_KINDS.index(kind), int(attributes.get("id", "0"))))
 
     def end(tag: str) -> None:
         nonlocal is_open
@@ -208,15 +227,18 @@ def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
     if remark:
         words = " ".join("".join(remark).split())
         faults.add(f"the file may be cut off: {words}", "its remark")
-    return found
+    return deleted
 
 
 def _has_any_word(path: Path, *words: bytes) -> bool:
-    """Returns whether a file contains any of `words`, each at most 8 bytes."""
+    """Returns whether a file contains any of `words`.
+
+    Each word has at most `_LONGEST_WORD` bytes.
+    """
     rest = b""
     with path.open("rb") as stream:
         while chunk := stream.read(_CHUNK_SIZE):
             if any(word in rest + chunk for word in words):
                 return True
-            rest = chunk[-8:]
+            rest = chunk[-_LONGEST_WORD:]
     return False

@@ -9,9 +9,11 @@ import re
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.tags import TABLES, tag_value
 
+# Speeds of 1 km/h and 1 mile/h [m/s].
 _KM_H = 1.0 / 3.6
 _MILES_H = 0.44704
-_FASTEST = 60.0  # [m/s]
+# Greatest plausible speed limit [m/s].
+_FASTEST = 60.0
 _WALKING_PACE = 7.0 * _KM_H
 # Speed limit of links, such as ramps [km/h].
 _LINK_LIMIT_KM_H = 50.0
@@ -40,9 +42,9 @@ def speed_limit(
     """
     side = "forward" if is_forward else "backward"
     for key in (f"maxspeed:{side}", "maxspeed", *_SPEED_RULES):
-        found = tag_value(tags, key, _parsed_speed, _FASTEST, where)
-        if found is not None:
-            return found
+        limit = tag_value(tags, key, _parsed_speed, _FASTEST, where)
+        if limit is not None:
+            return limit
     kind = tags.get("highway", "")
     return _KM_H * float(TABLES["limits"].get(kind, _LINK_LIMIT_KM_H))
 
@@ -55,14 +57,14 @@ def _parsed_speed(text: str) -> float | None:
     speeds = []
     for part in text.lower().split(";"):
         country, _, rule = part.strip().rpartition(":")
-        found = _SPEED.fullmatch(rule)
-        if found:
-            unit = found[2] or ("mph" if country.startswith(_IN_MILES) else "")
+        match = _SPEED.fullmatch(rule)
+        if match:
+            unit = match[2] or ("mph" if country.startswith(_IN_MILES) else "")
             scale = _MILES_H if unit == "mph" else _KM_H
-            speeds.append(int(found[1]) * scale)
+            speeds.append(int(match[1]) * scale)
         elif rule == "walk":
             speeds.append(_WALKING_PACE)
         elif rule in TABLES["rules"]:
             speeds.append(TABLES["rules"][rule] * _KM_H)
-    valid = [one for one in speeds if 0.0 < one <= _FASTEST]
+    valid = [speed for speed in speeds if 0.0 < speed <= _FASTEST]
     return min(valid, default=None)

@@ -39,6 +39,9 @@ _FARTHEST_STOP = 25.0
 _SHORTEST_LANE = 1.0
 # The direction of a street's end is that of its last piece of this length [m].
 _ARM_LENGTH = 6.0
+# The edges of nearly parallel streets meet at no corner or far away; the sine
+# or tangent of the angle between them counts as at least this.
+_LEAST_SINE = 0.1
 # An end of a stretch: the number of the stretch, and 0 for its start or -1 for
 # its end.
 _Arm = tuple[int, int]
@@ -99,6 +102,22 @@ class _Lane:
         return self.stretch, 0 if self.is_forward else -1
 
 
+class _Way(NamedTuple):
+    """A way from a lane into the next lane.
+
+    Attributes:
+        first: number of the lane that leads into the way.
+        last: number of the lane into which the way leads.
+        is_junction: whether vehicles enter the way as they enter a junction.
+        points: (N, 2) points of the way [m].
+    """
+
+    first: int
+    last: int
+    is_junction: bool
+    points: np.ndarray
+
+
 class StreetTraffic(NamedTuple):
     """The lanes of streets, and which lane leads into which.
 
@@ -133,9 +152,9 @@ def make_traffic_lanes(
     """
     stretches = list(_stretches(streets, crossed))
     arms: defaultdict[int, list[_Arm]] = defaultdict(list)
-    for k, stretch in enumerate(stretches):
+    for number, stretch in enumerate(stretches):
         for end, node in zip((0, -1), stretch.nodes, strict=True):
-            arms[node].append((k, end))
+            arms[node].append((number, end))
     meeting = _MeetingStreets(stretches, arms, crossed, side)
     drawn = list(meeting.lanes())
     lanes = [
@@ -150,12 +169,13 @@ def make_traffic_lanes(
     ]
     links: list[tuple[int, int]] = []
     shapely.prepare(surface)
-    for first, last, is_junction, line in meeting.ways(drawn):
-        if not surface.covers(shapely.LineString(line)):
+    for way in meeting.ways(drawn):
+        if not surface.covers(shapely.LineString(way.points)):
             continue
-        links += [(first, len(lanes)), (len(lanes), last)]
-        limit = min(lanes[k].limit for k in (first, last))
-        lanes.append(DirectedLane(_at_ground_level(line), limit, is_junction))
+        links += [(way.first, len(lanes)), (len(lanes), way.last)]
+        limit = min(lanes[way.first].limit, lanes[way.last].limit)
+        points = _at_ground_level(way.points)
+        lanes.append(DirectedLane(points, limit, way.is_junction))
     junctions = [node for node, ends in arms.items() if len(ends) > 2]
     return StreetTraffic(lanes, links, _outer_neighbours(drawn), junctions)
 
@@ -179,8 +199,7 @@ class _MeetingStreets:
     def setback(self, arm: _Arm) -> float:
         """Returns how far before an end of a stretch its lanes stop [m].
 
-        `arm` is a pair: the number of the stretch; and 0 for the end where its
-        line starts, or -1 for the other end.
+        On a short stretch, both ends share the length that is left.
         """
         stretch = self.stretches[arm[0]]
         wanted = [self._wanted_setback((arm[0], end)) for end in (0, -1)]
@@ -188,6 +207,11 @@ class _MeetingStreets:
         return wanted[arm[1]] * min(1.0, room / sum(wanted))
 
     def _wanted_setback(self, arm: _Arm) -> float:
+        """Returns the setback at an end of a stretch that is long enough [m].
+
+        The lanes stop before the corners where the edges of their street meet
+        the edges of other streets.
+        """
         stretch = self.stretches[arm[0]]
         arms = self.arms[stretch.nodes[arm[1]]]
         is_joint = len(arms) < 3
@@ -197,63 +221,61 @@ class _MeetingStreets:
             if other == arm:
                 continue
             crossed = self.stretches[other[0]]
-            wide = crossed.street.width / 2.0
+            other_half = crossed.street.width / 2.0
             angle = abs(
                 wrapped(crossed.heading(other[1]) - stretch.heading(arm[1]))
             )
-            # The corner where the edges of both streets meet.
             if is_joint:
-                corner = max(wide, half) / max(np.tan(angle / 2.0), 0.1)
+                tangent = max(np.tan(angle / 2.0), _LEAST_SINE)
+                corner = max(other_half, half) / tangent
             else:
-                corner = (wide + half * np.cos(angle)) / max(np.sin(angle), 0.1)
+                sine = max(np.sin(angle), _LEAST_SINE)
+                corner = (other_half + half * np.cos(angle)) / sine
                 corner += _BEFORE_CORNER
             reach = max(reach, corner)
         return float(min(reach, _FARTHEST_STOP))
 
     def lanes(self) -> Iterator[_Lane]:
         """Yields the lanes of all stretches."""
-        for k, stretch in enumerate(self.stretches):
-            along = np.linspace(0.0, stretch.length, len(stretch.line))
-            low = self.setback((k, 0))
-            high = stretch.length - self.setback((k, -1))
-            places = np.linspace(
-                low, high, max(2, int((high - low) / SPACING) + 1)
-            )
-            middle = np.column_stack(
-                [np.interp(places, along, x) for x in stretch.line.T]
-            )
-            tangent = np.gradient(stretch.line, axis=0)
-            tangent = np.column_stack(
-                [np.interp(places, along, x) for x in tangent.T]
-            )
-            tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        for number, stretch in enumerate(self.stretches):
+            middle, tangent = self._between_setbacks(number)
             for is_forward, count in (
                 (True, stretch.layout.forward),
                 (False, stretch.layout.backward),
             ):
-                for number in range(count):
-                    offset = stretch.layout.offset(is_forward, number)
+                for nth in range(count):
+                    offset = stretch.layout.offset(is_forward, nth)
                     offset *= self.side * (1.0 if is_forward else -1.0)
                     points = _line_beside(middle, tangent, offset)
                     if points is not None:
                         if not is_forward:
                             points = points[::-1]
-                        yield _Lane(k, is_forward, number, points)
+                        yield _Lane(number, is_forward, nth, points)
 
-    def ways(
-        self, lanes: Sequence[_Lane]
-    ) -> Iterator[tuple[int, int, bool, np.ndarray]]:
-        """Yields the ways from lanes into next lanes.
+    def _between_setbacks(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the middle of a stretch where its lanes are.
 
-        Yields:
-            Number of the lane, number of the next lane, whether the way is in a
-            junction, and the points (N, 2) of the way [m].
+        The result is points (N, 2) [m], and unit vectors (N, 2) along the
+        stretch at these points.
         """
+        stretch = self.stretches[number]
+        along = np.linspace(0.0, stretch.length, len(stretch.line))
+        low = self.setback((number, 0))
+        high = stretch.length - self.setback((number, -1))
+        places = np.linspace(low, high, max(2, int((high - low) / SPACING) + 1))
+        middle, tangent = (
+            np.column_stack([np.interp(places, along, x) for x in line.T])
+            for line in (stretch.line, np.gradient(stretch.line, axis=0))
+        )
+        return middle, tangent / np.linalg.norm(tangent, axis=1)[:, None]
+
+    def ways(self, lanes: Sequence[_Lane]) -> Iterator[_Way]:
+        """Yields the ways from lanes into next lanes."""
         leaving: defaultdict[_Arm, list[int]] = defaultdict(list)
         entering: defaultdict[_Arm, list[int]] = defaultdict(list)
-        for k, lane in enumerate(lanes):
-            leaving[lane.entry_arm].append(k)
-            entering[lane.exit_arm].append(k)
+        for number, lane in enumerate(lanes):
+            leaving[lane.entry_arm].append(number)
+            entering[lane.exit_arm].append(number)
         for node, arms in self.arms.items():
             # Vehicles enter a crossing as they would enter a junction.
             is_entered = len(arms) > 2 or node in self.crossed
@@ -264,20 +286,27 @@ class _MeetingStreets:
                 # they would enter a junction.
                 is_junction = is_entered or len(entering[a]) > len(leaving[b])
                 for first, last in product(entering[a], leaving[b]):
-                    one, other = lanes[first], lanes[last]
-                    before, after = (
-                        _heading_at_end(one, -1),
-                        _heading_at_end(other, 0),
+                    points = self._points_of_way(
+                        lanes[first], lanes[last], len(arms) > 2
                     )
-                    turn = float(np.degrees(wrapped(after - before)))
-                    if abs(turn) > SHARPEST_TURN_DEG:
-                        continue
-                    if not self._is_legal(one, other, turn, len(arms) > 2):
-                        continue
-                    line = blend(
-                        one.points[-1], before, other.points[0], after, SPACING
-                    )
-                    yield first, last, is_junction, line
+                    if points is not None:
+                        yield _Way(first, last, is_junction, points)
+
+    def _points_of_way(
+        self, first: _Lane, last: _Lane, is_junction: bool
+    ) -> np.ndarray | None:
+        """Returns points (N, 2) on the way from one lane to another [m].
+
+        The result is None if traffic may not take this way, or if the turn is
+        too sharp. `is_junction` is as for `_is_legal`.
+        """
+        before, after = _heading_at_end(first, -1), _heading_at_end(last, 0)
+        turn_deg = float(np.degrees(wrapped(after - before)))
+        if abs(turn_deg) > SHARPEST_TURN_DEG:
+            return None
+        if not self._is_legal(first, last, turn_deg, is_junction):
+            return None
+        return blend(first.points[-1], before, last.points[0], after, SPACING)
 
     def _is_legal(
         self, first: _Lane, last: _Lane, turn_deg: float, is_junction: bool
@@ -289,11 +318,18 @@ class _MeetingStreets:
         to the outermost lane. Where traffic goes straight on, lanes keep their
         number, counted from the inside. Between one-way streets, lanes keep
         their number, counted from the outside.
+
+        Args:
+            first: the lane that traffic leaves.
+            last: the lane that traffic enters.
+            turn_deg: angle between the lanes, positive to the left [deg].
+            is_junction: whether three or more ends of streets meet there.
         """
-        layouts = [self.stretches[one.stretch].layout for one in (first, last)]
+        lanes = (first, last)
+        layouts = [self.stretches[lane.stretch].layout for lane in lanes]
         here, there = (
-            layout.forward if one.is_forward else layout.backward
-            for layout, one in zip(layouts, (first, last), strict=True)
+            layout.forward if lane.is_forward else layout.backward
+            for layout, lane in zip(layouts, lanes, strict=True)
         )
         outer = (here - 1 - first.number, there - 1 - last.number)
         if all(layout.forward * layout.backward == 0 for layout in layouts):
@@ -308,20 +344,25 @@ class _MeetingStreets:
 def _stretches(
     streets: Sequence[Street], crossed: AbstractSet[int]
 ) -> Iterator[Stretch]:
+    """Yields the pieces of streets with lanes, except tracks and short pieces.
+
+    Streets are cut where they meet, and at the nodes in `crossed`.
+    """
     used = [
         street
         for street in streets
         if street.tags.get("highway") != "track"
         and lane_tags.lane_layout(street.tags, street.width).width
     ]
-    for street, line, ends in cut_at_nodes(used, crossed):
-        if shapely.LineString(line).length > SPACING:
-            layout = lane_tags.lane_layout(street.tags, street.width)
+    for piece in cut_at_nodes(used, crossed):
+        street = piece.street
+        line = shapely.LineString(piece.line)
+        if line.length > SPACING:
             yield Stretch(
                 street,
-                _rounded_line(shapely.LineString(line), _ROUNDED_OVER),
-                ends,
-                layout,
+                _rounded_line(line, _ROUNDED_OVER),
+                piece.nodes,
+                lane_tags.lane_layout(street.tags, street.width),
             )
 
 
@@ -375,15 +416,19 @@ def _rounded_line(line: shapely.LineString, window_length: float) -> np.ndarray:
 
 
 def _outer_neighbours(lanes: Sequence[_Lane]) -> Mapping[int, int]:
-    # Lanes of one direction, in order from the inside outwards.
+    """Returns for a lane the number of the next lane on its outer side.
+
+    Lanes of one direction must follow each other from the inside outwards.
+    """
     return {
-        k: k + 1
-        for k, (one, other) in enumerate(pairwise(lanes))
-        if (one.stretch, one.is_forward) == (other.stretch, other.is_forward)
+        number: number + 1
+        for number, (lane, after) in enumerate(pairwise(lanes))
+        if (lane.stretch, lane.is_forward) == (after.stretch, after.is_forward)
     }
 
 
 def _heading_at_end(lane: _Lane, end: int) -> float:
+    """Returns a lane's heading [rad] at its start (0) or its end (-1)."""
     a, b = lane.points[:2] if end == 0 else lane.points[-2:]
     return float(np.arctan2(*(b - a)[::-1]))
 

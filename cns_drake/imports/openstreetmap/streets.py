@@ -36,42 +36,64 @@ def street_surfaces(
 ) -> Iterator[ImportedObject]:
     """Yields the carriageways, their sidewalks, and paths for people.
 
-    Tunnels, and bridges over streets or railways, are left out and counted as
-    faults.
+    Sidewalks and paths end at carriageways. Tunnels, and bridges over streets
+    or railways, are left out and counted as faults.
     """
     faults = features.faults
     _count_left_out(bridges, faults)
-    roads: list[tuple[str, BaseGeometry]] = []
-    walks: list[tuple[str, BaseGeometry]] = []
+    roads, walks = _street_areas(features, local, bridges)
+    carriageways = shapely.union_all(list(roads.values()))
+    for name, area in roads.items():
+        areas = faces.parts_of(area)
+        yield from flat_object(f"road_{name}", _ROAD, areas, faults)
+    for name, area in walks.items():
+        areas = faces.parts_of(area.difference(carriageways))
+        yield from flat_object(f"walk_{name}", _WALK, areas, faults)
+
+
+def _street_areas(
+    features: OsmFeatures, local: LocalMetres, bridges: Bridges
+) -> tuple[dict[str, BaseGeometry], dict[str, BaseGeometry]]:
+    """Returns the areas in W of carriageways, and of sidewalks and paths [m].
+
+    The keys are the ids of the ways. For a sidewalk, `_l` or `_r` for its side
+    follows the id. Implausible tags of streets are counted as faults.
+    """
+    faults = features.faults
+    roads: dict[str, BaseGeometry] = {}
+    walks: dict[str, BaseGeometry] = {}
     for name, tags, line, _ in features.ways:
         if _is_elsewhere(name, tags, bridges):
             continue
         width = street_width(tags, (name, faults))
-        narrow = path_width(tags)
-        if width is None and narrow is None:
+        path = path_width(tags)
+        if width is None and path is None:
             continue
         course = LineString(local(line))
-        if width is None:
-            walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
-            continue
-        for is_forward in {True, "maxspeed:backward" not in tags}:
-            speed_limit(tags, is_forward, (name, faults))
-        if has_tag(tags, "bridge") and name not in bridges.level:
-            faults.add("bridge, laid on the ground", name)
-        roads.append((name, course.buffer(width / 2.0, 4)))
-        for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
-            if has:
-                reach = side * (width / 2.0 + SIDEWALK_WIDTH)
-                strip = course.buffer(reach, single_sided=True)
-                walks.append((f"{name}_{'lr'[side < 0]}", strip))
-    paved = shapely.union_all([area for _, area in roads])
-    for name, area in roads:
-        yield from flat_object(
-            f"road_{name}", _ROAD, faces.parts_of(area), faults
-        )
-    for name, area in walks:
-        areas = faces.parts_of(area.difference(paved))
-        yield from flat_object(f"walk_{name}", _WALK, areas, faults)
+        if width is not None:
+            _count_faults_of_street(name, tags, bridges, faults)
+            half = width / 2.0
+            roads[name] = course.buffer(half, quad_segs=4)
+            on_left, on_right = sidewalk_sides(tags)
+            reach = half + SIDEWALK_WIDTH
+            if on_left:
+                walks[f"{name}_l"] = course.buffer(reach, single_sided=True)
+            if on_right:
+                walks[f"{name}_r"] = course.buffer(-reach, single_sided=True)
+        elif path is not None:
+            walks[name] = course.buffer(path / 2.0, quad_segs=4)
+    return roads, walks
+
+
+def _count_faults_of_street(
+    name: str, tags: Tags, bridges: Bridges, faults: ImportFaults
+) -> None:
+    """Counts speed limits that cannot be read, and bridges on the ground."""
+    speed_limit(tags, True, (name, faults))
+    if "maxspeed:backward" in tags:
+        speed_limit(tags, False, (name, faults))
+    if has_tag(tags, "bridge") and name not in bridges.level:
+        faults.add("bridge, laid on the ground", name)
 
 
 def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:
@@ -85,8 +107,8 @@ def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:
 
 def _is_elsewhere(name: str, tags: Tags, bridges: Bridges) -> bool:
     """Returns whether a way is not a line on the ground."""
-    is_line = not (is_tunnel(tags) or has_tag(tags, "area"))
-    return not is_line or name in bridges.over_streets
+    is_tunnel_or_area = is_tunnel(tags) or has_tag(tags, "area")
+    return is_tunnel_or_area or name in bridges.over_streets
 
 
 def drivable_streets(
@@ -107,10 +129,16 @@ def drivable_streets(
             continue
         directions = driven_directions(tags)
         if any(directions):
-            aside = lanes_beside(tags, width)
-            place = (local(line), nodes)
             streets.append(
-                Street(*place, *directions, aside, width, name, tags)
+                Street(
+                    local(line),
+                    nodes,
+                    *directions,
+                    aside=lanes_beside(tags, width),
+                    width=width,
+                    name=name,
+                    tags=tags,
+                )
             )
     return streets
 

@@ -12,6 +12,9 @@ from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.faults import ImportFaults
 
 TABLES = parse_yaml(Path(__file__).with_name("tags.yaml").read_bytes())
+# OpenStreetMap allows no longer values of tags [characters].
+_LONGEST_VALUE = 255
+_FOOT = 0.3048  # [m]
 _NUMBER = r"(\d+(?:[.,]\d+)?|[.,]\d+)"
 _LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
 _COUNT = re.compile(_NUMBER)
@@ -46,8 +49,11 @@ def count(text: str | None) -> float | None:
 def _greatest_value(
     text: str | None, read: Callable[[str], float | None]
 ) -> float | None:
-    """Returns the greatest value in a text; None if a value is unreadable."""
-    if text is None or len(text) > 255:  # OpenStreetMap allows no more.
+    """Returns the greatest value in a text; None if a value is unreadable.
+
+    `read` converts the text of one value, and returns None if it cannot.
+    """
+    if text is None or len(text) > _LONGEST_VALUE:
         return None
     plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
     parts = [part for part in _BETWEEN.split(plain) if part.strip()]
@@ -57,10 +63,10 @@ def _greatest_value(
 
 
 def _parsed_length(text: str) -> float | None:
-    both = _FEET_AND_INCHES.fullmatch(text)
-    if both:
-        feet, inches = map(_decimal, both.groups())
-        return 0.3048 * (feet + inches / 12.0)
+    feet_and_inches = _FEET_AND_INCHES.fullmatch(text)
+    if feet_and_inches:
+        feet, inches = map(_decimal, feet_and_inches.groups())
+        return _FOOT * (feet + inches / 12.0)
     match = _LENGTH.fullmatch(text)
     if match is None or match[2] not in TABLES["units"]:
         return None

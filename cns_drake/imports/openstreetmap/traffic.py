@@ -28,6 +28,9 @@ from cns_drake.traffic.lane_joining import join_lanes
 
 # Traffic stays within this distance of drives [m].
 _TRAFFIC_WITHIN = 300.0
+# Ways through junctions must lie on streets within this distance of drives,
+# because streets with traffic extend beyond the distance of traffic [m].
+_SURFACE_WITHIN = 2.0 * _TRAFFIC_WITHIN
 # Half the width that a vehicle needs around the middle of its lane [m].
 _HALF_WIDTH = 1.3
 # What ends below this height does not stop a vehicle [m].
@@ -74,19 +77,21 @@ def lane_text_of_streets(
     )
     surface = shapely.union_all(
         [
-            line.buffer(street.width / 2.0, 4)
+            line.buffer(street.width / 2.0, quad_segs=4)
             for street, line in zip(streets, lines, strict=True)
-            if line.dwithin(paths, 2.0 * _TRAFFIC_WITHIN)
+            if line.dwithin(paths, _SURFACE_WITHIN)
         ]
     )
     side = 1.0 if drive_on == "right" else -1.0
     traffic = make_traffic_lanes(near, set(walks.crossings), surface, side)
     free = _are_free(traffic, objects)
-    outer = traffic.beside
+    right_of = traffic.beside
+    if side < 0.0:
+        right_of = {outer: inner for inner, outer in traffic.beside.items()}
     graph = join_lanes(
         traffic.lanes,
         [pair for pair in traffic.links if free[list(pair)].all()],
-        outer if side > 0 else {b: a for a, b in outer.items()},
+        right_of,
     )
     if not graph.pieces:
         return None
@@ -100,7 +105,10 @@ def lane_text_of_streets(
 def _sidewalks(
     objects: Iterable[ImportedObject], paths: BaseGeometry
 ) -> BaseGeometry:
-    """Returns the area of sidewalks near drives."""
+    """Returns the area of sidewalks near drives in W [m].
+
+    `paths` are the paths of the drives.
+    """
     triangles = [
         one.triangles[:, :, :2]
         for one in objects
@@ -119,7 +127,7 @@ def _sidewalks(
 def _are_free(
     traffic: StreetTraffic, objects: Iterable[ImportedObject]
 ) -> np.ndarray:
-    """Returns (L,) bool: whether no structure of the file blocks a lane."""
+    """Returns (L,) bool: which of L lanes no structure blocks."""
     solid = [
         one.triangles
         for one in objects
@@ -158,5 +166,5 @@ def _in_the_way(
         [_driven_area(piece.points) for piece in graph.pieces]
     )
     outlines = [one.structure.footprint_W for one in added]
-    hit = np.unique(tree.query(outlines, "intersects")[0])
-    return [added[k].structure.name for k in hit]
+    in_the_way = np.unique(tree.query(outlines, "intersects")[0])
+    return [added[number].structure.name for number in in_the_way]

@@ -29,6 +29,9 @@ _STRIP_WITHIN = 1.5
 # People walk from the end of a strip to the end of another within this distance
 # [m].
 _NEXT_END_WITHIN = 4.0
+# Two places on strips that are closer than this are one place for pedestrians
+# [m].
+_SAME_PLACE = 0.5
 _CROSSING_WIDTH = 2.4
 # Half the width of the pedestrians' path on a crossing [m].
 _CROSSING_HALF_PATH = 0.8
@@ -76,22 +79,26 @@ def find_walkways(
         ]
     )
     crossings: dict[int, lane_graph.Crossing] = {}
-    over = []
-    arms = ends_at_nodes(streets)
-    wanted = {node for node in crossed if arms[node] <= 2}
+    ends_of_crossings = []
+    num_ends = ends_at_nodes(streets)
+    # At a junction, a crossing would lead over several streets.
+    wanted = {node for node in crossed if num_ends[node] <= 2}
     for street in streets:
         for k, node in enumerate(street.nodes):
             if node not in wanted or node in crossings:
                 continue
-            found = strips.crossing(street, k)
-            if found is not None:
-                crossings[node], ends = found
-                over.append(ends)
+            crossing_and_ends = strips.crossing(street, k)
+            if crossing_and_ends is not None:
+                crossings[node], ends = crossing_and_ends
+                ends_of_crossings.append(ends)
     links = list(strips.links(walked))
     walkways = [
         *strips.walkways(),
         *(strips.way(a, b) for a, b in links),
-        *(strips.way(a, b, number) for number, (a, b) in enumerate(over)),
+        *(
+            strips.way(a, b, number)
+            for number, (a, b) in enumerate(ends_of_crossings)
+        ),
     ]
     return StreetWalkways(walkways, crossings)
 
@@ -140,6 +147,10 @@ class _Strips:
         return lane_graph.make_crossing(course, _CROSSING_WIDTH), (first, last)
 
     def _nearest_place(self, place: np.ndarray) -> _Place | None:
+        """Returns the place on a strip nearest to a place (2,) in W [m].
+
+        The result is None if no strip is near.
+        """
         point = shapely.Point(place)
         near = self._tree.query_nearest(point, max_distance=_STRIP_WITHIN)
         if not len(near):
@@ -148,6 +159,7 @@ class _Strips:
         return number, float(self.lines[number].project(point))
 
     def _node_at(self, place: _Place) -> int:
+        """Returns the number of the node at a place, a new one if necessary."""
         return self.nodes.setdefault(place, len(self.nodes))
 
     def links(self, walked: BaseGeometry) -> Iterator[tuple[_Place, _Place]]:
@@ -170,7 +182,7 @@ class _Strips:
             if (
                 a < b
                 and ends[a][0] != ends[b][0]
-                and way.length > 0.5
+                and way.length > _SAME_PLACE
                 and walked.covers(way)
             ):
                 self._node_at(ends[a])
@@ -184,7 +196,7 @@ class _Strips:
             cuts[k].add(s)
         for k, strip in enumerate(self.lines):
             for a, b in pairwise(sorted(cuts[k] | {0.0, float(strip.length)})):
-                if b - a < 0.5:
+                if b - a < _SAME_PLACE:
                     # Pedestrians between the same two places use the same
                     # piece.
                     self.nodes[k, b] = self._node_at((k, a))

@@ -14,10 +14,17 @@ from cns_drake.imports.openstreetmap.tags import (
     tag_value,
 )
 
-LANE_WIDTH = 3.0  # [m]
+# Width of a street per lane, and in addition at its edges together [m].
+LANE_WIDTH = 3.0
+_EDGE_WIDTH = 0.5
+# Share of the usual width of a street that a one-way street has.
+_ONE_WAY_SHARE = 0.6
+# Least width of a one-way street [m].
+_LEAST_ONE_WAY = 3.5
 # Least width on which two cars can pass each other [m].
 _LEAST_PASSING_WIDTH = 5.0
-_WIDEST = 60.0  # [m]
+# Greatest plausible width of a way [m], and number of lanes.
+_WIDEST = 60.0
 _MOST_STREET_LANES = 16
 # Values of the tag `railway` of tracks.
 _RAILS = ("rail", "light_rail", "tram")
@@ -63,9 +70,11 @@ def street_width(
         return width
     lanes = tag_value(tags, "lanes", count, _MOST_STREET_LANES, where)
     if lanes:
-        return LANE_WIDTH * lanes + 0.5
+        return LANE_WIDTH * lanes + _EDGE_WIDTH
     is_one_way = not all(driven_directions(tags))
-    return max(0.6 * usual, 3.5) if is_one_way else usual
+    if is_one_way:
+        return max(_ONE_WAY_SHARE * usual, _LEAST_ONE_WAY)
+    return usual
 
 
 def driven_directions(tags: Mapping[str, str]) -> tuple[bool, bool]:
@@ -97,12 +106,12 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     cars cannot pass each other, the distance is 0, because cars keep to the
     middle. `width` is the width of the carriageway [m].
     """
+    is_two_way = all(driven_directions(tags))
+    if is_two_way and width < _LEAST_PASSING_WIDTH:
+        return 0.0
     lanes = tag_value(tags, "lanes", count, _MOST_STREET_LANES, None)
     if not lanes:
-        lanes = 2.0 if all(driven_directions(tags)) else 1.0
-    # If two cars cannot pass each other, both directions keep to the middle.
-    if width < _LEAST_PASSING_WIDTH and all(driven_directions(tags)):
-        return 0.0
+        lanes = 2.0 if is_two_way else 1.0
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
 
 
