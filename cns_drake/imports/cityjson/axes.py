@@ -14,6 +14,9 @@ _MOST_JUDGED = 1000
 # A geometry is judged if six times the volume of a solid [m^3], or twice the
 # area of other surfaces as seen from above [m^2], is greater than this.
 _LEAST_JUDGED = 1e-3
+# Type of a face -> 1 if the face must look upwards, -1 if downwards.
+_UP_OR_DOWN = {"RoofSurface": 1.0, "GroundSurface": -1.0}
+_UP_OR_DOWN_IN_TERRAIN = {**_UP_OR_DOWN, "": 1.0}
 _BEYOND = "coordinates beyond the area of their reference system"
 
 
@@ -94,24 +97,25 @@ def _look_outwards(city: CityFile) -> Iterator[bool]:
     """Yields for each geometry whether its faces look outwards.
 
     A solid whose faces look outwards has a positive volume. Roofs and terrains
-    must look upwards, and floors downwards.
+    must look upwards, and floors downwards. Geometries are left out if their
+    volume or area is too small to judge.
     """
-    for one in city.objects.values():
-        above = {"RoofSurface": 1.0, "GroundSurface": -1.0}
-        if one.object_type == "TINRelief":
-            above[""] = 1.0
-        for geometry in one.geometries:
+    for city_object in city.objects.values():
+        is_terrain = city_object.object_type == "TINRelief"
+        signs = _UP_OR_DOWN_IN_TERRAIN if is_terrain else _UP_OR_DOWN
+        for geometry in city_object.geometries:
             if not geometry.faces:
                 continue
-            middle = geometry.faces[0][0][0]
-            total = 0.0
+            first = geometry.faces[0][0][0]
+            size = 0.0
             for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
                 for ring in face:
-                    p = ring - middle
-                    twice = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+                    p = ring - first
+                    # Normal of the ring, as long as twice its area.
+                    normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
                     if geometry.is_solid:
-                        total += float(p[0] @ twice)
+                        size += float(p[0] @ normal)
                     else:
-                        total += above.get(kind, 0.0) * float(twice[2])
-            if abs(total) > _LEAST_JUDGED:
-                yield total > 0.0
+                        size += signs.get(kind, 0.0) * float(normal[2])
+            if abs(size) > _LEAST_JUDGED:
+                yield size > 0.0

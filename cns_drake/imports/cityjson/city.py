@@ -28,6 +28,11 @@ from cns_drake.imports.imported_objects import ImportedObject, make_object
 # A geometry of a lower level of detail is left out if a higher one covers more
 # than this share of it.
 _COVERED = 0.5
+# From this level of detail on, a geometry is more than a footprint.
+_LEAST_BODY_LOD = 1.0
+# A solid is turned inside out if its volume is less than this [m^3]. Flat
+# solids, whose volume is 0 except for rounding errors, are not.
+_INSIDE_OUT_BELOW = -1e-3
 _WATER = Finish(colours.WATER, "water")
 # Beginning of a type -> its class, and a finish if that of the class would
 # mislead.
@@ -50,6 +55,7 @@ _CLASSES: dict[str, tuple[str, Finish | None]] = {
     "CityFurniture": ("other-object", None),
     "GenericCityObject": ("other-structure", None),
 }
+# Names are cut to this length.
 _LONGEST_NAME = 80
 
 
@@ -96,43 +102,66 @@ def import_objects(
         year_attribute: attribute with the year of construction; None for the
             usual names.
     """
-    groups = _families(city)
-    names = _unique_names(groups)
-    found = []
-    for root, members in groups.items():
-        first = city.objects[root]
+    families = _families(city)
+    names = _unique_names(families)
+    made = []
+    for root, members in families.items():
         chosen = _chosen_geometries(members, lod, city.faults)
         surfaces = _triangles_by_part(chosen, root, city.faults, origin)
         if not any(map(len, surfaces.values())):
             kind = "object without a surface"
-            if not chosen and any(one.geometries for one in members):
+            if not chosen and any(member.geometries for member in members):
                 kind = f"object without level of detail {lod:g}"
             city.faults.add(f"{kind}, left out", root)
             continue
-        name = names[root]
-        semantic_class, finish = _class_of(first.object_type)
-        years = [
-            construction_year(one.attributes, year_attribute, name, city.faults)
-            for one in members
-        ]
-        found.append(
+        object_type = city.objects[root].object_type
+        semantic_class, finish = _class_of(object_type)
+        made.append(
             make_object(
-                name,
+                names[root],
                 semantic_class,
-                first.object_type,
+                object_type,
                 surfaces,
                 {"body": finish, "roof": colours.RED_ROOF},
-                next((year for year in years if year is not None), None),
-                tags={
-                    key: str(value)
-                    for one in reversed(members)
-                    for key, value in one.attributes.items()
-                    if isinstance(value, str | int | float)
-                },
+                _year_of_family(
+                    members, year_attribute, names[root], city.faults
+                ),
+                tags=_tags_of_family(members),
                 lod=max(geometry.lod for geometry in chosen),
             )
         )
-    return found
+    return made
+
+
+def _year_of_family(
+    members: Iterable[CityObject],
+    year_attribute: str | None,
+    name: str,
+    faults: ImportFaults,
+) -> int | None:
+    """Returns the year in which an object was built; None if unknown.
+
+    The result is the first year that the object or one of its parts states. The
+    arguments are as for `construction_year`.
+    """
+    years = [
+        construction_year(member.attributes, year_attribute, name, faults)
+        for member in members
+    ]
+    return next((year for year in years if year is not None), None)
+
+
+def _tags_of_family(members: Sequence[CityObject]) -> dict[str, str]:
+    """Returns the attributes of an object and its parts as tags.
+
+    If several of them have an attribute, the value of the first counts.
+    """
+    return {
+        key: str(value)
+        for member in reversed(members)
+        for key, value in member.attributes.items()
+        if isinstance(value, str | int | float)
+    }
 
 
 def _families(city: CityFile) -> dict[str, list[CityObject]]:
@@ -141,42 +170,46 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
     The key of such a group is the id of the object without a parent.
     """
     groups: dict[str, list[CityObject]] = {}
-    for name, one in city.objects.items():
+    for name, member in city.objects.items():
         root = name
         seen = {name}
         while True:
             parents = [
-                p
-                for p in city.objects[root].parents
-                if p in city.objects
+                parent
+                for parent in city.objects[root].parents
+                if parent in city.objects
                 # A group is not one structure: it may contain half a city.
-                and city.objects[p].object_type != "CityObjectGroup"
+                and city.objects[parent].object_type != "CityObjectGroup"
             ]
             if not parents or parents[0] in seen:
                 break
             root = parents[0]
             seen.add(root)
-        groups.setdefault(root, []).append(one)
+        groups.setdefault(root, []).append(member)
     return groups
 
 
 def _unique_names(ids: Iterable[str]) -> dict[str, str]:
-    """Returns a unique name for each id: letters, digits, dots and dashes."""
+    """Returns a unique name for each id.
+
+    Names consist of letters, digits, dots, dashes and underscores. Where ids
+    lead to the same name, all of them get a number.
+    """
     plain = {
-        one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
+        own_id: re.sub(r"[^\w.-]+", "_", own_id, flags=re.ASCII)[:_LONGEST_NAME]
         or "object"
-        for one in ids
+        for own_id in ids
     }
     counts = Counter(plain.values())
     names: dict[str, str] = {}
     taken: set[str] = set()
-    for one, name in plain.items():
+    for own_id, name in plain.items():
         number = 1
-        while name in taken or (number == 1 and counts[plain[one]] > 1):
-            name = f"{plain[one]}_{number}"
+        while name in taken or (number == 1 and counts[plain[own_id]] > 1):
+            name = f"{plain[own_id]}_{number}"
             number += 1
         taken.add(name)
-        names[one] = name
+        names[own_id] = name
     return names
 
 
@@ -190,56 +223,59 @@ def _chosen_geometries(
     detailed geometries of parts cover it.
     """
     chosen: list[tuple[CityObject, CityGeometry]] = []
-    for one in members:
-        usable = [g for g in one.geometries if lod is None or g.lod == lod]
+    for member in members:
+        usable = [g for g in member.geometries if lod is None or g.lod == lod]
         if usable:
             highest = max(g.lod for g in usable)
-            chosen += [(one, g) for g in usable if g.lod == highest]
+            chosen += [(member, g) for g in usable if g.lod == highest]
     # A footprint is dropped if there is any better geometry.
-    chosen = [pair for pair in chosen if pair[1].lod >= 1.0] or chosen
+    bodies = [pair for pair in chosen if pair[1].lod >= _LEAST_BODY_LOD]
+    chosen = bodies or chosen
     kept = []
-    for one, geometry in chosen:
-        is_whole = not one.parents
+    for member, geometry in chosen:
+        is_whole = not member.parents
         # Levels with the same integer part, such as 2 and 2.2, may be used
         # together.
         better = [
             other
             for owner, other in chosen
-            if _is_building_body(one)
+            if _is_building_body(member)
             and _is_building_body(owner)
             and other.lod > geometry.lod
             and (is_whole or int(other.lod) > int(geometry.lod))
         ]
         if better and _is_covered(geometry, better):
-            faults.add("geometry with a better one inside, left out", one.name)
+            kind = "geometry with a better one inside, left out"
+            faults.add(kind, member.name)
         else:
             kept.append(geometry)
     return kept
 
 
-def _is_building_body(one: CityObject) -> bool:
+def _is_building_body(member: CityObject) -> bool:
     """Returns whether an object is a building or a `BuildingPart`.
 
     The other children of a building are installations such as balconies.
     """
-    return not one.parents or one.object_type.endswith("Part")
+    return not member.parents or member.object_type.endswith("Part")
 
 
-def _is_covered(one: CityGeometry, others: Sequence[CityGeometry]) -> bool:
-    """Returns whether other geometries cover one, seen from above."""
-    own = _footprint([one])
+def _is_covered(geometry: CityGeometry, others: Sequence[CityGeometry]) -> bool:
+    """Returns whether others cover most of a geometry, seen from above."""
+    own = _footprint([geometry])
     shared = own.intersection(_footprint(others)).area
     return bool(shared > _COVERED * own.area)
 
 
 def _footprint(geometries: Iterable[CityGeometry]) -> BaseGeometry:
+    """Returns the area of geometries seen from above, in whole millimetres."""
     polygons = [
         shapely.make_valid(shapely.Polygon(np.round(face[0][:, :2], 3)))
         for geometry in geometries
         for face in geometry.faces
         if len(face[0]) > 2
     ]
-    return shapely.union_all([one for one in polygons if one.area > 0.0])
+    return shapely.union_all([area for area in polygons if area.area > 0.0])
 
 
 def _triangles_by_part(
@@ -251,14 +287,20 @@ def _triangles_by_part(
     """Returns the triangles (M, 3, 3) of `body` and of `roof` in W [m].
 
     Surfaces without triangles are left out.
+
+    Args:
+        geometries: geometries of an object and its parts.
+        name: id of the object, as an example in `faults`.
+        faults: counts solids and faces that are changed or left out.
+        origin: (3,) origin of W in the file's coordinates [m].
     """
-    found: dict[str, list[np.ndarray]] = {}
+    triangles_of: dict[str, list[np.ndarray]] = {}
     for geometry in geometries:
         faces = [
             face_triangles([ring - origin for ring in face], name, faults)
             for face in geometry.faces
         ]
-        if geometry.is_solid and _enclosed_volume(faces) < -1e-3:
+        if geometry.is_solid and _enclosed_volume(faces) < _INSIDE_OUT_BELOW:
             faults.add("solid turned inside out, reversed", name)
             faces = [triangles[:, ::-1] for triangles in faces]
         for triangles, kind in zip(faces, geometry.kinds, strict=True):
@@ -266,8 +308,11 @@ def _triangles_by_part(
                 faults.add("face that only closes a solid, left out", name)
                 continue
             part = "roof" if kind == "RoofSurface" else "body"
-            found.setdefault(part, []).append(triangles)
-    return {part: np.concatenate(found[part]) for part in sorted(found)}
+            triangles_of.setdefault(part, []).append(triangles)
+    return {
+        part: np.concatenate(triangles_of[part])
+        for part in sorted(triangles_of)
+    }
 
 
 def _enclosed_volume(faces: list[np.ndarray]) -> float:
@@ -280,7 +325,8 @@ def _enclosed_volume(faces: list[np.ndarray]) -> float:
 
 
 def _class_of(kind: str) -> tuple[str, Finish | None]:
-    for beginning, look in _CLASSES.items():
+    """Returns class and finish of a type, as in `_CLASSES`."""
+    for beginning, class_and_finish in _CLASSES.items():
         if kind.startswith(beginning):
-            return look
+            return class_and_finish
     return "other-object", None

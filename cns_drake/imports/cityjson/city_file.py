@@ -77,6 +77,6 @@ class CityFile:
 
     def faces(self) -> Iterator[Face]:
         """Yields the faces of all geometries of all objects."""
-        for one in self.objects.values():
-            for geometry in one.geometries:
+        for city_object in self.objects.values():
+            for geometry in city_object.geometries:
                 yield from geometry.faces

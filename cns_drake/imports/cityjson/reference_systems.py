@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import pyproj
@@ -24,6 +25,20 @@ _NEAR_AREA_DEG = 0.5
 # A projection that changes lengths by more than this share is refused.
 _MOST_STRETCHED = 0.005
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
+
+
+class _Axis(NamedTuple):
+    """An axis of a reference system.
+
+    Attributes:
+        direction: direction, such as `east`.
+        unit: name of the unit.
+        metres: length of the unit [m].
+    """
+
+    direction: str
+    unit: str
+    metres: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +98,10 @@ class ReferenceSystem:
             return True
         longitude, latitude = to_degrees(system, first, second)
         west, south, east, north = system.area_of_use.bounds
-        near = _NEAR_AREA_DEG
+        margin = _NEAR_AREA_DEG
         return bool(
-            west - near <= longitude <= east + near
-            and south - near <= latitude <= north + near
+            west - margin <= longitude <= east + margin
+            and south - margin <= latitude <= north + margin
         )
 
 
@@ -134,31 +149,30 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
             "https://www.opengis.net/def/crs/EPSG/0/7415)"
         ) from error
     parts = system.sub_crs_list or [system]
-    axes = [axis for part in parts for axis in part.axis_info]
     if any(part.is_geographic for part in parts):
         raise InputError(
             f"{where}: {name} is in degrees; project it to metres first (for"
             " example with cjio's crs_reproject)"
         )
-    # Direction, unit, and length of the unit in metres, for each axis.
-    meanings = [
-        (axis.direction, axis.unit_name, axis.unit_conversion_factor)
-        for axis in axes
+    defined = [axis for part in parts for axis in part.axis_info]
+    axes = [
+        _Axis(axis.direction, axis.unit_name, axis.unit_conversion_factor)
+        for axis in defined
     ]
     heights_assumed = len(axes) == 2
     if heights_assumed:
-        meanings.append(("up", *meanings[0][1:]))
-    rows = [_ROWS.get(direction, (-1, 0.0)) for direction, _, _ in meanings]
+        axes.append(axes[0]._replace(direction="up"))
+    rows = [_ROWS.get(axis.direction, (-1, 0.0)) for axis in axes]
     if sorted(row for row, _ in rows) != [0, 1, 2]:
-        listed = ", ".join(f"{a.name} ({a.direction})" for a in axes)
+        listed = ", ".join(f"{a.name} ({a.direction})" for a in defined)
         raise InputError(
             f"{where}: {name} ({system.name}) has the axes {listed}, which are"
             " not east, north and up; reproject the file first"
         )
     matrix = np.zeros((3, 3))
     for column, (row, sign) in enumerate(rows):
-        matrix[row, column] = sign * meanings[column][2]
-    words = tuple(f"{direction} [{unit}]" for direction, unit, _ in meanings)
+        matrix[row, column] = sign * axes[column].metres
+    words = tuple(f"{axis.direction} [{axis.unit}]" for axis in axes)
     return ReferenceSystem(name, words, matrix, heights_assumed)
 
 
@@ -185,8 +199,8 @@ def check_lengths(name: str, place: np.ndarray, where: str) -> None:
     system = horizontal_system(name)
     degrees = to_degrees(system, first, second)
     factors = pyproj.Proj(system).get_factors(*degrees)
-    extremes = factors.tissot_semimajor, factors.tissot_semiminor
-    stretch = max(extremes, key=lambda factor: abs(factor - 1.0))
+    scales = factors.tissot_semimajor, factors.tissot_semiminor
+    stretch = max(scales, key=lambda scale: abs(scale - 1.0))
     if _MOST_STRETCHED < abs(stretch - 1.0) < np.inf:
         raise InputError(
             f"{where}: in {name}, 1 m on the ground is {stretch:.3g} m long;"
