@@ -15,9 +15,13 @@ from cns_drake.imports.drives.way_graph import WayGraph
 
 # Paths prefer to be this far from walls [m].
 _COMFORT = 6.0
+# A metre right beside a wall costs this much more than a metre in comfort.
+_WALL_PRICE = 3.0
 # Except near the joint, an arm keeps this distance from the drive that it
 # leaves [m].
 _ARM_APART = 10.0
+# Cells within this distance are near the joint [m].
+_JOINT_REACH = 1.5 * _ARM_APART
 # Cells within this distance of an obstacle are closed [m].
 _OBSTRUCTED = 3.0
 
@@ -33,8 +37,8 @@ class CellGraph(WayGraph):
         number = np.full(wide.shape, -1)
         number[wide] = np.arange(len(row))
         clearance = space.clearance[wide]
-        # A cell near a wall costs up to four times as much.
-        price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
+        discomfort = 1.0 - np.minimum(clearance / _COMFORT, 1.0)
+        price = 1.0 + discomfort * _WALL_PRICE
         starts, ends = [], []
         rows, columns = wide.shape
         for down, aside in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -56,8 +60,8 @@ class CellGraph(WayGraph):
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         driven = cKDTree(self._xy[pieces])
         distance, _ = driven.query(self._xy, distance_upper_bound=_ARM_APART)
-        here = np.linalg.norm(self._xy - self._xy[joint], axis=1)
-        return np.isfinite(distance) & (here > 1.5 * _ARM_APART)
+        from_joint = np.linalg.norm(self._xy - self._xy[joint], axis=1)
+        return np.isfinite(distance) & (from_joint > _JOINT_REACH)
 
     def is_simple(self, way: Sequence[int]) -> bool:
         return len(set(way)) == len(way)

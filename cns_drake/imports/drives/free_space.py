@@ -1,6 +1,6 @@
 """Finds the free space for a car between the buildings of a city."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,8 @@ from cns_drake.imports.ground import Ground
 from cns_drake.imports.imported_objects import ImportedObject, boxes_of
 from cns_drake.imports.surface_samples import surface_samples
 
-CELL = 1.0  # [m]
+# Size of a cell of the grid [m].
+CELL = 1.0
 # A car passes below things higher than this above the ground [m].
 _HEADROOM = 3.5
 # A car passes over things no higher than a kerb [m].
@@ -100,18 +101,14 @@ def find_free_space(
     low, high = _search_bounds(objects)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     window = (low, high)
-    on_road, in_water, blocked = np.zeros((3, *size[::-1]), dtype=bool)
-    for covered, some in (
-        (
-            on_road,
-            [o for o in objects if o.structure.semantic_class == "road"],
-        ),
-        (in_water, [o for o in objects if _is_water(o)]),
-    ):
-        # In one call: thousands of small groups would take far longer.
-        surfaces = joined_triangles(one.triangles for one in some)
-        for row, column in _covered_cells(surfaces, window):
-            covered[row, column] = True
+    shape = (size[1], size[0])
+    on_road = _area_of(
+        [o for o in objects if o.structure.semantic_class == "road"],
+        window,
+        shape,
+    )
+    in_water = _area_of([o for o in objects if _is_water(o)], window, shape)
+    blocked = np.zeros(shape, dtype=bool)
     walls = []
     for one in objects:
         if not (one.is_ground or _is_water(one)):
@@ -136,6 +133,23 @@ def find_free_space(
         least,
         STRtree(np.asarray(shapely.linearrings(outlines))),
     )
+
+
+def _area_of(
+    objects: Iterable[ImportedObject],
+    window: _Window,
+    shape: tuple[int, int],
+) -> np.ndarray:
+    """Returns (R, C) bool: which cells of a grid some objects cover.
+
+    `window` contains the limits of the grid, and `shape` is (R, C).
+    """
+    covered = np.zeros(shape, dtype=bool)
+    # In one call: thousands of small groups would take far longer.
+    surfaces = joined_triangles(one.triangles for one in objects)
+    for row, column in _covered_cells(surfaces, window):
+        covered[row, column] = True
+    return covered
 
 
 def _is_water(one: ImportedObject) -> bool:
@@ -163,16 +177,17 @@ def _blocked_by(
     """Returns the cells that a structure blocks, and the triangles that block.
 
     The cells, given by row and column (N,) each, include the inside of a
-    building. The triangles are (M, 3, 3) [m].
+    building. The triangles are (M, 3, 3) [m]. `window` contains the limits of
+    the grid.
     """
     corners = one.triangles.reshape(-1, 3)
     above = corners[:, 2] - ground.height(corners[:, :2])
     lowest = above.reshape(-1, 3).min(axis=1)
     highest = above.reshape(-1, 3).max(axis=1)
     is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
-    found = [np.zeros((2, 0), dtype=int)]
-    found += _covered_cells(one.triangles[is_low], window, ground)
-    row, column = np.concatenate(found, axis=1)
+    cells = [np.zeros((2, 0), dtype=int)]
+    cells += _covered_cells(one.triangles[is_low], window, ground)
+    row, column = np.concatenate(cells, axis=1)
     if one.structure.semantic_class == "building" and len(row):
         row, column = _with_enclosed(row, column)
     return (row, column), one.triangles[is_low & (highest > _KERB)]
@@ -191,13 +206,20 @@ def _with_enclosed(
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
-    """Returns the distance from each cell to the nearest cell not free [m]."""
+    """Returns the distance from each cell to the nearest cell not free [m].
+
+    `free` (R, C) says which cells are free, and the result has this shape, too.
+    """
     # Padded, since no car can drive beyond the grid.
     return ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 
 
 def _between_buildings(blocked: np.ndarray) -> np.ndarray:
-    """Returns the cells that have buildings on both sides."""
+    """Returns (R, C) bool: which cells have buildings on both sides.
+
+    `blocked` (R, C) says in which cells a building stands. The sides are at
+    most half the width of the widest street away.
+    """
     reach = int(_HALF_STREET / CELL)
     near = ndimage.distance_transform_edt(~np.pad(blocked, 2 * reach)) <= reach
     return (ndimage.distance_transform_edt(near) > reach)[

@@ -39,6 +39,8 @@ _MOST_TRIES = 30
 # Greatest number of ends that are tried to find a way that passes no place
 # twice.
 _MOST_ENDS = 20
+# Lengths that differ by less than this are equal [m].
+_ROUNDING = 1e-6
 # Greatest number of pieces from which ways are searched.
 _MOST_STARTS = 200
 # In large graphs, ways are searched from fewer pieces, so that this number of
@@ -90,7 +92,8 @@ def _longest_way(graph: WayGraph) -> list[int]:
         begins[_longest_way_from(graph, into, start)[-1]] = None
     for begin in begins:
         way = _longest_way_from(graph, links, begin)
-        if graph.length(way) > graph.length(best) + 1e-6:
+        # Of ways that are equally long except for rounding, the first counts.
+        if graph.length(way) > graph.length(best) + _ROUNDING:
             best = way
     return best
 
@@ -158,6 +161,7 @@ def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
 
 
 def _nearest_index(values: np.ndarray, wanted: float) -> int:
+    """Returns the index of the value that is nearest to a wanted value."""
     return int(np.abs(values - wanted).argmin())
 
 

@@ -24,6 +24,8 @@ _DEGREE = 5
 _MARGIN = 1.01
 # Distance between the places where bends and room are checked [m].
 _CHECK_SPACING = 0.25
+# Curvatures below this count as this, because a radius must be finite [1/m].
+_STRAIGHTEST = 1e-12
 # Least length of a proposed drive [m].
 SHORTEST = 80.0
 # The place (2,) of an obstacle: a bend that is too tight, or no room [m].
@@ -40,6 +42,9 @@ _TOLERANCES = (1.5, 1.0, 0.7, 2.0, 3.0)
 # Numbers of places in the running mean that smooths a line, tried in turn; the
 # values were found by trial.
 _MEAN_WINDOWS = (5, 11, 17)
+# A line is smoothed only if it has at least this many times as many places as
+# the running mean.
+_LEAST_WINDOWS = 4
 
 
 @dataclass(frozen=True)
@@ -128,7 +133,7 @@ def driven_path(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     u = np.linspace(first, last, count)
     (x1, y1), (x2, y2) = spline(u, 1).T, spline(u, 2).T
     curvature = np.abs(x1 * y2 - y1 * x2) / np.hypot(x1, y1) ** 3
-    return spline(u), 1.0 / np.maximum(curvature, 1e-12)
+    return spline(u), 1.0 / np.maximum(curvature, _STRAIGHTEST)
 
 
 def simplified_drive(
@@ -148,25 +153,25 @@ def simplified_drive(
         space: the free space.
         tolerances: distances by which the drive may deviate from the line [m].
     """
-    found: WaypointRoute | Obstacle = xy[len(xy) // 2]
-    for straightened, tolerance in product(_MEAN_WINDOWS, tolerances):
-        if len(xy) < 4 * straightened:
+    drive: WaypointRoute | Obstacle = xy[len(xy) // 2]
+    for window, tolerance in product(_MEAN_WINDOWS, tolerances):
+        if len(xy) < _LEAST_WINDOWS * window:
             break
-        kernel = np.ones(straightened) / straightened
+        kernel = np.ones(window) / window
         smooth = np.column_stack(
             [np.convolve(column, kernel, mode="valid") for column in xy.T]
         )
         line = LineString(smooth).simplify(tolerance)
-        found = steerable_drive(
+        drive = steerable_drive(
             _dense_waypoints(np.array(line.coords)), space.obstacle
         )
-        if isinstance(found, WaypointRoute):
+        if isinstance(drive, WaypointRoute):
             break
-    return found
+    return drive
 
 
 def _dense_waypoints(corners: np.ndarray) -> np.ndarray:
-    """Returns waypoints with additional ones between those far apart."""
+    """Returns waypoints (N, 2) at corners and between corners far apart [m]."""
     points = [corners[:1]]
     for a, b in pairwise(corners):
         length = float(np.linalg.norm(b - a))
@@ -194,12 +199,12 @@ def with_ground_heights(
             (N, 2) [m].
         faults: counts the drives that are left out.
     """
-    found = []
+    with_heights = []
     for drive in drives:
         xy = np.round(drive.waypoints, 3)
         waypoints = np.column_stack([xy, height(xy)])
         if isinstance(steerable_drive(waypoints, margin=1.0), WaypointRoute):
-            found.append(replace(drive, waypoints=waypoints))
+            with_heights.append(replace(drive, waypoints=waypoints))
         else:
             faults.add("drive too tight on its slope, left out", "drive")
-    return found
+    return with_heights

@@ -31,6 +31,8 @@ _TURN_REACH = 12.0
 _SHARP_DEG_PER_M = 4.0
 # Tolerances of waypoints relative to the lanes, tried in turn [m].
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
+# Places on a line that are closer than this are one place [m].
+_SAME_PLACE = 1e-6
 # Number of places in the running mean that smooths corners.
 _CORNER_WINDOW = 7
 # Number of places in the running mean that smooths lateral offsets.
@@ -59,6 +61,7 @@ class Lane:
 
     @property
     def length(self) -> float:
+        """Length of the lane along the middle of the street [m]."""
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
 
@@ -98,6 +101,7 @@ def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _leads_on(lane: Lane, after: Lane) -> bool:
+    """Returns whether cars may turn from a lane into one that begins there."""
     if lane.way == after.way:
         return False
     a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
@@ -122,7 +126,7 @@ def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
         parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
     rows = np.concatenate(parts)
     steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
-    return rows[np.append(True, steps > 1e-6)]
+    return rows[np.append(True, steps > _SAME_PLACE)]
 
 
 class StreetGraph(WayGraph):
@@ -142,7 +146,7 @@ class StreetGraph(WayGraph):
         # Streets with a faulty place, for example on another continent, are
         # left out: sampling them would never end.
         self.lanes = [
-            one for one in make_lanes(streets) if one.length <= LONGEST
+            lane for lane in make_lanes(streets) if lane.length <= LONGEST
         ]
         self._ways = np.array([lane.way for lane in self.lanes], dtype=int)
         self._space = space
@@ -170,23 +174,23 @@ class StreetGraph(WayGraph):
         heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
         bends = np.abs(np.gradient(heading)) > np.radians(_SHARP_DEG_PER_M)
         reach = int(_TURN_REACH / _LANE_SPACING)
-        near = np.convolve(bends, np.ones(2 * reach + 1), mode="same") > 0
-        right = np.column_stack([along[:, 1], -along[:, 0]]) * self._side
-        found: WaypointRoute | Obstacle = middle[len(middle) // 2]
+        around = np.ones(2 * reach + 1)
+        near_turn = np.convolve(bends, around, mode="same") > 0
+        right = np.column_stack([along[:, 1], -along[:, 0]])
+        to_kept_side = right * self._side
+        drive: WaypointRoute | Obstacle = middle[len(middle) // 2]
         for tolerance, share in product(_TOLERANCES, _AT_TURNS):
-            aside = rows[:, 2] * np.where(near, share, 1.0)
+            aside = rows[:, 2] * np.where(near_turn, share, 1.0)
             aside = uniform_filter1d(aside, _OFFSET_WINDOW, mode="nearest")
-            places = middle + aside[:, None] * right
-            found = simplified_drive(places, self._space, (tolerance,))
-            if isinstance(found, WaypointRoute):
+            places = middle + aside[:, None] * to_kept_side
+            drive = simplified_drive(places, self._space, (tolerance,))
+            if isinstance(drive, WaypointRoute):
                 break
-        return found
+        return drive
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
-        from_line = [
-            np.linalg.norm(
-                lane_path([self.lanes[k]], 1.0)[:, :2] - place, axis=1
-            ).min()
-            for k in way
+        lines = [lane_path([self.lanes[k]], _LANE_SPACING) for k in way]
+        distances = [
+            np.linalg.norm(line[:, :2] - place, axis=1).min() for line in lines
         ]
-        return np.array([way[int(np.argmin(from_line))]])
+        return np.array([way[int(np.argmin(distances))]])
