@@ -16,6 +16,10 @@ from cns_drake.imports.named_randomness import random_generator
 # A building whose feet are farther from the ground than this was sunk into it
 # [m].
 _MOST_SUNK = 2.0
+# Share of the box around a footprint that the footprint is assumed to fill.
+_FILLED_SHARE = 0.8
+# Least height of a building that gets a style [m].
+_LEAST_HEIGHT = 1.0
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class BareBuilding:
     """An imported building, split into surfaces that details can be added to.
 
     Attributes:
-        one: the building.
+        imported: the building as imported, without details.
         walls: triangles (M, 3, 3) of the walls [m].
         roof: triangles (M, 3, 3) of the roof [m].
         rest: triangles (M, 3, 3) of all other surfaces [m].
@@ -33,7 +37,7 @@ class BareBuilding:
         rng: random generator for the details.
     """
 
-    one: ImportedObject
+    imported: ImportedObject
     walls: np.ndarray
     roof: np.ndarray
     rest: np.ndarray
@@ -56,43 +60,49 @@ def split_buildings(
         ground: the ground on which they stand.
         seed: seed of the random styles.
     """
-    found = []
+    split = []
     styles: dict[str, Style] = {}
-    for one in sorted(buildings, key=lambda one: one.original != ""):
-        some = _split_building(one, ground, seed, styles.get(one.original))
-        styles[one.draw_name] = some.style
-        found.append(some)
-    return found
+    variants_last = sorted(buildings, key=lambda one: one.original != "")
+    for building in variants_last:
+        style = styles.get(building.original)
+        bare = _split_building(building, ground, seed, style)
+        styles[building.draw_name] = bare.style
+        split.append(bare)
+    return split
 
 
 def _split_building(
-    one: ImportedObject,
+    building: ImportedObject,
     ground: Ground,
     seed: int,
     known: Style | None = None,
 ) -> BareBuilding:
-    """Returns a building, split; `known` is the style of its original."""
+    """Returns a building, split into walls, roof and other surfaces.
+
+    For a variant, `known` is the style of the original. The other arguments are
+    as for `split_buildings`.
+    """
     surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
-    for part in one.structure.model.parts:
+    for part in building.structure.model.parts:
         if isinstance(part.shape, MeshShape):
-            mesh = one.structure.model.meshes[part.shape.mesh]
+            mesh = building.structure.model.meshes[part.shape.mesh]
             surfaces[part.name] = mesh.vertices[mesh.triangles()]
     body = surfaces["body"]
     upright, up = is_upright(body), looks_up(body)
     roof = np.concatenate([surfaces["roof"], body[up]])
     walls, rest = body[upright], body[~upright & ~up]
-    corners = one.triangles.reshape(-1, 3)
+    corners = building.triangles.reshape(-1, 3)
     foot = float(corners[:, 2].min())
     below = float(ground.height(corners[:, :2]).min())
     base = foot if abs(foot - below) < _MOST_SUNK else below
     width, depth = np.ptp(corners[:, :2], axis=0)
-    top = walls if len(walls) else one.triangles
-    height = max(1.0, float(top[:, :, 2].max()) - base)
+    standing = walls if len(walls) else building.triangles
+    height = max(_LEAST_HEIGHT, float(standing[:, :, 2].max()) - base)
     is_flat = bool(len(roof)) and roof_pieces.is_flat_roof(roof)
-    rng = random_generator(seed, "dressing", one.draw_name)
-    area = 0.8 * float(width * depth)
-    style = make_style(one.tags, one.year, area, height, is_flat, rng)
+    rng = random_generator(seed, "dressing", building.draw_name)
+    area = _FILLED_SHARE * float(width * depth)
+    style = make_style(building.tags, building.year, area, height, is_flat, rng)
     if known is not None:
         storeys = max(1, round(height / known.storey))
         style = replace(known, storey=height / storeys)
-    return BareBuilding(one, walls, roof, rest, base, style, is_flat, rng)
+    return BareBuilding(building, walls, roof, rest, base, style, is_flat, rng)

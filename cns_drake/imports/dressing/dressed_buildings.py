@@ -38,8 +38,10 @@ _WALLS_WITHIN = 60.0
 _ROOFS_WITHIN = 100.0
 # About this many triangles are used for openings, first on the nearest walls.
 _MOST_TRIANGLES = 1_100_000
-# About this many triangles are needed per 9 m^2 of a wall, for its openings.
+# About this many triangles are needed for an opening. A wall has about one
+# opening for this much of its area [m^2].
 _TRIANGLES_OF_OPENING = 30
+_AREA_OF_OPENING = 9.0
 # About this many triangles are needed per wall in addition.
 _TRIANGLES_OF_WALL = 40
 # Shops are on walls at most this far from a street [m].
@@ -48,6 +50,9 @@ _SHOPS_WITHIN = 16.0
 _LOD_WITH_ROOF = 2.2
 # From this level of detail on, a model has its own windows.
 _LOD_WITH_WINDOWS = 3.0
+# Places in front of a wall at which the ground is looked up: distance from the
+# wall [m].
+_BEFORE_WALL = 1.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 
@@ -107,27 +112,36 @@ def dress_buildings(
     at_random: Counter[str] = Counter()
     by_file: Counter[str] = Counter()
     dressed = {}
-    for number, some in enumerate(bare):
+    for number, building in enumerate(bare):
         model, counts = _dress_building(
-            some, walls.get(number, ()), paths, seed
+            building, walls.get(number, ()), paths, seed
         )
         at_random += counts
-        by_file.update(some.style.by_tag)
-        structure = replace(some.one.structure, model=model)
-        dressed[some.one] = replace(some.one, structure=structure)
+        by_file.update(building.style.by_tag)
+        imported = building.imported
+        structure = replace(imported.structure, model=model)
+        dressed[imported] = replace(imported, structure=structure)
     return DressedBuildings(dressed, at_random, by_file)
 
 
 def _dress_building(
-    some: BareBuilding,
+    building: BareBuilding,
     plans: Sequence[FacadePlan],
     paths: BaseGeometry,
     seed: int,
 ) -> tuple[Model, Counter[str]]:
-    """Returns the model of a dressed building, and counts of random details."""
-    structure, style = some.one.structure, some.style
-    footprint = structure.model.footprint
-    out = Assembly(Site(Polygon(), structure.name), some.rng)
+    """Returns the model of a dressed building, and counts of random details.
+
+    Args:
+        building: the building.
+        plans: plans of the walls that get details; all other walls stay bare.
+        paths: paths of the drives in W [m].
+        seed: seed of the random draws.
+    """
+    imported, style = building.imported, building.style
+    footprint = imported.structure.model.footprint
+    site = Site(Polygon(), imported.structure.name)
+    out = Assembly(site, building.rng)
     out.declare_materials(
         body=style.wall,
         doors=style.door,
@@ -137,22 +151,30 @@ def _dress_building(
         sign=style.sign,
         trim=style.trim,
     )
-    planned = {one.tobytes() for plan in plans for one in plan.panel.triangles}
-    bare = [one for one in some.walls if one.tobytes() not in planned]
+    planned = {
+        triangle.tobytes()
+        for plan in plans
+        for triangle in plan.panel.triangles
+    }
+    bare = [
+        triangle
+        for triangle in building.walls
+        if triangle.tobytes() not in planned
+    ]
     walls = np.array(bare).reshape(-1, 3, 3)
-    out.add_to("body", to_mesh(walls), to_mesh(some.rest))
-    out.add_to("roof", to_mesh(some.roof))
+    out.add_to("body", to_mesh(walls), to_mesh(building.rest))
+    out.add_to("roof", to_mesh(building.roof))
     counts: Counter[str] = Counter()
     for plan in plans:
         # The name must not depend on the map's origin.
         panel = plan.panel
         heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
         wall = f"wall {panel.length:.1f} {heading:.0f}"
-        rng = random_generator(seed, wall, some.one.draw_name)
+        rng = random_generator(seed, wall, imported.draw_name)
         counts += facade_pieces.add_facade(out, plan, rng)
-    has_own_roof = some.one.lod >= _LOD_WITH_ROOF or not len(some.roof)
+    has_own_roof = imported.lod >= _LOD_WITH_ROOF or not len(building.roof)
     if not has_own_roof and shapely.dwithin(footprint, paths, _ROOFS_WITHIN):
-        roof_pieces.add_roof_pieces(out, some.roof, style, some.is_flat)
+        roof_pieces.add_roof_pieces(out, building.roof, style, building.is_flat)
     counts["roof equipment and chimneys"] = len(out.parts)
     return out.to_model(footprint), counts
 
@@ -165,15 +187,28 @@ def _plan_facades(
     views: DriveViews,
     paving: UpperSides,
 ) -> dict[int, list[FacadePlan]]:
-    """Returns the plans of the walls to dress, by the building's number."""
+    """Returns the plans of the walls to dress, by the building's number.
+
+    Args:
+        bare: the buildings.
+        drives: the drives.
+        streets: the streets, on which doors and shops are.
+        ground: the ground on which buildings stand.
+        views: viewpoints on the drives, from which walls are visible.
+        paving: upper sides of the paving in front of the walls.
+    """
     walls = [
-        some.walls if some.one.lod < _LOD_WITH_WINDOWS else np.zeros((0, 3, 3))
-        for some in bare
+        building.walls
+        if building.imported.lod < _LOD_WITH_WINDOWS
+        else _NO_TRIANGLES
+        for building in bare
     ]
     panels, to_drive = _visible_panels(walls, views)
     if not panels:
         return {}
-    before = np.array([p.place(p.length / 2, 0.0, 1.0) for p in panels])
+    before = np.array(
+        [p.place(p.length / 2, 0.0, _BEFORE_WALL) for p in panels]
+    )
     heights = ground.height(before[:, :2])
     plans = [
         plan_facade(
@@ -187,14 +222,16 @@ def _plan_facades(
             panels, heights, to_drive, strict=True
         )
     ]
-    solids = [some.one.triangles for some in bare]
+    solids = [building.imported.triangles for building in bare]
     upper = UpperSides(np.concatenate(solids))
     probes = [plan.probes() for plan in plans]
-    hidden = upper.hides(np.concatenate(probes))
-    ends = np.cumsum([len(some) for some in probes])[:-1]
+    are_hidden = upper.hides(np.concatenate(probes))
+    ends = np.cumsum([len(of_plan) for of_plan in probes])[:-1]
     plans = [
-        plan.without(some)
-        for plan, some in zip(plans, np.split(hidden, ends), strict=True)
+        plan.without(is_hidden)
+        for plan, is_hidden in zip(
+            plans, np.split(are_hidden, ends), strict=True
+        )
     ]
     lines = [street.line for street in streets]
     ways = MultiLineString([*lines, *(drive.path for drive in drives)])
@@ -213,22 +250,22 @@ def _with_fronts(
             building gets its door in the nearest of its walls on a street.
         paving: upper sides of the paving in front of the walls.
     """
-    groups: defaultdict[int, list[int]] = defaultdict(list)
-    for k, plan in enumerate(plans):
-        groups[plan.panel.building].append(k)
-    found: dict[int, list[FacadePlan]] = {}
-    for number, members in groups.items():
-        possible = [k for k in members if plans[k].on_street]
-        front = min(possible, key=lambda k: (to_way[k], k), default=None)
-        found[number] = []
-        for k in members:
-            plan = plans[k]
-            if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
+    walls_of: defaultdict[int, list[int]] = defaultdict(list)
+    for wall, plan in enumerate(plans):
+        walls_of[plan.panel.building].append(wall)
+    plans_of: dict[int, list[FacadePlan]] = {}
+    for building, walls in walls_of.items():
+        on_street = [wall for wall in walls if plans[wall].on_street]
+        front = min(on_street, key=lambda k: (to_way[k], k), default=None)
+        plans_of[building] = []
+        for wall in walls:
+            plan = plans[wall]
+            if plan.style.shops and to_way[wall] < _SHOPS_WITHIN:
                 plan = with_shops(plan, paving)
-            if k == front:
+            if wall == front:
                 plan = with_doors(plan, paving)
-            found[number].append(plan)
-    return found
+            plans_of[building].append(plan)
+    return plans_of
 
 
 def _visible_panels(
@@ -245,10 +282,10 @@ def _visible_panels(
     distances = views.distances(panels, _WALLS_WITHIN)
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
-    cost = [
+    costs = [
         _TRIANGLES_OF_WALL
-        + _TRIANGLES_OF_OPENING * panel.length * panel.height / 9.0
+        + _TRIANGLES_OF_OPENING * panel.length * panel.height / _AREA_OF_OPENING
         for panel in (panels[k] for k in order)
     ]
-    order = order[np.cumsum(cost) <= _MOST_TRIANGLES]
+    order = order[np.cumsum(costs) <= _MOST_TRIANGLES]
     return [panels[k] for k in order], distances[order]

@@ -155,10 +155,12 @@ def _paved_terrain(
 
 def _take_back_placed(city: ForeignCity, placed: PlacedObjects) -> None:
     """Removes small objects from the city's faults if they were placed."""
-    for one in city.small_objects:
-        if one.source in placed.sources:
-            placed.sources.remove(one.source)
-            city.faults.take_back(f"{one.element}, left out")
+    # A tree row has several objects, but was left out once.
+    left = set(placed.sources)
+    for small in city.small_objects:
+        if small.source in left:
+            left.remove(small.source)
+            city.faults.take_back(f"{small.element}, left out")
 
 
 def _check_number(number: int) -> None:

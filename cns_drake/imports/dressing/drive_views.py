@@ -78,22 +78,22 @@ class DriveViews:
             panels: the N walls.
             most: greatest distance at which a viewpoint counts [m].
         """
-        pairs = [self._facing_places(panel, most) for panel in panels]
-        counts = [len(distance) for _, distance in pairs]
+        facing = [self._facing_places(panel, most) for panel in panels]
+        counts = [len(distances) for _, distances in facing]
         if not sum(counts):
             return np.full(len(panels), np.inf)
         number = np.repeat(np.arange(len(panels)), counts)
-        place = np.concatenate([some for some, _ in pairs])
-        distance = np.concatenate([some for _, some in pairs])
+        place = np.concatenate([places for places, _ in facing])
+        distance = np.concatenate([distances for _, distances in facing])
         probes = []
         for panel in panels:
             top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
             x, z = _PROBES.T * [[panel.length], [top]]
             probes.append(panel.place(x, z, _BEFORE))
         is_seen = self._is_seen(np.stack(probes)[number], self._eyes[place])
-        found = np.full(len(panels), np.inf)
-        np.minimum.at(found, number[is_seen], distance[is_seen])
-        return found
+        nearest = np.full(len(panels), np.inf)
+        np.minimum.at(nearest, number[is_seen], distance[is_seen])
+        return nearest
 
     def _facing_places(
         self, panel: Panel, most: float
@@ -101,7 +101,8 @@ class DriveViews:
         """Returns the places that face a panel, and their distances.
 
         The result is two arrays (K,): numbers of places at most `most` from the
-        panel, and their distances from the panel [m].
+        panel, and their distances from the panel [m]. The nearest places are
+        all included, of the others only some.
         """
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)

@@ -72,6 +72,36 @@ _ON_WALL = {"glass": -0.02, "doors": -0.03, "frames": 0.0}
 _FROM_EDGE = 0.1
 # Smaller remainders of a wall are dropped [m^2].
 _LEAST_AREA = 1e-4
+# Probability that a wall has balconies, if its style allows them.
+_BALCONIES_SHARE = 0.6
+# Height of a balcony door's lower edge above the floor of its storey, and above
+# the floor of the balcony [m].
+_DOOR_ABOVE_FLOOR = 0.1
+_DOOR_ABOVE_BALCONY = 0.02
+# Distance of balconies from the ends of their wall [m].
+_BALCONY_FROM_END = 0.1
+# A balcony is this many times as wide as its window.
+_BALCONY_RATIO = 1.5
+# Windows that begin lower than this have no sills [m].
+_LEAST_SILL = 0.2
+# Height of a window's horizontal bar, as a share of the window's height.
+_BAR_SHARE = 0.7
+# Width of the piers beside windows [m].
+_PIER_WIDTH = 0.15
+# Least height of a plinth [m].
+_LEAST_PLINTH = 0.1
+# Openings that begin within this distance above a plinth interrupt it [m].
+_ABOVE_PLINTH = 0.05
+# Shorter pieces of a plinth are left out [m].
+_SHORTEST_PLINTH = 0.05
+# Distance of a sign from the shop window below it, and from the top of the wall
+# [m].
+_SIGN_ABOVE_SHOP = 0.06
+_SIGN_BELOW_TOP = 0.05
+# Least height of a sign [m].
+_LEAST_SIGN = 0.15
+# Probability that a shop window has an awning.
+_AWNINGS_SHARE = 0.4
 
 
 def add_facade(
@@ -89,16 +119,9 @@ def add_facade(
     """
     counts: Counter[str] = Counter()
     panel, style = plan.panel, plan.style
-    has_balconies = style.balconies and bool(rng.random() < 0.6)
+    has_balconies = style.balconies and bool(rng.random() < _BALCONIES_SHARE)
     if has_balconies:
-        floor = plan.floor + 0.1
-        openings = [
-            o._replace(z0=max(min(floor + o.row * style.storey, o.z0), 0.0))
-            if _has_balcony(o)
-            else o
-            for o in plan.openings
-        ]
-        plan = replace(plan, openings=openings)
+        plan = _with_balcony_doors(plan)
     plan, reliefs, area = _within_outline(plan)
     if not reliefs:
         out.add_to("body", to_mesh(panel.triangles))
@@ -120,6 +143,19 @@ def add_facade(
             _add_in_wall(out, "trim", panel, boards.board(*limits))
             counts["gutters" if is_gutter else "cornices"] = 1
     return counts
+
+
+def _with_balcony_doors(plan: FacadePlan) -> FacadePlan:
+    """Returns a plan with windows down to the floor where balconies are."""
+    floor = plan.floor + _DOOR_ABOVE_FLOOR
+    storey = plan.style.storey
+    openings = [
+        o._replace(z0=max(min(floor + o.row * storey, o.z0), 0.0))
+        if _has_balcony(o)
+        else o
+        for o in plan.openings
+    ]
+    return replace(plan, openings=openings)
 
 
 def _add_in_wall(
@@ -160,7 +196,11 @@ def _within_outline(
 
 
 def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
-    """Returns the reliefs of an opening, and the materials of their fronts."""
+    """Returns the reliefs of an opening, and the materials of their fronts.
+
+    Far from drives, the result is only the front of the opening, which lies on
+    the wall.
+    """
     style = plan.style
     kind = opening.kind
     x0, x1, z0 = opening.x0, opening.x1, opening.z0
@@ -175,20 +215,20 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
         bay = bays.house_door(DOOR_WIDTH, 0.0, height, depth)
     else:
         has_bars = plan.to_drive < _BARS_WITHIN
-        has_sill = plan.to_drive < _SILLS_WITHIN and z0 > 0.2
+        has_sill = plan.to_drive < _SILLS_WITHIN and z0 > _LEAST_SILL
         bay = bays.window(
             style.window_width,
             0.0,
             height,
             style.recess,
             mullions=int(has_bars and style.window_width > _WIDEST_LEAF),
-            transom=0.7 * height
+            transom=_BAR_SHARE * height
             if has_bars and height > _HIGHEST_PANE
             else None,
             ledge=_SILL_REACH * has_sill,
-            pier=0.15,
+            pier=_PIER_WIDTH,
         )
-    found = []
+    reliefs = []
     for relief in bay(x0, x1):
         depth = relief.depth
         material = "body"
@@ -198,13 +238,14 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
             material = "glass"
         elif kind in ("door", "gate") and depth > 0.0:
             material = "doors"
-        found.append((lifted(relief, z0), material))
+        reliefs.append((lifted(relief, z0), material))
     if plan.to_drive < _RECESSES_WITHIN:
-        return found
-    first = next((pair for pair in found if pair[1] in _ON_WALL), None)
-    if first is None:
-        return []
-    return [(first[0]._replace(depth=_ON_WALL[first[1]]), first[1])]
+        return reliefs
+    return [
+        (relief._replace(depth=_ON_WALL[material]), material)
+        for relief, material in reliefs
+        if material in _ON_WALL
+    ][:1]
 
 
 def _add_wall(
@@ -254,13 +295,13 @@ def _add_plinth(
     reach = _PLINTH_REACH
     top = plan.ground + plan.style.plinth
     is_there = plan.style.plinth and plan.stands_on_ground
-    if not is_there or not 0.1 < top < panel.height:
+    if not is_there or not _LEAST_PLINTH < top < panel.height:
         return 0
     end = panel.length + reach
-    low = [(r.x0, r.x1) for r, _ in reliefs if r.z0 < top + 0.05]
+    gaps = [(r.x0, r.x1) for r, _ in reliefs if r.z0 < top + _ABOVE_PLINTH]
     start = -reach
-    for x0, x1 in [*sorted(low), (end, end)]:
-        if x0 - start > 0.05:
+    for x0, x1 in [*sorted(gaps), (end, end)]:
+        if x0 - start > _SHORTEST_PLINTH:
             board = boards.board(start, x0, 0.0, top, reach)
             _add_in_wall(out, "trim", panel, board)
         start = max(start, x1)
@@ -276,13 +317,14 @@ def _has_balcony(opening: Opening) -> bool:
 
 
 def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
+    """Adds balconies that block no car; returns the number of balconies."""
     count = 0
     for o in filter(_has_balcony, plan.openings):
         middle = (o.x0 + o.x1) / 2
-        z = o.z0 - 0.02
-        half = min(_BALCONY_WIDTH, 1.5 * (o.x1 - o.x0)) / 2
-        x0 = max(0.1, middle - half)
-        x1 = min(plan.panel.length - 0.1, middle + half)
+        z = o.z0 - _DOOR_ABOVE_BALCONY
+        half = min(_BALCONY_WIDTH, _BALCONY_RATIO * (o.x1 - o.x0)) / 2
+        x0 = max(_BALCONY_FROM_END, middle - half)
+        x1 = min(plan.panel.length - _BALCONY_FROM_END, middle + half)
         if not plan.is_in_the_way(z, _BALCONY_REACH):
             mesh = balconies.balcony(x0, x1, _BALCONY_REACH, z)
             _add_in_wall(out, "trim", plan.panel, mesh)
@@ -293,14 +335,14 @@ def _add_balconies(out: Assembly, plan: FacadePlan) -> int:
 def _add_signs(
     out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
-    """Adds the signs and awnings above shop windows."""
+    """Adds a sign and awnings above shop windows; returns their counts."""
     shops = [o for o in plan.openings if o.kind == "shop"]
     if not shops:
         return Counter()
     panel = plan.panel
-    z = max(o.z1 for o in shops) + 0.06
-    height = min(_SIGN_HEIGHT, panel.height - z - 0.05)
-    if height > 0.15:
+    z = max(o.z1 for o in shops) + _SIGN_ABOVE_SHOP
+    height = min(_SIGN_HEIGHT, panel.height - z - _SIGN_BELOW_TOP)
+    if height > _LEAST_SIGN:
         start, end = min(o.x0 for o in shops), max(o.x1 for o in shops)
         limits = (start + JAMB_WIDTH, end - JAMB_WIDTH, z, z + height)
         _add_in_wall(out, "sign", panel, boards.board(*limits, _SIGN_REACH))
@@ -309,7 +351,7 @@ def _add_signs(
         JAMB_WIDTH, _AWNING_REACH, high - _AWNING_HEIGHT, high
     )
     cells = [(o.x0, o.x1) for o in shops]
-    awnings = canopies.awnings(panel.frame, cells, rng, 0.4, shape)
+    awnings = canopies.awnings(panel.frame, cells, rng, _AWNINGS_SHARE, shape)
     if plan.is_in_the_way(low, _AWNING_REACH):
         awnings = []
     out.add_to("sign", *awnings)

@@ -146,11 +146,11 @@ class FacadePlan:
         and in its recess. Paving far above or below the ground is ignored.
         """
         depths = {"shop": SHOP_DEPTH, "gate": GATE_DEPTH}
-        deep = depths.get(door.kind, self.style.recess + DOOR_DEEPER)
+        depth = depths.get(door.kind, self.style.recess + DOOR_DEEPER)
         middle = (door.x0 + door.x1) / 2
         x, out = np.meshgrid(
             [door.x0 + JAMB_WIDTH, middle, door.x1 - JAMB_WIDTH],
-            [_PAVING_BEFORE, -deep / 2, -deep],
+            [_PAVING_BEFORE, -depth / 2, -depth],
         )
         places = self.panel.place(x, np.zeros(x.shape), out).reshape(-1, 3)
         low = float(paving.heights(places[:, :2]).max()) - self.panel.origin[2]
@@ -170,7 +170,7 @@ class FacadePlan:
         pairs = zip(self.openings, is_hidden[:-1], strict=True)
         return replace(
             self,
-            openings=[o for o, is_gone in pairs if not is_gone],
+            openings=[o for o, is_occluded in pairs if not is_occluded],
             top_is_free=not is_hidden[-1],
         )
 

@@ -12,15 +12,17 @@ from cns_drake.imports.imported_objects import ImportedObject
 _KERB_DEPTH = 0.25
 # Colour of kerbs.
 _KERB_RGB: Rgb = (0.60, 0.60, 0.58)
+# Millimetres in a metre: corners that are equal in whole millimetres are one.
+_MM = 1000.0
 
 
-def with_kerb(one: ImportedObject) -> ImportedObject:
+def with_kerb(sidewalk: ImportedObject) -> ImportedObject:
     """Returns a sidewalk with a kerb: a vertical face along its whole edge."""
-    structure = one.structure
+    structure = sidewalk.structure
     name = f"{structure.name}_kerb"
-    edges = _outer_edges(turned_up(one.triangles))
+    edges = _outer_edges(turned_up(sidewalk.triangles))
     if not len(edges):
-        return one
+        return sidewalk
     low = edges - [0.0, 0.0, _KERB_DEPTH]
     quads = np.stack([low[:, 0], low[:, 1], edges[:, 1], edges[:, 0]], axis=1)
     corners = np.arange(4 * len(quads)).reshape(-1, 4).tolist()
@@ -33,12 +35,12 @@ def with_kerb(one: ImportedObject) -> ImportedObject:
         ),
         meshes={**structure.model.meshes, name: mesh},
     )
-    return replace(one, structure=replace(structure, model=model))
+    return replace(sidewalk, structure=replace(structure, model=model))
 
 
 def _outer_edges(triangles: np.ndarray) -> np.ndarray:
     """Returns the edges (N, 2, 3) that no two triangles (M, 3, 3) share."""
-    corners = np.rint(triangles.reshape(-1, 3) * 1000.0).astype(np.int64)
+    corners = np.rint(triangles.reshape(-1, 3) * _MM).astype(np.int64)
     _, number = np.unique(corners, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)
     edges = np.stack([number, np.roll(number, -1, axis=1)], axis=2)

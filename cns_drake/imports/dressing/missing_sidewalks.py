@@ -22,6 +22,8 @@ from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.streets import KERB_HEIGHT, SIDEWALK_WIDTH, Street
 
+# Pieces of a sidewalk are left out if no circle of this radius fits in [m].
+_SLIVER_RADIUS = 0.3
 # Streets of these kinds have sidewalks unless their tags say otherwise.
 _WITH_SIDEWALKS = (
     "primary",
@@ -61,31 +63,34 @@ def missing_sidewalks(
     ]
     if not lacking:
         return
-    shapes = [
+    obstacles = [
         one
         for one in near_drives(objects, drives)
         if one.structure.semantic_class in ("building", "road", "sidewalk")
         or one.object_type.startswith("Water")
     ]
-    lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
-    taken = np.concatenate([triangles_from_above(shapes), lanes])
+    carriageways = [
+        line.buffer(street.width / 2.0, quad_segs=4) for street, line in near
+    ]
+    taken = np.concatenate([triangles_from_above(obstacles), carriageways])
     # The union of a whole city takes long, so only polygons near each street
     # are used.
     tree = STRtree(taken)
-    made: list[BaseGeometry] = []
+    sidewalks: list[BaseGeometry] = []
     for street, line in lacking:
-        strip = line.buffer(street.width / 2.0 + SIDEWALK_WIDTH, 4)
+        reach = street.width / 2.0 + SIDEWALK_WIDTH
+        strip = line.buffer(reach, quad_segs=4)
         others = [
             *taken[tree.query(strip, "intersects")],
-            *(area for area in made if area.intersects(strip)),
+            *(area for area in sidewalks if area.intersects(strip)),
         ]
         covered = shapely.union_all(others, grid_size=GRID)
-        area = area_outside(strip, covered)
-        made.append(area)
+        sidewalk = area_outside(strip, covered)
+        sidewalks.append(sidewalk)
         surface = [
             flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
-            for part in parts_of(area)
-            if not part.buffer(-0.3).is_empty
+            for part in parts_of(sidewalk)
+            if not part.buffer(-_SLIVER_RADIUS).is_empty
         ]
         if surface:
             laid = np.concatenate(surface)

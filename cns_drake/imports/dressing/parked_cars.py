@@ -21,6 +21,19 @@ ROWS_WITHIN = 70.0
 _CAR_EVERY = (5.8, 7.2)
 # Share of the places that are taken.
 _TAKEN_SHARE = 0.6
+# Least and greatest distance of the first car from the start of a street [m].
+_FIRST_CAR = (4.0, 9.0)
+# Cars keep this distance from the end of a street [m].
+_FROM_END = 4.0
+# Greatest angle between a parked car and its place [rad].
+_MOST_TURNED = 0.02
+# Greatest distance of a car from the middle of its bay, along the row [m].
+_MOST_ASIDE = 0.2
+# Lines within this distance of a street's line belong to the street [m].
+_SAME_LINE = 0.5
+# Distance of bays from the edges of a car park, along and across the row [m].
+_BAYS_FROM_ENDS = 0.25
+_BAYS_FROM_EDGE = 0.2
 # Distance of the cars' middle from the kerb [m].
 _FROM_KERB = 1.05
 # Distance of the cars from other streets [m].
@@ -82,36 +95,40 @@ def park_along(
         rng: random generator for places and kinds of cars.
     """
     line = row.line
-    others = lines.difference(line.buffer(0.5))
+    others = lines.difference(line.buffer(_SAME_LINE))
     for side, is_allowed in zip((1.0, -1.0), row.may_park, strict=True):
         if not is_allowed:
             continue
-        s = float(rng.uniform(4.0, 9.0))
-        while s < line.length - 4.0:
+        s = float(rng.uniform(*_FIRST_CAR))
+        while s < line.length - _FROM_END:
             xy, yaw = place_along(line, s, side, row.half - _FROM_KERB)
             yaw += 0.0 if side > 0 else np.pi
             is_taken = rng.random() < _TAKEN_SHARE
-            yaw += float(rng.uniform(-0.02, 0.02))
+            yaw += float(rng.uniform(-_MOST_TURNED, _MOST_TURNED))
             form = pick_key(TABLES["vehicles"], rng)
             # Without other streets, the distance is NaN.
             is_clear = not others.distance(Point(xy)) <= _FROM_CROSSING
             if is_taken and is_clear:
-                kind = f"car_{row.name}_{int(s)}_{'lr'[side > 0]}"
-                if room.place(kind, form, xy, yaw, rng):
-                    room.found.at_random["Parked vehicles"] += 1
+                letter = "r" if side > 0 else "l"
+                name = f"car_{row.name}_{int(s)}_{letter}"
+                if room.place(name, form, xy, yaw, rng):
+                    room.placed.at_random["Parked vehicles"] += 1
             s += float(rng.uniform(*_CAR_EVERY))
 
 
-def fill_car_park(room: StreetRoom, one: ImportedObject, seed: int) -> None:
+def fill_car_park(
+    room: StreetRoom, car_park: ImportedObject, seed: int
+) -> None:
     """Parks cars at random along the longer sides of a car park.
 
     Args:
         room: the city, which places cars where there is room.
-        one: the car park.
+        car_park: the car park.
         seed: seed of the random draws.
     """
-    outline = MultiPoint(one.triangles.reshape(-1, 3)[:, :2])
+    outline = MultiPoint(car_park.triangles.reshape(-1, 3)[:, :2])
     box = np.array(outline.minimum_rotated_rectangle.boundary.coords)
+    # A car park without area has no rectangle.
     if len(box) != 5 or not room.is_near(box, ROWS_WITHIN):
         return
     sides = np.diff(box, axis=0)[:2]
@@ -122,23 +139,26 @@ def fill_car_park(room: StreetRoom, one: ImportedObject, seed: int) -> None:
     middle = box[:4].mean(axis=0)
     is_row = width < _BAY_LENGTH
     pitch = _ROW_PITCH if is_row else _BAY_WIDTH
-    offsets = [0.0] if is_row else [width / 2.0 - _BAY_LENGTH / 2.0 - 0.2]
+    offsets = [0.0]
+    if not is_row:
+        offsets = [width / 2.0 - _BAY_LENGTH / 2.0 - _BAYS_FROM_EDGE]
     if width > 2.0 * _BAY_LENGTH + _AISLE_WIDTH:
         offsets.append(-offsets[0])
     heading = float(np.arctan2(along[1], along[0]))
     heading += 0.0 if is_row else np.pi / 2.0
-    area = shapely.union_all(shapely.polygons(one.triangles[:, :, :2]))
-    name = one.structure.name
+    area = shapely.union_all(shapely.polygons(car_park.triangles[:, :, :2]))
+    name = car_park.structure.name
     rng = random_generator(seed, "car park", name)
-    count = int((length - 0.5) / pitch)
+    count = int((length - 2.0 * _BAYS_FROM_ENDS) / pitch)
     for row, offset in enumerate(offsets):
         for k in range(count):
-            x = (k - (count - 1) / 2.0) * pitch + float(rng.uniform(-0.2, 0.2))
+            x = (k - (count - 1) / 2.0) * pitch
+            x += float(rng.uniform(-_MOST_ASIDE, _MOST_ASIDE))
             place = middle + x * along + offset * across
-            yaw = heading + float(rng.uniform(-0.02, 0.02))
+            yaw = heading + float(rng.uniform(-_MOST_TURNED, _MOST_TURNED))
             form = pick_key(TABLES["vehicles"], rng)
             if rng.random() > _TAKEN_SHARE or not area.contains(Point(place)):
                 continue
             xy = (float(place[0]), float(place[1]))
             if room.place(f"car_{name}_{row}_{k}", form, xy, yaw, rng):
-                room.found.at_random["Parked vehicles"] += 1
+                room.placed.at_random["Parked vehicles"] += 1

@@ -50,50 +50,69 @@ def paved_gaps(
     ]
     if not walks:
         return
-    roads = [_flat_outline(one) for one in near if one.object_type == "Road"]
     walks_tree = STRtree(walks)
-    houses = [one for one in near if one.structure.semantic_class == "building"]
-    roofs = triangles_from_above(houses)
-    beside = walks_tree.query(roofs, "dwithin", _WIDEST_GAP)[0]
-    covered = shapely.union_all([*walks, *roads, *roofs[np.unique(beside)]])
-    half = _WIDEST_GAP / 2.0
-    closed = covered.buffer(half, 2).buffer(-half, 2)
-    gaps = shapely.difference(closed, covered, grid_size=GRID)
-    other = triangles_from_above(
+    gaps = _gaps_beside(walks, walks_tree, near)
+    obstacles = triangles_from_above(
         [
             one
             for one in near
             if one.object_type not in ("Sidewalk", "Road", "Crossing")
-            and one not in houses
+            and one.structure.semantic_class != "building"
         ]
     )
-    other_tree = STRtree(other)
+    obstacles_tree = STRtree(obstacles)
     surfaces: dict[tuple[int, int], list[np.ndarray]] = {}
-    for part in parts_of(gaps):
+    for gap in parts_of(gaps):
         if (
-            part.area < _SMALLEST_GAP
-            or not walks_tree.query(part, "dwithin", _GAP_WITHIN).size
+            gap.area < _SMALLEST_GAP
+            or not walks_tree.query(gap, "dwithin", _GAP_WITHIN).size
         ):
             continue
         taken = shapely.union_all(
-            other[other_tree.query(part, "intersects")], grid_size=GRID
+            obstacles[obstacles_tree.query(gap, "intersects")], grid_size=GRID
         )
-        free = area_outside(part, taken)
-        inside = free.buffer(-_NARROWEST_GAP / 2.0, 2)
-        wide = polygons_only(inside.buffer(_NARROWEST_GAP / 2.0, 2))
-        open_ = shapely.intersection(wide, free, grid_size=GRID)
         square = (
-            int(part.centroid.x // _SQUARE),
-            int(part.centroid.y // _SQUARE),
+            int(gap.centroid.x // _SQUARE),
+            int(gap.centroid.y // _SQUARE),
         )
         surfaces.setdefault(square, []).extend(
-            flat_surface(one, KERB_HEIGHT, "gap", ImportFaults())
-            for one in parts_of(open_)
+            flat_surface(part, KERB_HEIGHT, "gap", ImportFaults())
+            for part in parts_of(_wide_parts(area_outside(gap, taken)))
         )
-    found = [some for some in surfaces.values() if some]
-    for number, some in enumerate(found):
-        surface = np.concatenate(some)
+    filled = [of_square for of_square in surfaces.values() if of_square]
+    for number, of_square in enumerate(filled):
+        surface = np.concatenate(of_square)
         yield paved_structure(f"sidewalk_gap_{number}", "sidewalk", surface)
+
+
+def _gaps_beside(
+    walks: Sequence[BaseGeometry],
+    walks_tree: STRtree,
+    objects: Sequence[ImportedObject],
+) -> BaseGeometry:
+    """Returns the narrow gaps between sidewalks, roads and buildings in W [m].
+
+    Args:
+        walks: areas of the sidewalks [m].
+        walks_tree: search tree of these areas.
+        objects: objects of the city, which include roads and buildings.
+    """
+    roads = [_flat_outline(one) for one in objects if one.object_type == "Road"]
+    houses = [o for o in objects if o.structure.semantic_class == "building"]
+    roofs = triangles_from_above(houses)
+    beside = walks_tree.query(roofs, "dwithin", _WIDEST_GAP)[0]
+    covered = shapely.union_all([*walks, *roads, *roofs[np.unique(beside)]])
+    half = _WIDEST_GAP / 2.0
+    closed = covered.buffer(half, quad_segs=2).buffer(-half, quad_segs=2)
+    return shapely.difference(closed, covered, grid_size=GRID)
+
+
+def _wide_parts(area: BaseGeometry) -> BaseGeometry:
+    """Returns an area without the parts that are too narrow to be paved."""
+    half = _NARROWEST_GAP / 2.0
+    inside = area.buffer(-half, quad_segs=2)
+    wide = polygons_only(inside.buffer(half, quad_segs=2))
+    return shapely.intersection(wide, area, grid_size=GRID)
 
 
 def _flat_outline(one: ImportedObject) -> BaseGeometry:

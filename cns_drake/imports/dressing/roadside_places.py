@@ -11,6 +11,8 @@ from cns_drake.imports.streets import Street
 
 # Objects on a carriageway are moved to this distance beside its edge [m].
 FROM_EDGE = 0.6
+# Objects closer to the middle of a street are on neither side of it [m].
+_IN_THE_MIDDLE = 0.05
 
 
 def beside_street(
@@ -33,16 +35,16 @@ def beside_street(
     line = courses[nearest]
     half = streets[nearest].width / 2.0
     station = station_at(line, line.project(point))
-    foot = np.array([station.x, station.y])
-    offset = xy - foot
+    middle = np.array([station.x, station.y])
+    offset = xy - middle
     distance = float(np.hypot(*offset))
-    if distance < 0.05:
+    if distance < _IN_THE_MIDDLE:
         # On the right of the street, where signs stand.
         offset = np.array([np.sin(station.yaw), -np.cos(station.yaw)])
         distance = 1.0
     outwards = offset / distance
     if distances[nearest] < half + FROM_EDGE:
-        xy = foot + outwards * (half + FROM_EDGE)
+        xy = middle + outwards * (half + FROM_EDGE)
     return xy, float(np.arctan2(-outwards[1], -outwards[0]))
 
 

@@ -30,6 +30,7 @@ _LEAST_ROOF = 40.0
 _AREA_OF_ITEM = 90.0
 # Greatest number of pieces of equipment on a roof.
 _MOST_ITEMS = 6
+# Use of a building -> the equipment of its roof, the first piece first.
 _ITEMS = {
     "flats": "stair_house vents skylight tank vents dish",
     "office": "lift_house air_handler ac_unit ac_unit vents cooling_tower",
@@ -38,10 +39,19 @@ _ITEMS = {
     "industrial": "skylight vents skylight vents air_handler tank",
     "house": "vents dish",
 }
-_CHIMNEYS = ("house", "flats", "public")
+# Uses of buildings with chimneys.
+_WITH_CHIMNEYS = ("house", "flats", "public")
 _BRICK = Finish((0.45, 0.27, 0.22), "brick")
 # Depth of a chimney's foot below the ridge [m].
 _BELOW_RIDGE = 0.35
+# A ridge longer than this has two chimneys [m].
+_SHORT_RIDGE = 15.0
+# Chimneys stand on this range of a ridge's length, in shares of the length.
+_CHIMNEY_PLACES = (0.12, 0.88)
+# Probability that a chimney is a row of chimneys.
+_ROW_SHARE = 0.3
+# Chimneys are left out where the roof is lower than the ridge by this [m].
+_MOST_BELOW = 1.0
 # Scale of a chimney relative to the shared mesh.
 _CHIMNEY_SCALE = 0.6
 # Points of a ridge are at most this far below its highest one [m].
@@ -71,33 +81,36 @@ def add_roof_pieces(
         is_flat: whether the roof is flat.
     """
     items = _ITEMS.get(style.use, "").split()
-    if is_flat and items and (found := _largest_level_part(roof)) is not None:
-        area, z = found
+    if is_flat and items and (level := _largest_level_part(roof)) is not None:
+        area, z = level
         count = min(_MOST_ITEMS, len(items), int(area.area / _AREA_OF_ITEM) + 1)
         ring = np.array(area.exterior.coords)[:-1]
         equip_roof(out, ring, z, items[:count])
-    if not is_flat and style.use in _CHIMNEYS:
+    if not is_flat and style.use in _WITH_CHIMNEYS:
         _add_chimneys(out, roof)
 
 
 def _largest_level_part(roof: np.ndarray) -> tuple[Polygon, float] | None:
-    """Returns a roof's largest level part, without holes, and the part's z."""
+    """Returns a roof's largest level part, without holes, and the part's z.
+
+    The result is None if no level part is large enough for equipment.
+    """
     level = roof[unit_normals(roof)[:, 2] > _LEVEL_COSINE]
     best: tuple[Polygon, float] | None = None
     if not len(level):
         return None
     steps = np.round(level[:, :, 2].mean(axis=1) / _SAME_HEIGHT)
     for step in np.unique(steps):
-        some = level[steps == step]
+        alike = level[steps == step]
         whole = shapely.union_all(
-            [Polygon(one) for one in np.round(some[:, :, :2], 3)],
+            [Polygon(triangle) for triangle in np.round(alike[:, :, :2], 3)],
             grid_size=GRID,
         )
         for part in shapely.get_parts(whole):
             if isinstance(part, Polygon) and part.area > _LEAST_ROOF:
                 part = _without_holes(part)
                 if best is None or part.area > best[0].area:
-                    best = part, float(some[:, :, 2].max())
+                    best = part, float(alike[:, :, 2].max())
     return best
 
 
@@ -117,6 +130,7 @@ def _without_holes(area: Polygon) -> Polygon:
 
 
 def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
+    """Adds one or two chimneys at random places on the ridge of a roof."""
     corners = roof.reshape(-1, 3)
     ridge = corners[corners[:, 2] > corners[:, 2].max() - _RIDGE_TOLERANCE]
     start = ridge[np.lexsort([ridge[:, 1], ridge[:, 0]])[0]]
@@ -124,13 +138,16 @@ def _add_chimneys(out: Assembly, roof: np.ndarray) -> None:
     length = float(np.linalg.norm(end - start))
     yaw = math.atan2(end[1] - start[1], end[0] - start[0])
     sides = UpperSides(roof)
-    count = 1 + int(length > 15.0)
-    for k, share in enumerate(out.rng.uniform(0.12, 0.88, 2)[:count]):
+    count = 1 + int(length > _SHORT_RIDGE)
+    # Two numbers are sampled for any roof.
+    shares = out.rng.uniform(*_CHIMNEY_PLACES, 2)[:count]
+    for k, share in enumerate(shares):
         x, y, z = start + share * (end - start)
         height = float(sides.heights(np.array([[x, y]]))[0])
         # There may be no ridge between two gables.
-        if height > z - 1.0:
-            item = "chimney_row" if out.rng.random() < 0.3 else "chimney"
+        if height > z - _MOST_BELOW:
+            is_row = out.rng.random() < _ROW_SHARE
+            item = "chimney_row" if is_row else "chimney"
             scale = (_CHIMNEY_SCALE, _CHIMNEY_SCALE, _CHIMNEY_SCALE)
             xyz = (x, y, height - _BELOW_RIDGE)
             part = f"chimney_{k}"

@@ -43,14 +43,20 @@ def without_curves(model: Model) -> Model:
         elif isinstance(shape, SphereShape):
             r = shape.radius
             part = replace(part, shape=MeshShape(_BALL, (r, r, r)))
-            low = np.sqrt(0.5)
-            meshes[_BALL] = _revolved([0.0, low, 1.0], [1.0, low, 0.0], _SIDES)
+            # The circles are at latitudes of 90, 45 and 0 deg.
+            half = np.sqrt(0.5)
+            meshes[_BALL] = _revolved(
+                [0.0, half, 1.0], [1.0, half, 0.0], _SIDES
+            )
         parts.append(part)
     return replace(model, parts=tuple(parts), meshes=meshes)
 
 
 def _revolved(radius: list[float], z: list[float], sides: int) -> Mesh:
-    """Returns a solid of revolution with polygons of the circles' areas."""
+    """Returns a solid of revolution with polygons of the circles' areas.
+
+    `z` is as for `revolved`, and `radius` contains the radii of the circles.
+    """
     step = 2.0 * np.pi / sides
     wide = np.sqrt(step / np.sin(step)) * np.array(radius)
     vertices, triangles = revolved(wide, np.array(z), sides)

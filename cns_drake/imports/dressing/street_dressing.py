@@ -40,6 +40,15 @@ _OBJECTS_WITHIN = 100.0
 _LAMP_EVERY = 27.0
 # Mean distance between random small objects [m].
 _SMALL_EVERY = 22.0
+# Distance between two random small objects, in shares of the mean distance.
+_SMALL_SPACINGS = (0.6, 1.4)
+# Least and greatest distance of the first random object from the start of a
+# street [m].
+_FIRST_OBJECT = (3.0, 12.0)
+# Where there is no room beside the carriageway, lamps stand on its edge: this
+# far inside it, or this far from the middle of the street [m].
+_LAMP_INSIDE = 0.4
+_LAMP_FROM_MIDDLE = 2.3
 
 
 def dress_streets(
@@ -64,13 +73,13 @@ def dress_streets(
         drives: the drives of the map.
         ground: heights of the ground on which objects stand.
         guessed_ground: ground that was made for a file without a terrain, as
-            structures; empty if the file has a terrain.
+            objects; empty if the file has a terrain.
         seed: seed of all random draws.
     """
-    found = PlacedObjects()
+    placed = PlacedObjects()
     if not drives:
-        return found
-    room = StreetRoom(objects, drives, ground, guessed_ground, found)
+        return placed
+    room = StreetRoom(objects, drives, ground, guessed_ground, placed)
     near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
@@ -90,7 +99,7 @@ def dress_streets(
             _place_lamps(room, row, rng)
             if not small_objects:
                 _place_small_objects(room, row, rng)
-    return found
+    return placed
 
 
 def _streets_to_dress(
@@ -117,7 +126,17 @@ def _off_carriageway(
     streets: Sequence[Street],
     courses: Sequence[LineString],
 ) -> ImportedObject:
-    """Returns a tree, moved off the carriageway and its kerb if necessary."""
+    """Returns a tree, moved off the carriageway and its kerb if necessary.
+
+    The tree stays if it is far from drives, or if there is no room beside the
+    carriageway. If it is moved, this is noted among the placed objects.
+
+    Args:
+        room: the city, which places objects where there is room.
+        tree: the tree.
+        streets: the streets near drives.
+        courses: middle line of each of these streets.
+    """
     structure = tree.structure
     xy = np.array(structure.xyz[:2])
     if not streets or not room.is_near(np.array([xy] * 2), _OBJECTS_WITHIN):
@@ -132,13 +151,13 @@ def _off_carriageway(
         structure=replace(structure, xyz=(x, y, z)),
         triangles=tree.triangles + np.array([x - xy[0], y - xy[1], 0.0]),
     )
-    room.found.moved[tree] = moved
+    room.placed.moved[tree] = moved
     return moved
 
 
 def _place_from_file(
     room: StreetRoom,
-    one: SmallObject,
+    small: SmallObject,
     number: int,
     streets: Sequence[Street],
     courses: Sequence[LineString],
@@ -148,38 +167,40 @@ def _place_from_file(
 
     Args:
         room: the city, which places objects where there is room.
-        one: the small object.
+        small: the small object.
         number: number of the object among all small objects.
         streets: the streets near drives.
         courses: middle line of each of these streets.
         seed: seed of the random draws.
     """
-    name = f"{one.kind}_{one.source}"
-    if one.source.startswith("w"):
+    name = f"{small.kind}_{small.source}"
+    if small.source.startswith("w"):
+        # A tree row has several trees.
         name += f"_{number}"
-    xy, yaw = np.array(one.xy), one.yaw
+    xy, yaw = np.array(small.xy), small.yaw
     if streets:
         xy, towards = beside_street(xy, streets, courses)
         yaw = towards if yaw is None else yaw
     rng = random_generator(seed, "thing", name)
     at = (float(xy[0]), float(xy[1]))
-    if room.place(name, one.kind, at, yaw or 0.0, rng):
-        placed_last = room.found.objects[-1].structure.name
-        room.found.from_file.add(placed_last)
-        room.found.sources.add(one.source)
-        room.found.by_file[title_of(one.kind)] += 1
+    if room.place(name, small.kind, at, yaw or 0.0, rng):
+        placed_last = room.placed.objects[-1].structure.name
+        room.placed.from_file.add(placed_last)
+        room.placed.sources.add(small.source)
+        room.placed.by_file[title_of(small.kind)] += 1
     else:
-        room.found.no_room += 1
+        room.placed.no_room += 1
 
 
 def _place_lamps(
     room: StreetRoom, row: DressedStreet, rng: np.random.Generator
 ) -> None:
-    """Places lamps along a street where the file has none."""
-    s = float(rng.uniform(3.0, 12.0))
+    """Places lamps along a street, on alternate sides, if the file has none."""
+    s = float(rng.uniform(*_FIRST_OBJECT))
     side = 1.0
+    offsets = (row.half + FROM_EDGE, row.half - _LAMP_INSIDE, _LAMP_FROM_MIDDLE)
     while s < row.line.length:
-        for offset in (row.half + FROM_EDGE, row.half - 0.4, 2.3):
+        for offset in offsets:
             xy, yaw = place_along(row.line, s, side, offset)
             if any(
                 np.hypot(x - xy[0], y - xy[1]) < _LAMP_EVERY
@@ -190,7 +211,7 @@ def _place_lamps(
             yaw += side * np.pi / 2.0
             lamp = f"lamp_post_{row.name}_{int(s)}"
             if room.place(lamp, "lamp_post", xy, yaw, rng):
-                room.found.at_random["Lamp post"] += 1
+                room.placed.at_random["Lamp post"] += 1
                 break
         s += _LAMP_EVERY
         side = -side
@@ -200,12 +221,12 @@ def _place_small_objects(
     room: StreetRoom, row: DressedStreet, rng: np.random.Generator
 ) -> None:
     """Places random small objects along a street, for a file without any."""
-    s = float(rng.uniform(3.0, 12.0))
+    s = float(rng.uniform(*_FIRST_OBJECT))
     while s < row.line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0
         kind = pick_key(TABLES["small things"], rng)
         xy, yaw = place_along(row.line, s, side, row.half + FROM_EDGE)
         yaw += side * np.pi / 2.0
         if room.place(f"{kind}_{row.name}_{int(s)}", kind, xy, yaw, rng):
-            room.found.at_random[title_of(kind)] += 1
-        s += float(rng.uniform(0.6, 1.4)) * _SMALL_EVERY
+            room.placed.at_random[title_of(kind)] += 1
+        s += float(rng.uniform(*_SMALL_SPACINGS)) * _SMALL_EVERY

@@ -37,6 +37,8 @@ _MOST_FALL = 0.5
 # A street this far above the guessed ground is a bridge or a roof, and no
 # object stands on it [m].
 _BRIDGE_HEIGHT = 1.0
+# Walls are looked for at this height above the ground [m].
+_WALL_PROBE = 0.5
 # Radius around the middle of a trunk that no other object takes [m].
 _TRUNK_RADIUS = 0.4
 # Classes of structures that nothing may touch.
@@ -72,7 +74,7 @@ class StreetRoom:
     """Places small objects in a city where there is room.
 
     Attributes:
-        found: the objects that are placed.
+        placed: the objects that are placed.
         paths: paths of the drives [m].
         lamps: positions (x, y) of the street lamps among the objects [m].
     """
@@ -83,7 +85,7 @@ class StreetRoom:
         drives: Sequence[WaypointRoute],
         ground: Ground,
         guessed_ground: Sequence[Structure],
-        found: PlacedObjects,
+        placed_objects: PlacedObjects,
     ):
         """Takes what already stands, and the drives whose paths stay free.
 
@@ -93,9 +95,9 @@ class StreetRoom:
             ground: the ground on which objects stand.
             guessed_ground: structures of the ground that was guessed; none if
                 the file has terrain.
-            found: gets the objects that are placed.
+            placed_objects: gets the objects that are placed.
         """
-        self.found = found
+        self.placed = placed_objects
         self._ground = ground
         self.paths = MultiLineString([drive.path for drive in drives])
         shapely.prepare(self.paths)
@@ -195,7 +197,7 @@ class StreetRoom:
         self._names.add(name)
         structure = replace(structure, name=name, xyz=(x, y, z))
         triangles = _bounding_triangles(footprint, z)
-        self.found.objects.append(
+        self.placed.objects.append(
             ImportedObject(structure, title_of(kind), None, triangles)
         )
         if kind == "lamp_post":
@@ -218,7 +220,9 @@ class StreetRoom:
         xy = shapely.get_coordinates(around.exterior)
         xy = np.concatenate([xy, shapely.get_coordinates(footprint.centroid)])
         z = self._ground.height(xy)
-        return bool(self._solids.hides(np.column_stack([xy, z + 0.5])).any())
+        return bool(
+            self._solids.hides(np.column_stack([xy, z + _WALL_PROBE])).any()
+        )
 
 
 def title_of(kind: str) -> str:

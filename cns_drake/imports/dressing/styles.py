@@ -36,11 +36,49 @@ _LARGE_HOUSE = 260.0
 # A building whose use is not tagged is a house only if it is lower than this
 # [m].
 _HIGH_HOUSE = 9.5
+# A building whose use is not tagged is a shed only if it is lower than this
+# [m].
+_HIGH_SHED = 4.0
 # A building whose use is not tagged is an office if it is higher than this [m].
 _HIGH_BLOCK = 26.0
 # A low building whose use is not tagged is a shed if its area is smaller than
 # this [m^2].
 _SMALL = 45.0
+# Probability that a house is old if its year does not decide.
+_OLD_SHARE = 0.6
+# Least and greatest factor of the brightness of random walls.
+_TINTS = (0.92, 1.06)
+# Greatest height of a window, as a share of its storey's height.
+_MOST_WINDOW_SHARE = 0.58
+# Least width of the wall between two windows [m].
+_BETWEEN_WINDOWS = 0.6
+# The part of a storey's height beside the window that is below the window.
+_SILL_SHARE = 0.62
+# The same in storeys at least this high [m].
+_HIGH_STOREY = 5.0
+_HIGH_SILL_SHARE = 0.4
+# Depth of windows [m].
+_OLD_RECESS = 0.22
+_NEW_RECESS = 0.14
+# Factor of the brightness of trim, relative to the wall.
+_OLD_TRIM_TINT = 1.16
+_NEW_TRIM_TINT = 0.82
+# Houses of more than this height may have shops, with this probability.
+_LEAST_SHOP_HOUSE = 6.0
+_SHOPS_SHARE = 0.4
+# Flats with at least this number of storeys may have balconies, with this
+# probability.
+_BALCONY_STOREYS = 3
+_BALCONIES_SHARE = 0.45
+# Least height of a plinth, and greatest random addition [m].
+_LEAST_PLINTH = 0.3
+_MORE_PLINTH = 0.4
+# Height of a gutter [m].
+_GUTTER = 0.12
+# Least height of a cornice, and greatest random addition [m].
+_OLD_CORNICE = 0.35
+_NEW_CORNICE = 0.18
+_MORE_CORNICE = 0.2
 
 
 @dataclass(frozen=True)
@@ -98,11 +136,11 @@ def building_use(
     """
     words = [tags.get(key, "") for key in _USE_KEYS]
     words += [key for key in ("shop", "office") if key in tags]
-    found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
+    tagged = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
     for use, look in _LOOKS["uses"].items():
-        if found & set(look["words"].split()):
+        if tagged & set(look["words"].split()):
             return use, True
-    if area < _SMALL and height < 4.0:
+    if area < _SMALL and height < _HIGH_SHED:
         return "shed", False
     if area < _LARGE_HOUSE and height < _HIGH_HOUSE:
         return "house", False
@@ -113,6 +151,8 @@ def building_use(
 
 def tagged_finish(tags: Mapping[str, str], part: str) -> Finish | None:
     """Returns the finish that tags give to a part; None without such tags.
+
+    A tag for the colour takes precedence over the colour of the material.
 
     `part` is the beginning of the tags' keys, `building` or `roof`.
     """
@@ -159,11 +199,11 @@ def make_style(
     )
     drawn_wall = _random_finish(rng, *look["walls"].split())
     drawn_roof = _random_finish(rng, "felts" if is_flat else "tiles")
-    tint = float(rng.uniform(0.92, 1.06))
-    is_old = float(rng.random()) < 0.6
+    tint = float(rng.uniform(*_TINTS))
+    is_old = float(rng.random()) < _OLD_SHARE
     if year is not None:
         is_old = year < _OLD_BEFORE or (year < _NEW_FROM and is_old)
-    chances = rng.random(4)
+    shops_draw, balconies_draw, plinth_draw, cornice_draw = rng.random(4)
     is_block = use in ("flats", "office", "retail")
     levels = count(tags.get("building:levels")) if tags else None
     storeys = max(1, round(height / storey))
@@ -171,7 +211,7 @@ def make_style(
         storeys = max(1, round(levels))
         by_tag.add("levels")
     storey = max(height / storeys, _STOREYS[0])
-    window = min(window, 0.58 * storey)
+    window = min(window, _MOST_WINDOW_SHARE * storey)
     wall, roof = tagged_finish(tags, "building"), tagged_finish(tags, "roof")
     by_tag |= {"wall"} if wall else set()
     by_tag |= {"roof"} if roof else set()
@@ -179,43 +219,54 @@ def make_style(
     shops = use == "retail" or (
         is_block
         and not is_tagged
-        and storey * storeys > 6.0
-        and chances[0] < 0.4
+        and storey * storeys > _LEAST_SHOP_HOUSE
+        and shops_draw < _SHOPS_SHARE
     )
+    sill_share = _SILL_SHARE if storey < _HIGH_STOREY else _HIGH_SILL_SHARE
+    has_balconies = (
+        use == "flats"
+        and storeys >= _BALCONY_STOREYS
+        and balconies_draw < _BALCONIES_SHARE
+    )
+    plinth = round(_LEAST_PLINTH + _MORE_PLINTH * plinth_draw, 2)
     return Style(
         use=use,
         storey=storey,
         window_pitch=pitch,
-        window_width=round(min(width, pitch - 0.6), 2),
-        window_sill=round(
-            (storey - window) * (0.62 if storey < 5.0 else 0.4), 2
-        ),
+        window_width=round(min(width, pitch - _BETWEEN_WINDOWS), 2),
+        window_sill=round((storey - window) * sill_share, 2),
         window_height=round(window, 2),
-        recess=0.22 if is_old else 0.14,
+        recess=_OLD_RECESS if is_old else _NEW_RECESS,
         wall=wall,
         roof=roof or drawn_roof,
         glass=_random_finish(rng, "glass"),
         frame=_random_finish(rng, "frames"),
-        trim=_tinted(wall, 1.16 if is_old else 0.82),
+        trim=_tinted(wall, _OLD_TRIM_TINT if is_old else _NEW_TRIM_TINT),
         door=_random_finish(rng, "doors"),
         sign=_random_finish(rng, "signs"),
         shops=bool(shops),
-        balconies=bool(use == "flats" and storeys >= 3 and chances[1] < 0.45),
-        plinth=0.0 if use == "shed" else round(0.3 + 0.4 * chances[2], 2),
-        cornice=_cornice(use, is_flat, is_old, float(chances[3])),
+        balconies=bool(has_balconies),
+        plinth=0.0 if use == "shed" else plinth,
+        cornice=_cornice(use, is_flat, is_old, float(cornice_draw)),
         by_tag=frozenset(by_tag),
     )
 
 
-def _cornice(use: str, is_flat: bool, is_old: bool, chance: float) -> float:
+def _cornice(use: str, is_flat: bool, is_old: bool, draw: float) -> float:
+    """Returns the height of a building's cornice or gutter [m]; 0 for none.
+
+    `draw` is a random number from 0 to 1.
+    """
     if use in ("shed", "industrial"):
         return 0.0
     if not is_flat:
-        return 0.12  # That is a gutter.
-    return round((0.35 if is_old else 0.18) + 0.2 * chance, 2)
+        return _GUTTER
+    least = _OLD_CORNICE if is_old else _NEW_CORNICE
+    return round(least + _MORE_CORNICE * draw, 2)
 
 
 def _tinted(finish: Finish, factor: float) -> Finish:
+    """Returns a finish that is brighter by a factor."""
     assert finish.rgb is not None
     rgb = np.clip(np.multiply(finish.rgb, factor), 0.0, 1.0).round(3)
     return finish._replace(rgb=triple(rgb))
@@ -223,5 +274,7 @@ def _tinted(finish: Finish, factor: float) -> Finish:
 
 def _random_finish(rng: np.random.Generator, *palettes: str) -> Finish:
     """Returns a random finish of some palettes."""
-    found = [one for name in palettes for one in _LOOKS["palettes"][name]]
-    return Finish.given(Dice(rng).pick(found))
+    finishes = [
+        finish for name in palettes for finish in _LOOKS["palettes"][name]
+    ]
+    return Finish.given(Dice(rng).pick(finishes))

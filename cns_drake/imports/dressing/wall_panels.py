@@ -23,6 +23,7 @@ _SAME_PLANE = float(np.cos(np.radians(1.0)))
 # A wall that bends is divided where normals differ by more than this (0.02
 # deg).
 _STRAIGHT = float(np.cos(np.radians(0.02)))
+# Millimetres in a metre: corners that are equal in whole millimetres are one.
 _MM = 1000.0
 # A wall is a rectangle if at most this much of the rectangle's area is missing
 # [m^2].
@@ -129,22 +130,26 @@ def find_panels(
             axis=1,
         )
         wanted = is_wanted(limits)
-        groups = [some for k, some in enumerate(groups) if wanted[k]]
+        groups = [
+            members
+            for members, is_used in zip(groups, wanted, strict=True)
+            if is_used
+        ]
     normals = long_normals(triangles) / 2.0
     areas = np.linalg.norm(normals, axis=1)
-    found = []
-    for some in groups:
-        number = int(building[some[0]])
-        wall = triangles[some], normals[some], areas[some]
+    panels = []
+    for members in groups:
+        number = int(building[members[0]])
+        wall = triangles[members], normals[members], areas[members]
         panel = _make_panel(number, *wall)
         if panel.is_plane:
-            found.append(panel)
+            panels.append(panel)
         else:
             facets = _panel_numbers(
-                wall[0], units[some], building[some], _STRAIGHT
+                wall[0], units[members], building[members], _STRAIGHT
             )
-            found += _plane_pieces(panel, facets, *wall)
-    return found
+            panels += _plane_pieces(panel, facets, *wall)
+    return panels
 
 
 def _plane_pieces(
@@ -162,21 +167,21 @@ def _plane_pieces(
     x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
     starts = [x[facets == number].min() for number in range(facets.max() + 1)]
 
-    def of(members: Sequence[int]) -> Panel:
+    def piece_of(members: Sequence[int]) -> Panel:
         here = np.isin(facets, members)
-        one = triangles[here], normals[here], areas[here]
-        return _make_panel(wall.building, *one, _MOST_PIECE_BENT)
+        piece = triangles[here], normals[here], areas[here]
+        return _make_panel(wall.building, *piece, _MOST_PIECE_BENT)
 
-    found: list[Panel] = []
+    pieces: list[Panel] = []
     members: list[int] = []
     for number in np.argsort(starts, kind="stable").tolist():
-        if members and (longer := of([*members, number])).is_plane:
+        if members and (longer := piece_of([*members, number])).is_plane:
             members.append(number)
-            found[-1] = longer
+            pieces[-1] = longer
         else:
             members = [number]
-            found.append(of(members))
-    return found
+            pieces.append(piece_of(members))
+    return pieces
 
 
 def _panel_numbers(
@@ -237,7 +242,10 @@ def _make_panel(
     if length * height - areas.sum() > _NO_AREA:
         flat = np.column_stack([x - x.min(), corners[:, 2] - origin[2]])
         outline = shapely.union_all(
-            [Polygon(one) for one in np.round(flat, 3).reshape(-1, 3, 2)],
+            [
+                Polygon(triangle)
+                for triangle in np.round(flat, 3).reshape(-1, 3, 2)
+            ],
             grid_size=1.0 / _MM,
         )
     is_plane = bool(np.ptp(aside) <= bent)
