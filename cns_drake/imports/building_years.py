@@ -21,6 +21,8 @@ _PERIOD = re.compile(
 )
 _DAY = re.compile(r"jd:(\d{7})(?:\.\d+)?", re.ASCII)
 _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)", re.ASCII)
+# Longer texts are cut [characters].
+_LONGEST_TEXT = 255
 # Julian day number of the day before 1 January of the year 1.
 _DAY_ZERO = 1721425
 # The usual attributes in lower case, the most reliable first: those of 3DBAG,
@@ -38,7 +40,8 @@ _USUAL_ATTRIBUTES = (
     "baujahr",
     "start_date",
 )
-# Placeholder for an unknown year.
+# Greatest year in a file that is a year and no other number; it is also a
+# placeholder for an unknown year.
 _PLACEHOLDER = 9999
 # Placeholder for an unknown year in Dutch registers.
 _DUTCH_PLACEHOLDER = 1005
@@ -54,7 +57,7 @@ def year_of_date(text: str) -> int | None:
     result is the middle year, or an earlier or later year if the text says
     "early" or "late".
     """
-    text = text.strip().lower()[:255].split("..")[-1].strip()
+    text = text.strip().lower()[:_LONGEST_TEXT].split("..")[-1].strip()
     day = _DAY.fullmatch(text)
     if day:
         number = int(day[1]) - _DAY_ZERO
@@ -64,11 +67,11 @@ def year_of_date(text: str) -> int | None:
         text = plain
     period = _PERIOD.fullmatch(text)
     if period:
-        part = _SHARES_OF_PERIOD[period[1] or ""]
+        share = _SHARES_OF_PERIOD[period[1] or ""]
         if period[2]:
             century = int(period[2])
-            return 100 * (century - 1) + round(100 * part) if century else None
-        return 10 * int(period[3]) + round(10 * part)
+            return 100 * (century - 1) + round(100 * share) if century else None
+        return 10 * int(period[3]) + round(10 * share)
     match = _YEAR.search(text)
     return (int(match[1]) or None) if match else None
 
@@ -86,15 +89,17 @@ def construction_year(
         attribute: name of the attribute with the year; if None, the usual
             attributes are tried.
         name: name of the object, as an example in `faults`.
-        faults: counts values that are not years, and years in the future.
+        faults: counts placeholders for unknown years, and years in the future.
     """
     faults = faults or ImportFaults()
     if attribute is not None:
-        given = {attribute: attributes.get(attribute)}
+        candidates = {attribute: attributes.get(attribute)}
     else:
         lower = {key.lower(): value for key, value in attributes.items()}
-        given = {key: lower[key] for key in _USUAL_ATTRIBUTES if key in lower}
-    for key, value in given.items():
+        candidates = {
+            key: lower[key] for key in _USUAL_ATTRIBUTES if key in lower
+        }
+    for key, value in candidates.items():
         year = _year_of_value(value)
         if year is None:
             continue
@@ -109,10 +114,11 @@ def construction_year(
 
 
 def _year_of_value(value: object) -> int | None:
+    """Returns the year in an attribute, a number or a text; None if none."""
     if isinstance(value, bool) or value is None:
         return None
     if isinstance(value, (int, float)):
-        return int(value) if 1 <= value <= 9999 else None
+        return int(value) if 1 <= value <= _PLACEHOLDER else None
     return year_of_date(str(value))
 
 

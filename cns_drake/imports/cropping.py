@@ -36,14 +36,14 @@ def cropped_city(
     paths = MultiLineString([drive.path for drive in drives])
     shapely.prepare(paths)
     changed: dict[ImportedObject, ImportedObject | None] = {}
-    for one in city.kept:
-        corners = one.triangles.reshape(-1, 3)
+    for kept in city.kept:
+        corners = kept.triangles.reshape(-1, 3)
         if not _are_near(corners[None], paths, distance)[0]:
-            name = one.structure.name
+            name = kept.structure.name
             faults.add("structure far from the drives, left out", name)
-            changed[one] = None
-        elif one.object_type == "TINRelief":
-            changed[one] = _cropped_terrain(one, paths, distance)
+            changed[kept] = None
+        elif kept.object_type == "TINRelief":
+            changed[kept] = _cropped_terrain(kept, paths, distance)
     cropped = city.replaced(changed)
     if not cropped.kept:
         raise InputError(
@@ -65,17 +65,17 @@ def _are_near(
 
 
 def _cropped_terrain(
-    one: ImportedObject, paths: BaseGeometry, distance: float
+    terrain: ImportedObject, paths: BaseGeometry, distance: float
 ) -> ImportedObject:
-    """Returns the part of a terrain that is near paths."""
+    """Returns the part of a terrain that is within `distance` of paths [m]."""
+    model = terrain.structure.model
     meshes = {}
-    for name, mesh in one.structure.model.meshes.items():
+    for name, mesh in model.meshes.items():
         faces = mesh.triangles()
         near = faces[_are_near(mesh.vertices[faces], paths, distance)]
         used, index = np.unique(near, return_inverse=True)
         corners = map(tuple, index.reshape(-1, 3).tolist())
         meshes[name] = Mesh(mesh.vertices[used], tuple(corners))
-    model = one.structure.model
     parts = tuple(
         part
         for part in model.parts
@@ -83,7 +83,8 @@ def _cropped_terrain(
     )
     filled = {name: mesh for name, mesh in meshes.items() if mesh.faces}
     structure = replace(
-        one.structure, model=replace(model, parts=parts, meshes=filled)
+        terrain.structure, model=replace(model, parts=parts, meshes=filled)
     )
-    near = _are_near(one.triangles, paths, distance)
-    return replace(one, structure=structure, triangles=one.triangles[near])
+    triangles = terrain.triangles
+    triangles = triangles[_are_near(triangles, paths, distance)]
+    return replace(terrain, structure=structure, triangles=triangles)

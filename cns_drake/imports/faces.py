@@ -19,15 +19,16 @@ LEAST_AREA = 1e-5
 _BENT = 0.05
 # Millimetres in a metre: corners that are equal in whole millimetres are one.
 _MM = 1000.0
-_LEAST_PART_AREA = 0.01  # [m^2]
+# Smaller polygons of a geometry are dropped [m^2].
+_LEAST_PART_AREA = 0.01
 # The four corner triangles of a face with four corners. The second and the last
 # one together fill the face.
 _CORNERS_OF_FOUR = np.array([(3, 0, 1), (0, 1, 2), (1, 2, 3), (0, 2, 3)])
 
 
-def joined_triangles(some: Iterable[np.ndarray]) -> np.ndarray:
-    """Concatenates arrays of triangles (M, 3, 3)."""
-    return np.concatenate([np.zeros((0, 3, 3)), *some])
+def joined_triangles(surfaces: Iterable[np.ndarray]) -> np.ndarray:
+    """Returns the triangles (N, 3, 3) of surfaces with (M, 3, 3) triangles."""
+    return np.concatenate([np.zeros((0, 3, 3)), *surfaces])
 
 
 def face_triangles(
@@ -44,18 +45,11 @@ def face_triangles(
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    # The vector is as long as twice the area.
-    first, rest = rings[0][:1], rings[0][1:]
-    fan = [np.repeat(first, len(rest) - 1, axis=0), rest[:-1], rest[1:]]
-    normal = long_normals(np.stack(fan, axis=1)).sum(axis=0)
-    if 0.5 * np.linalg.norm(normal) < LEAST_AREA:
-        # The two halves of a ring that crosses itself may have the same area.
-        _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
-        normal = axes[2] if spread[1] ** 2 >= LEAST_AREA else np.zeros(3)
+    outer = rings[0]
+    normal = _normal_of_ring(outer)
     if not normal.any():
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    outer = rings[0]
     has_holes = any(len(hole) >= 3 for hole in rings[1:])
     if len(outer) == 3 and not has_holes:
         return outer[None]
@@ -69,17 +63,33 @@ def face_triangles(
     return _triangulate_along(normal, rings, name, faults)
 
 
+def _normal_of_ring(ring: np.ndarray) -> np.ndarray:
+    """Returns a vector (3,) normal to a ring (N, 3); 0 for a ring without area.
+
+    The ring is counter-clockwise as seen from the end of the vector.
+    """
+    first, rest = ring[:1], ring[1:]
+    fan = [np.repeat(first, len(rest) - 1, axis=0), rest[:-1], rest[1:]]
+    # The vector is as long as twice the area.
+    normal = long_normals(np.stack(fan, axis=1)).sum(axis=0)
+    if 0.5 * np.linalg.norm(normal) >= LEAST_AREA:
+        return np.asarray(normal)
+    # The two halves of a ring that crosses itself may have the same area.
+    _, spread, axes = np.linalg.svd(ring - ring.mean(axis=0))
+    return axes[2] if spread[1] ** 2 >= LEAST_AREA else np.zeros(3)
+
+
 def _without_repetitions(
     ring: np.ndarray, name: str, faults: ImportFaults
 ) -> np.ndarray:
-    """Returns a ring without repeated corners."""
+    """Returns a ring without corners that repeat the corner before them."""
     if len(ring) == 0:
         return ring
     rounded = np.rint(ring * _MM).tolist()
     kept = [k for k in range(len(ring)) if rounded[k] != rounded[k - 1]]
     if len(kept) < len(ring):
-        twice = len(ring) - len(kept)
-        faults.add("repeated corner, left out", name, twice)
+        repeated = len(ring) - len(kept)
+        faults.add("repeated corner, left out", name, repeated)
         return ring[kept]
     return ring
 
@@ -90,20 +100,25 @@ def _triangulate_along(
     name: str,
     faults: ImportFaults,
 ) -> np.ndarray:
-    """Returns the triangles of a face, triangulated as seen along an axis."""
+    """Returns the triangles (M, 3, 3) of a face [m].
+
+    The face is triangulated as seen along the axis of W that is nearest to its
+    `normal` (3,). Corners of the face keep their exact coordinates; all other
+    corners of triangles lie in the face's plane. The other arguments are as for
+    `face_triangles`.
+    """
     axis = int(np.abs(normal).argmax())
     axes = [(axis + 1) % 3, (axis + 2) % 3]
     if normal[axis] < 0.0:
         axes.reverse()
-    # In whole millimetres.
-    flat = [np.rint(ring[:, axes] * _MM) for ring in rings]
+    flat_mm = [np.rint(ring[:, axes] * _MM) for ring in rings]
     corners = {
         tuple(key): corner
-        for keys, ring in zip(flat, rings, strict=True)
+        for keys, ring in zip(flat_mm, rings, strict=True)
         for key, corner in zip(keys.tolist(), ring, strict=True)
     }
-    holes = [one / _MM for one in flat[1:] if len(one) >= 3]
-    polygon: BaseGeometry = Polygon(flat[0] / _MM, holes)
+    holes = [hole / _MM for hole in flat_mm[1:] if len(hole) >= 3]
+    polygon: BaseGeometry = Polygon(flat_mm[0] / _MM, holes)
     if not polygon.is_valid:
         faults.add("face that crosses itself, repaired", name)
         polygon = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
@@ -120,7 +135,6 @@ def _triangulate_along(
     for row, key, point in zip(
         lifted, np.rint(xy * _MM).tolist(), xy, strict=True
     ):
-        # Corners keep their exact coordinates.
         corner = corners.get(tuple(key))
         if corner is not None:
             row[:] = corner
@@ -157,13 +171,13 @@ def level_rings(polygon: Polygon, z: float) -> list[np.ndarray]:
 
 
 def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
-    """Yields the polygons of a geometry, except tiny ones."""
+    """Yields the polygons of a geometry, except polygons below 0.01 m^2."""
     if isinstance(geometry, Polygon):
         if geometry.area > _LEAST_PART_AREA:
             yield geometry
         return
-    for one in getattr(geometry, "geoms", ()):
-        yield from parts_of(one)
+    for part in getattr(geometry, "geoms", ()):
+        yield from parts_of(part)
 
 
 def valid_parts(

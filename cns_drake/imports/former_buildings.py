@@ -10,7 +10,7 @@ from cns_drake.imports.imported_objects import ImportedObject
 
 # Two buildings stand in the same place if they share this much of the smaller
 # outline.
-_SHARED = 0.3
+_LEAST_SHARED = 0.3
 
 
 def with_former_buildings(
@@ -27,24 +27,25 @@ def with_former_buildings(
         others: objects of today, which stood in the past city as well.
     """
     others = list(others)
-    later = [one for one in others if one.is_building]
-    tree = STRtree([one.structure.model.footprint for one in later])
+    of_today = [other for other in others if other.is_building]
+    outlines = [building.structure.model.footprint for building in of_today]
+    tree = STRtree(outlines)
     stood: list[ImportedObject] = []
     replaced: set[ImportedObject] = set()
-    for one in former:
-        outline = one.structure.model.footprint
-        there = [
-            later[k]
+    for building in former:
+        outline = building.structure.model.footprint
+        successors = [
+            of_today[k]
             for k in np.sort(tree.query(outline, "intersects"))
-            if _are_in_same_place(outline, later[k].structure.model.footprint)
+            if _are_in_same_place(outline, outlines[k])
         ]
-        if any(new.year is not None for new in there):
+        if any(successor.year is not None for successor in successors):
             continue
-        stood.append(one)
-        replaced.update(there)
-    return [one for one in others if one not in replaced] + stood
+        stood.append(building)
+        replaced.update(successors)
+    return [other for other in others if other not in replaced] + stood
 
 
-def _are_in_same_place(one: BaseGeometry, other: BaseGeometry) -> bool:
-    shared = one.intersection(other).area
-    return bool(shared > _SHARED * min(one.area, other.area))
+def _are_in_same_place(outline: BaseGeometry, other: BaseGeometry) -> bool:
+    shared = outline.intersection(other).area
+    return bool(shared > _LEAST_SHARED * min(outline.area, other.area))

@@ -41,6 +41,11 @@ _BESIDE_HULL = 1.0
 _CORNER_STRIDE = 7
 
 
+# Places beyond a grid are moved to this far before its end, so that there is
+# another row and column behind them [cells].
+_BEFORE_END = 1.001
+
+
 class Ground:
     """The ground of an imported city: heights on an evenly spaced grid.
 
@@ -63,11 +68,13 @@ class Ground:
         Heights are interpolated between the points of the grid. A place outside
         of the grid has the height of the nearest edge.
         """
-        column = np.clip(
-            (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001
-        )
-        row = np.clip(
-            (xy[:, 1] - self.ys[0]) / self.cell, 0, len(self.ys) - 1.001
+        column, row = (
+            np.clip(
+                (coordinate - grid[0]) / self.cell, 0, len(grid) - _BEFORE_END
+            )
+            for coordinate, grid in zip(
+                xy[:, :2].T, (self.xs, self.ys), strict=True
+            )
         )
         c, r = column.astype(int), row.astype(int)
         u, v = column - c, row - r
@@ -145,7 +152,7 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
     Each solid consists of triangles (M, 3, 3).
     """
     corners = [triangles.reshape(-1, 3) for triangles in solids]
-    feet = [some[some[:, 2].argmin()] for some in corners]
+    feet = [of_solid[of_solid[:, 2].argmin()] for of_solid in corners]
     return np.array(feet).reshape(-1, 3)
 
 
@@ -161,23 +168,23 @@ def ground_of(
         below_bridges: whether bridges and tunnels are ignored in the guess,
             unless the city has no other structures.
     """
-    corners = joined_triangles(one.triangles for one in objects).reshape(-1, 3)
+    surfaces = joined_triangles(one.triangles for one in objects)
     terrain = [one for one in objects if one.object_type == "TINRelief"]
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
-        low = objects
+        standing = objects
         if below_bridges:
             spans = ("Bridge", "Tunnel")
             firm = [o for o in objects if not o.object_type.startswith(spans)]
-            low = firm or objects
-        feet = [feet_of([o.triangles for o in low if not o.is_ground])]
+            standing = firm or objects
+        feet = [feet_of([o.triangles for o in standing if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_CORNER_STRIDE]
-            for one in low
+            for one in standing
             if one.is_ground
         ]
-    return guess_ground(np.concatenate(feet), corners)
+    return guess_ground(np.concatenate(feet), surfaces.reshape(-1, 3))
 
 
 def ground_structures(

@@ -1,6 +1,7 @@
 """An additional first stage of a city, in which some buildings differ."""
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from typing import Any
 
@@ -55,37 +56,40 @@ def grow(
     (last,) = city.standing.values()
     buildings = [one for one in last if one.is_building]
     chosen = _choose_buildings(buildings, round(part * len(buildings)), seed)
-    taken = {one.structure.name for one in city.kept}
     lower = _heights_of_lower(chosen, seed)
+    names = {one.structure.name for one in city.kept}
     variants = {
-        one: _lowered_building(one, lower[one], taken) if one in lower else None
-        for one in chosen
+        building: _lowered_building(building, height, names)
+        for building, height in lower.items()
     }
-    first = [new for one in last if (new := variants.get(one, one)) is not None]
-    missing = [one.structure.name for one in chosen if one not in lower]
-    stood: list[ImportedObject] = []
+    absent = set(chosen) - lower.keys()
+    first = [variants.get(one, one) for one in last if one not in absent]
+    missing = [building.structure.name for building in absent]
+    gone_since: list[ImportedObject] = []
     if city.gone:
-        before = first
-        first = with_former_buildings(city.gone, before)
-        stood = [one for one in first if one in set(city.gone)]
-        missing += [one.draw_name for one in set(before) - set(first)]
-    extra = [new for new in variants.values() if new in set(first)]
+        with_successors = first
+        first = with_former_buildings(city.gone, with_successors)
+        gone_since = [one for one in first if one in set(city.gone)]
+        successors = set(with_successors) - set(first)
+        missing += [building.draw_name for building in successors]
     changes: dict[str, Any] = {
         "missing": sorted(missing),
         "part_of_height": dict(
             sorted(
-                (one.structure.name, height)
-                for one, height in lower.items()
-                if one.structure.name not in missing
+                (building.structure.name, height)
+                for building, height in lower.items()
+                if building.structure.name not in missing
             )
         ),
     }
-    if stood:
-        changes["gone_since"] = [one.structure.name for one in stood]
+    if gone_since:
+        changes["gone_since"] = [one.structure.name for one in gone_since]
+    in_first = set(first)
+    lowered = [one for one in variants.values() if one in in_first]
     grown = replace(
         city,
         standing={"01": first, "02": last},
-        kept=[*city.kept, *extra, *stood],
+        kept=[*city.kept, *lowered, *gone_since],
         gone=(),
     )
     return grown, changes
@@ -94,17 +98,21 @@ def grow(
 def _heights_of_lower(
     chosen: Sequence[ImportedObject], seed: int
 ) -> dict[ImportedObject, float]:
-    """Returns for each lower building the share of the height that remains."""
+    """Returns which buildings are lower, and their heights in the first stage.
+
+    A height is a share of the building's height in the last stage. All other
+    buildings of those `chosen` are missing in the first stage.
+    """
     least, most = _LOWER_HEIGHTS
     heights = {}
-    for one in chosen:
-        name = one.structure.name
+    for building in chosen:
+        name = building.structure.name
         if (
-            np.ptp(one.triangles[:, :, 2]) >= _LEAST_HEIGHT
+            np.ptp(building.triangles[:, :, 2]) >= _LEAST_HEIGHT
             and random_share(seed, "lower", name) < _SHARE_LOWER
         ):
             share = least + (most - least) * random_share(seed, "height", name)
-            heights[one] = round(share, 2)
+            heights[building] = round(share, 2)
     return heights
 
 
@@ -113,11 +121,12 @@ def _choose_buildings(
 ) -> list[ImportedObject]:
     """Returns `number` random buildings, about half of them block by block."""
     blocks: dict[int, list[ImportedObject]] = {}
-    for block, one in zip(_block_numbers(buildings), buildings, strict=True):
-        blocks.setdefault(block, []).append(one)
+    numbers = _block_numbers(buildings)
+    for number_of_block, building in zip(numbers, buildings, strict=True):
+        blocks.setdefault(number_of_block, []).append(building)
 
     def lot_of_block(members: list[ImportedObject]) -> float:
-        name = min(one.structure.name for one in members)
+        name = min(member.structure.name for member in members)
         return random_share(seed, "block", name)
 
     chosen: list[ImportedObject] = []
@@ -126,9 +135,9 @@ def _choose_buildings(
             break
         if 1 < len(members) <= number - len(chosen):
             chosen += members
-    left = set(buildings) - set(chosen)
     singles = sorted(
-        left, key=lambda one: random_share(seed, "single", one.structure.name)
+        set(buildings) - set(chosen),
+        key=lambda one: random_share(seed, "single", one.structure.name),
     )
     return chosen + singles[: number - len(chosen)]
 
@@ -137,7 +146,7 @@ def _block_numbers(buildings: Sequence[ImportedObject]) -> np.ndarray:
     """Returns for each building the number (N,) of its block."""
     if not buildings:
         return np.zeros(0, dtype=int)
-    outlines = [one.structure.model.footprint for one in buildings]
+    outlines = [building.structure.model.footprint for building in buildings]
     near = STRtree(outlines).query(np.array(outlines), "dwithin", _BLOCK_WITHIN)
     links = coo_array(
         (np.ones(near.shape[1]), (near[0], near[1])),
@@ -148,16 +157,19 @@ def _block_numbers(buildings: Sequence[ImportedObject]) -> np.ndarray:
 
 
 def _lowered_building(
-    one: ImportedObject, share: float, taken: set[str]
+    building: ImportedObject, share: float, taken: AbstractSet[str]
 ) -> ImportedObject:
-    """Returns a building cut to a share of its height, with a new name."""
+    """Returns a building scaled to a share of its height, with a new name.
+
+    `taken` contains names that other structures have.
+    """
     suffix = "_lower"
-    while f"{one.structure.name}{suffix}" in taken:
+    while f"{building.structure.name}{suffix}" in taken:
         suffix += "_"
-    bottom = float(one.triangles[:, :, 2].min())
+    foot = float(building.triangles[:, :, 2].min())
     scale = np.array([1.0, 1.0, share])
-    move = np.array([0.0, 0.0, (1.0 - share) * bottom])
-    model = one.structure.model
+    move = np.array([0.0, 0.0, (1.0 - share) * foot])
+    model = building.structure.model
     meshes = {
         f"{name}{suffix}": replace(mesh, vertices=mesh.vertices * scale + move)
         for name, mesh in model.meshes.items()
@@ -171,14 +183,14 @@ def _lowered_building(
         for part in model.parts
     )
     structure = replace(
-        one.structure,
-        name=f"{one.structure.name}{suffix}",
+        building.structure,
+        name=f"{building.structure.name}{suffix}",
         model=replace(model, parts=parts, meshes=meshes),
     )
     return replace(
-        one,
+        building,
         structure=structure,
-        object_type=f"{one.object_type}, lower at first",
-        triangles=one.triangles * scale + move,
-        original=one.structure.name,
+        object_type=f"{building.object_type}, lower at first",
+        triangles=building.triangles * scale + move,
+        original=building.structure.name,
     )

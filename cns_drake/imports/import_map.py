@@ -40,7 +40,8 @@ from cns_drake.roads.waypoint_file import read_waypoints
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER, check_new_map
 
-# Gets the folder, and stage -> its numbers of structures and triangles.
+# A function that gets a map's folder, and the name of each stage -> the numbers
+# of structures and triangles in the stage.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
@@ -116,16 +117,23 @@ def import_city(
         map_files.write_facts(draft, source, facts, city.faults)
         report = _report_of(staged, drives, city.faults)
         map_files.write_report(draft, report)
-        when = [f" in {year}" for year in options.years] or [""]
-        if options.grow is not None:
-            when = [", not all of it built", ""]
         map_files.write_drives(
             draft,
-            dict(zip(staged.standing, when, strict=True)),
+            _titles_of_stages(staged, options),
             [drive.waypoints for drive in drives],
         )
         finish(draft, sizes)
     return report
+
+
+def _titles_of_stages(
+    staged: StagedCity, options: ImportOptions
+) -> dict[str, str]:
+    """Returns for each stage the words that end the titles of its drives."""
+    titles = [f" in {year}" for year in options.years] or [""]
+    if options.grow is not None:
+        titles = [", not all of it built", ""]
+    return dict(zip(staged.standing, titles, strict=True))
 
 
 def _find_drives(
@@ -183,7 +191,9 @@ def _report_of(
     return ImportReport(
         kinds=dict(Counter(one.object_type for one in staged.kept)),
         triangles=sum(one.num_own_triangles for one in staged.kept),
-        stages={stage: len(some) for stage, some in staged.standing.items()},
+        stages={
+            stage: len(objects) for stage, objects in staged.standing.items()
+        },
         undated=staged.undated,
         dated=staged.dated,
         drives=tuple(drive.length for drive in drives),
@@ -223,6 +233,10 @@ def _import_roads(
     own: Sequence[WaypointRoute] | None,
     finish: Finish,
 ) -> ImportReport:
+    """Writes a map folder from a road network, as `import_city` does.
+
+    `own` are drives that replace the proposed drives; None to propose drives.
+    """
     with uninterrupted():  # This imports the whole city generator.
         from cns_drake.imports.opendrive.town import build_town
         from cns_drake.imports.opendrive.town_files import write_town
@@ -236,6 +250,11 @@ def _import_roads(
 
 
 def _read(source: Path, options: ImportOptions) -> ForeignCity:
+    """Returns the city in a CityJSON or OpenStreetMap file.
+
+    Raises:
+        InputError: the file is of another format or cannot be used.
+    """
     if source.suffix in (".json", ".jsonl"):
         return import_cityjson(source, options.lod, options.year_attribute)
     if source.suffix not in (".osm", ".pbf"):

@@ -1,6 +1,7 @@
 """A picture of an imported map from above, with its drives."""
 
 from collections.abc import Sequence
+import math
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,15 @@ from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130
+# Length of the longer side of the map in the picture [in].
 _LONGER_SIDE_INCHES = 9.0
+# Least width of the picture, so that the legend fits in [in].
+_LEAST_WIDTH_INCHES = 4.0
+# Size of tick marks and labels beside the map [in].
+_LABELS_INCHES = 0.8
+# Width of a column, and height of a row of the legend [in].
+_COLUMN_INCHES = 2.0
+_ROW_INCHES = 0.2
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 _ROUTE_WIDTHS = (5.0, 2.0)  # [pt]
 _ROOM_COLOUR = "#ffd92f"
@@ -66,10 +75,11 @@ def draw_overview(
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
     size = _LONGER_SIDE_INCHES * (high - low) / (high - low).max()
-    wide = max(size[0] + 0.8, 4.0)
-    columns = int(wide / 2)
-    rows = -(-len(legend) // columns)
-    figure.set_size_inches(wide, size[1] + 0.8 + 0.2 * rows)
+    width = max(size[0] + _LABELS_INCHES, _LEAST_WIDTH_INCHES)
+    columns = int(width / _COLUMN_INCHES)
+    rows = math.ceil(len(legend) / columns)
+    height = size[1] + _LABELS_INCHES + _ROW_INCHES * rows
+    figure.set_size_inches(width, height)
     figure.legend(
         legend.values(),
         legend.keys(),
@@ -82,21 +92,21 @@ def draw_overview(
 def _draw_objects(
     axes: Axes, objects: Sequence[ImportedObject]
 ) -> dict[str, Artist]:
-    """Draws objects, the ground first; returns the legend."""
+    """Draws objects except terrain, the ground first; returns the legend."""
     legend: dict[str, Artist] = {}
     for is_ground in (True, False):
-        alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
+        by_colour: dict[tuple[float, float, float], list[np.ndarray]] = {}
         for one in objects:
             if one.is_ground == is_ground and one.object_type != "TINRelief":
                 colour = _colour_of(one)
-                alike.setdefault(colour, []).append(one.triangles)
+                by_colour.setdefault(colour, []).append(one.triangles)
                 name = one.structure.semantic_class
                 if name == "building":
                     name = "building, any colour"
                 elif colour == WATER:
                     name = "water"
                 legend.setdefault(name, Patch(facecolor=colour))
-        for colour, triangles in alike.items():
+        for colour, triangles in by_colour.items():
             # The library takes an array faster than a list, but its type hints
             # do not allow it.
             corners_xy: Any = np.concatenate(triangles)[:, :, :2]
@@ -158,6 +168,10 @@ def _draw_drives(
 
 
 def _colour_of(one: ImportedObject) -> tuple[float, float, float]:
+    """Returns the colour of a structure in the picture.
+
+    Plants have the colour of their class, all others that of their first part.
+    """
     part = one.structure.model.parts[0]
     if one.structure.semantic_class == "vegetation":
         return CLASS_RGB["vegetation"]

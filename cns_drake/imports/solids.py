@@ -8,6 +8,12 @@ from cns_drake.city.geometry import long_normals
 from cns_drake.imports.faces import LEAST_AREA, flat_surface, level_rings
 from cns_drake.imports.faults import ImportFaults
 
+# The ends of a hipped roof's ridge are inset by at most this share of its
+# length.
+_MOST_INSET_SHARE = 0.45
+# Triangles (M, 3, 3) of a pitched roof [m]: its slopes, and its gables.
+_Roof = tuple[list[np.ndarray], list[np.ndarray]]
+
 
 def extruded(
     polygon: Polygon,
@@ -42,37 +48,45 @@ def extruded(
     if low > 0.0:
         floor = flat_surface(polygon, low, name, faults)[:, ::-1]
     corners = level_rings(polygon, eaves)[0]
-    ridge = None
+    pitched = None
     if roof != "flat" and roof_height > 0.0:
-        ridge = _slopes_and_gables(roof, polygon, corners, high)
+        pitched = _slopes_and_gables(roof, polygon, corners, high)
         # A slope that looks downwards reaches beyond the footprint.
-        if ridge is None or (
-            long_normals(np.concatenate(ridge[0]))[:, 2].min() < -LEAST_AREA
+        if pitched is None or (
+            long_normals(np.concatenate(pitched[0]))[:, 2].min() < -LEAST_AREA
         ):
-            ridge = None
+            pitched = None
             faults.add(f"roof of shape {roof}, made flat", name)
-    if ridge is None:
-        roofs = flat_surface(polygon, high, name, faults)
-        return np.concatenate([floor, _walls(polygon, low, high)]), roofs
-    slopes, gables = ridge
+    if pitched is None:
+        top = flat_surface(polygon, high, name, faults)
+        return np.concatenate([floor, _walls(polygon, low, high)]), top
+    slopes, gables = pitched
     walls = np.concatenate([floor, _walls(polygon, low, eaves), *gables])
     return walls, np.concatenate(slopes)
 
 
 def _walls(polygon: Polygon, low: float, high: float) -> np.ndarray:
-    found = []
+    """Returns the walls from `low` to `high`, as triangles (M, 3, 3) [m]."""
+    triangles = []
     for ring in level_rings(polygon, low):
         following = np.roll(ring, -1, axis=0)
         up = np.array([0.0, 0.0, high - low])
-        found.append(np.stack([ring, following, following + up], axis=1))
-        found.append(np.stack([ring, following + up, ring + up], axis=1))
-    return np.concatenate(found)
+        triangles.append(np.stack([ring, following, following + up], axis=1))
+        triangles.append(np.stack([ring, following + up, ring + up], axis=1))
+    return np.concatenate(triangles)
 
 
 def _slopes_and_gables(
     roof: str, polygon: Polygon, corners: np.ndarray, high: float
-) -> tuple[list[np.ndarray], list[np.ndarray]] | None:
-    """Returns the slopes and gables of a roof; None if it cannot be made."""
+) -> _Roof | None:
+    """Returns the slopes and gables of a roof; None if it cannot be made.
+
+    Args:
+        roof: shape of the roof, as for `extruded`.
+        polygon: the footprint.
+        corners: (N, 3) outline of the footprint at the height of the eaves [m].
+        high: height of the highest point [m].
+    """
     if roof == "pyramidal" and not polygon.interiors:
         top = np.array([polygon.centroid.x, polygon.centroid.y, high])
         following = np.roll(corners, -1, axis=0)
@@ -92,7 +106,9 @@ def _slopes_and_gables(
     if roof == "hipped":
         across = float(np.linalg.norm(d - a))
         along = max(float(np.linalg.norm(end - start)), 1e-6)
-        inset = (end - start) * min(0.45, 0.5 * across / along)
+        # Slopes on all sides have the same pitch, if the ridge is long enough.
+        share = min(_MOST_INSET_SHARE, 0.5 * across / along)
+        inset = (end - start) * share
         start, end = start + inset, end - inset
     slopes = [
         np.array([[a, b, end], [a, end, start]]),

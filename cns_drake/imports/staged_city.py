@@ -47,17 +47,23 @@ class StagedCity:
         `changed` maps an object to its replacement, or to None to remove it.
         """
 
-        def new(some: Iterable[ImportedObject]) -> list[ImportedObject]:
-            others = (changed.get(one, one) for one in some)
-            return [one for one in others if one is not None]
+        def with_changes(
+            objects: Iterable[ImportedObject],
+        ) -> list[ImportedObject]:
+            others = (changed.get(one, one) for one in objects)
+            return [other for other in others if other is not None]
 
-        standing = {stage: new(some) for stage, some in self.standing.items()}
-        return replace(self, standing=standing, kept=new(self.kept))
+        standing = {
+            stage: with_changes(objects)
+            for stage, objects in self.standing.items()
+        }
+        return replace(self, standing=standing, kept=with_changes(self.kept))
 
     def with_objects(self, added: Sequence[ImportedObject]) -> StagedCity:
         """Returns the city with more objects, which exist in all stages."""
         standing = {
-            stage: [*some, *added] for stage, some in self.standing.items()
+            stage: [*objects, *added]
+            for stage, objects in self.standing.items()
         }
         return replace(self, standing=standing, kept=[*self.kept, *added])
 
@@ -77,35 +83,35 @@ def stage_city(
     Raises:
         InputError: if all stages together have no structure, or too many.
     """
-    found = _without_outliers(city)
-    if not found:
+    objects = _without_outliers(city)
+    if not objects:
         raise InputError(f"{source}: no object has a surface")
     standing = {
         stage: [
             one
-            for one in found
-            if not _may_be_missing(one) or _stands_at(one, k, options)
+            for one in objects
+            if not _may_be_missing(one) or _stands_at(one, number, options)
         ]
-        for k, stage in enumerate(stage_names(options.years))
+        for number, stage in enumerate(stage_names(options.years))
     }
     gone: list[ImportedObject] = []
     if options.grow is not None:
         (today,) = map(set, standing.values())
-        gone = [one for one in found if one not in today]
+        gone = [one for one in objects if one not in today]
     elif options.dressed:
         standing = {
             stage: with_former_buildings(
-                [one for one in some if not _is_here(one)],
-                [one for one in some if _is_here(one)],
+                [one for one in of_stage if not _is_here(one)],
+                [one for one in of_stage if _is_here(one)],
             )
-            for stage, some in standing.items()
+            for stage, of_stage in standing.items()
         }
-    ever = {one for some in standing.values() for one in some}
-    for one in found:
+    ever = {one for of_stage in standing.values() for one in of_stage}
+    for one in objects:
         if one not in ever and one not in gone:
             kind = f"building {_why_never(one, options)}, left out"
             city.faults.add(kind, one.structure.name)
-    kept = [one for one in found if one in ever]
+    kept = [one for one in objects if one in ever]
     if len(kept) >= MAX_INSTANCE:
         raise InputError(
             f"{source}: {len(kept)} objects are more than instance ids can"
@@ -116,7 +122,7 @@ def stage_city(
             f"{source}: no structure stands at any stage; check --years and "
             "--undated"
         )
-    years = [one.year for one in found if _may_be_missing(one)]
+    years = [one.year for one in objects if _may_be_missing(one)]
     undated = years.count(None)
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
 
@@ -130,8 +136,8 @@ def _stands_at(one: ImportedObject, stage: int, options: ImportOptions) -> bool:
     """Returns whether a structure stands in the stage of number `stage`.
 
     A structure that was demolished at an unknown date stands in all stages
-    except the last, from its year of construction on. If this year is unknown,
-    `options.undated` decides.
+    except the last, from its year of construction on. If the year of
+    construction is unknown, `options.undated` decides.
     """
     years = options.years
     until = one.until
@@ -168,7 +174,10 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
-    """Returns a city's structures, except structures far from the middle."""
+    """Returns a city's objects within 10 km of its middle.
+
+    All other objects are counted in the city's faults.
+    """
     if not city.objects:
         return []
     boxes = boxes_of(city.objects)

@@ -6,8 +6,9 @@ import numpy as np
 
 from cns_drake.city.geometry import quartered
 
-# Longer triangles are divided, so that parts far away can be left out.
-_LONGEST_EDGE = 256  # In spacings.
+# Triangles with longer edges are divided, so that parts far away can be left
+# out [spacings].
+_LONGEST_EDGE = 256
 # Number of triangles that are processed at a time.
 _TRIANGLES_AT_ONCE = 64
 
@@ -69,10 +70,10 @@ def _points_on(triangles: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def _part_ends(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ends of equal parts into which things are divided.
+    """Returns the ends of the equal parts into which N segments are divided.
 
-    Thing k has counts[k] parts. The ends are two arrays: the number of the
-    thing (M,), and the position of the end on it, from 0 to 1 (M,).
+    Segment k has counts[k] parts. The ends are two arrays: the number of the
+    segment (M,), and the position of the end on it, from 0 to 1 (M,).
     """
     owner = np.repeat(np.arange(len(counts)), counts + 1)
     first = np.cumsum(counts + 1) - counts - 1
