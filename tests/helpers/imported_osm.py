@@ -7,7 +7,7 @@ from cns_drake.imports.openstreetmap.city import import_openstreetmap
 
 def import_osm(path, year_attribute=None):
     city = import_openstreetmap(path, year_attribute)
-    return city, {one.structure.name: one for one in city.structures}
+    return city, {one.structure.name: one for one in city.objects}
 
 
 def bounds(one):
