@@ -18,6 +18,7 @@ from cns_drake.city.facades import (
     balconies,
     bays,
     equip_roof,
+    foot_band,
     outlines,
     tiers,
 )
@@ -25,6 +26,18 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # Room for balconies in front, and for canopies [m].
 _FRONT_M = 1.7
+# Length of front for each section, which has a stair of its own [m].
+_SECTION_M = 18.0
+# Height of everything above the topmost storey: roof and stair house [m].
+_TOP_M = 1.9
+# Height of the walls above the topmost storey of a section [m].
+_RIM_M = 0.9
+# Distance of the bays from the ends of a wall [m].
+_END_M = 0.5
+# Side walls longer than this have rows of windows instead of one window [m].
+_LONG_SIDE_M = 15.0
+# Half the width of the canopy over a door, and of a stair tower [m].
+_STAIR_HALF_M = 1.5
 
 
 class BalconyFlats(Building):
@@ -37,7 +50,7 @@ class BalconyFlats(Building):
         # Distance by which every other section stands back.
         self.stagger = self.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
         # Number of sections of the slab, each with its own stair.
-        self.sections = min(max(round(site.width / 18.0), 1), 3)
+        self.sections = min(max(round(site.width / _SECTION_M), 1), 3)
         # Number of storeys by which every other section is lower.
         self.step = self.whole(0, 2)
         self.depth = round(
@@ -66,68 +79,97 @@ class BalconyFlats(Building):
         """
         sections = _sections(self, self.site)
         plan, fronts = _outline(sections)
-        storeys = max(2, round((self.height - 1.9) / self.storey))
+        body = self.height - _TOP_M
+        storeys = max(2, round(body / self.storey))
         lower = self.step if self.sections > 1 and storeys > 3 else 0
-        storey = (self.height - 1.9) / storeys
+        storey = body / storeys
         walls = [_Front(self, plan, edge) for edge in fronts]
         ground = _storey_walls(self, storey, walls, ground=True)
         top = tiers.add_ground(self, plan, ground)
-        count, per_group, exact = tiers.storey_groups(
+        # The storeys that all sections have.
+        common = tiers.storey_groups(
             (storeys - 1 - lower) * storey, storey=storey, most=5
         )
-        facade = _storey_walls(self, exact, walls)
+        facade = _storey_walls(self, common.storey, walls)
         top = tiers.add_storeys(
-            self, plan, facade, z0=top, groups=count, per_group=per_group
-        )
-        common = count * per_group
-        _add_balconies(
             self,
-            walls,
-            ground.height,
-            tiers.StoreyGroups(count, per_group, exact),
+            plan,
+            facade,
+            z0=top,
+            groups=common.groups,
+            per_group=common.per_group,
         )
+        _add_balconies(self, walls, ground.height, common)
         for k, section in enumerate(sections):
-            part = f"section_{k}"
-            high = top
+            eaves = top
             if lower and k % 2 == 0:
-                rows = bays.rhythm(
-                    self.pitch, [_window(self, exact)], margin=0.5
+                eaves = _add_upper_storeys(
+                    self, k, section, top, common.storey, lower
                 )
-                attic = Facade(
-                    exact, bands=(), layout=rows, glass=(self.recess,)
-                )
-                high = tiers.add_storeys(
-                    self,
-                    section,
-                    attic,
-                    z0=top,
-                    groups=1,
-                    per_group=lower,
-                    part=f"{part}_storey",
-                )
-            rim = Facade(
-                0.9,
-                bands=(
-                    Band(z0=0.0, z1=0.15, depth=-0.08),
-                    Band(z0=0.75, z1=0.9, depth=-0.08),
-                ),
-            )
-            roof = tiers.add_crown(
-                self,
-                section,
-                rim,
-                z0=high,
-                parapet=0.6,
-                part=f"{part}_crown",
-                thickness=0.25,
-            )
-            items = self.roof_items[k :: self.sections]
-            equip_roof(self, section, roof, items, prefix=f"{part}_")
-        high = ground.height + common * exact
+            _add_section_roof(self, k, section, eaves)
+        high = ground.height + common.num_storeys * common.storey
         stairs = []
         for k, wall in enumerate(walls):
             stairs += _stair(self, wall, high, k == 0)
         self.add("stairs", *stairs, finish=self.colours["rail"])
+
+
+def _add_upper_storeys(
+    flats: BalconyFlats,
+    number: int,
+    section: np.ndarray,
+    z0: float,
+    storey: float,
+    count: int,
+) -> float:
+    """Adds storeys that only one section has; returns their top [m].
+
+    Args:
+        flats: the building.
+        number: number of the section.
+        section: outline (4, 2) of the section [m].
+        z0: height of the storeys' floor [m].
+        storey: height of a storey [m].
+        count: number of storeys.
+    """
+    windows = [_window(flats, storey)]
+    rows = bays.rhythm(flats.pitch, windows, margin=_END_M)
+    walls = Facade(storey, layout=rows, glass=(flats.recess,))
+    return tiers.add_storeys(
+        flats,
+        section,
+        walls,
+        z0=z0,
+        groups=1,
+        per_group=count,
+        part=f"section_{number}_storey",
+    )
+
+
+def _add_section_roof(
+    flats: BalconyFlats, number: int, section: np.ndarray, z0: float
+) -> None:
+    """Adds the parapet and the roof of a section, and equipment on the roof.
+
+    `section` is the outline (4, 2) of the section `number` [m], and `z0` the
+    height of the parapet's foot [m].
+    """
+    part = f"section_{number}"
+    bands = (
+        foot_band(height=0.15, reach=0.08),
+        Band(z0=0.75, z1=_RIM_M, depth=-0.08),
+    )
+    roof = tiers.add_crown(
+        flats,
+        section,
+        Facade(_RIM_M, bands=bands),
+        z0=z0,
+        parapet=0.6,
+        part=f"{part}_crown",
+        thickness=0.25,
+    )
+    items = flats.roof_items[number :: flats.sections]
+    equip_roof(flats, section, roof, items, prefix=f"{part}_")
 
 
 def _sections(flats: BalconyFlats, site: Site) -> list[np.ndarray]:
@@ -138,12 +180,15 @@ def _sections(flats: BalconyFlats, site: Site) -> list[np.ndarray]:
         y0 + _FRONT_M + flats.stagger * (k % 2) for k in range(flats.sections)
     ]
     return [
-        outlines.rectangle(a, round(y, 2), b, round(y + flats.depth, 2))
-        for (a, b), y in zip(itertools.pairwise(bounds), fronts, strict=True)
+        outlines.rectangle(left, round(y, 2), right, round(y + flats.depth, 2))
+        for (left, right), y in zip(
+            itertools.pairwise(bounds), fronts, strict=True
+        )
     ]
 
 
 def _window(flats: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
+    """Returns a bay with a window in a storey of the height `storey` [m]."""
     return bays.window(
         width=flats.window_width,
         sill=sill,
@@ -160,7 +205,8 @@ def _storey_walls(
     ground: bool = False,
 ) -> Facade:
     """Returns the walls of a storey, with doors and a plinth if `ground`."""
-    window, french = _window(flats, storey), _window(flats, storey, 0.12)
+    window = _window(flats, storey)
+    french_window = _window(flats, storey, sill=0.12)
     slit = bays.window(width=1.3, sill=0.3, head=storey, depth=flats.recess)
     door = bays.window(
         width=1.6, sill=0.0, head=2.3, depth=flats.recess, mullions=1
@@ -170,11 +216,11 @@ def _storey_walls(
         bays.window(width=1.0, sill=1.0, head=storey - 0.5, depth=flats.recess),
         width=2.0,
     )
-    rows = bays.rhythm(flats.pitch, [window], margin=0.5)
+    rows = bays.rhythm(flats.pitch, [window], margin=_END_M)
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
         if edge not in by_front:
-            return (rows if length > 15.0 else blank)(edge, length)
+            return (rows if length > _LONG_SIDE_M else blank)(edge, length)
         front = by_front[edge]
         relief: list[Relief] = []
         for k, (a, b) in enumerate(front.cells):
@@ -185,13 +231,13 @@ def _storey_walls(
                     relief += slit(a, b)
             else:
                 has_balcony = k in front.spots and not ground
-                relief += (french if has_balcony else window)(a, b)
+                relief += (french_window if has_balcony else window)(a, b)
         return relief
 
     band = (
-        Band(z0=0.0, z1=0.35, depth=-0.06)
+        foot_band(height=0.35, reach=0.06)
         if ground
-        else Band(z0=0.0, z1=0.12, depth=-0.04)
+        else foot_band(height=0.12, reach=0.04)
     )
     return Facade(
         round(storey, 3), bands=(band,), layout=layout, glass=(flats.recess,)
@@ -214,9 +260,12 @@ def _add_balconies(
             if not joined:
                 width = min(width, flats.balcony_width)
             x = (a + b) / 2
-            ends = round(x - width / 2, 2), round(x + width / 2, 2)
             balcony = balconies.balcony(
-                *ends, flats.balcony_reach, 0.0, flats.rail
+                x0=round(x - width / 2, 2),
+                x1=round(x + width / 2, 2),
+                reach=flats.balcony_reach,
+                z=0.0,
+                rail=flats.rail,
             )
             pieces += [
                 front.wall.place(balcony, k * storey) for k in range(per_group)
@@ -244,26 +293,25 @@ def _stair(
     """
     x, wall = front.stair, front.wall
     pieces = [
-        wall.box(x=around(x, 1.5), y=(-0.05, 1.4), z=(2.55, 2.75)),
+        wall.box(x=around(x, _STAIR_HALF_M), y=(-0.05, 1.4), z=(2.55, 2.75)),
         wall.standing(x=(x - 1.4, x - 1.25), y=(1.1, 1.25), z1=2.6),
         wall.standing(x=(x + 1.25, x + 1.4), y=(1.1, 1.25), z1=2.6),
     ]
     if flats.stair == "tower":
         high = flats.height if highest else top + 1.6
-        pieces.append(wall.box(x=around(x, 1.5), y=(-2.5, 0.9), z=(2.7, high)))
+        tower = wall.box(
+            x=around(x, _STAIR_HALF_M), y=(-2.5, 0.9), z=(2.7, high)
+        )
+        pieces.append(tower)
         for k in range(int((high - 4.2) / flats.storey)):
             z = 3.7 + k * flats.storey
-            pieces.append(
-                wall.box(x=around(x, 0.55), y=(0.85, 0.98), z=(z, z + 1.1))
-            )
+            frame = wall.box(x=around(x, 0.55), y=(0.85, 0.98), z=(z, z + 1.1))
+            pieces.append(frame)
     elif highest:
-        pieces.append(
-            wall.box(
-                x=around(x, 2.2),
-                y=(-5.0, -1.5),
-                z=(top - 0.1, flats.height),
-            )
+        house = wall.box(
+            x=around(x, 2.2), y=(-5.0, -1.5), z=(top - 0.1, flats.height)
         )
+        pieces.append(house)
     return pieces
 
 
@@ -284,7 +332,15 @@ def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
 
 
 class _Front:
-    """The front wall of a section, with the bays of stair and balconies."""
+    """The front wall of a section, with the bays of stair and balconies.
+
+    Attributes:
+        edge: number of the wall's edge in the outline of all sections.
+        wall: the wall.
+        cells: start and end of each bay along the wall [m].
+        middle: number of the stair's bay.
+        spots: numbers of the bays with balconies.
+    """
 
     def __init__(
         self, flats: BalconyFlats, plan: np.ndarray, edge: int
@@ -292,7 +348,7 @@ class _Front:
         self.edge = edge
         self.wall = WallFrame(plan, edge)
         self.cells = bays.stretches(
-            self.wall.length, pitch=flats.pitch, margin=0.5
+            self.wall.length, pitch=flats.pitch, margin=_END_M
         )
         self.middle = len(self.cells) // 2
         free = [k for k in range(len(self.cells)) if k != self.middle]

@@ -17,8 +17,26 @@ from cns_drake.city.facades import (
     piers,
     solids,
     tiers,
+    top_band,
 )
 from cns_drake.city.geometry import MeshShape, merge_meshes
+
+# Free strip between the widest storeys and the edge of the site [m].
+_MARGIN_M = 0.8
+# Least length of the chords of which round corners consist [m].
+_LEAST_CHORD_M = 2.8
+# Height of an open garden floor [m].
+_GARDEN_M = 3.4
+# Greatest number of parts of which all stacks together consist.
+_MOST_GROUPS = 12
+# Height of the walls above the topmost storey [m].
+_CROWN_M = 1.2
+# Depth of the glass of the lobby [m].
+_LOBBY_RECESS_M = 0.3
+# Walls of the lobby shorter than this are chords of a round corner [m].
+_CHORD_WALL_M = 4.5
+# Distance between the columns of a garden floor [m].
+_COLUMN_PITCH_M = 7.0
 
 
 class BandedTower(Building):
@@ -53,23 +71,15 @@ class BandedTower(Building):
 
         The building's site must be a rectangle.
         """
-        x0, y0, x1, y1 = self.site.bounds
-        base = outlines.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
-        step = max(2.8, 0.5 * self.radius)
-        outer = np.round(
-            outlines.rounded(
-                base, dict.fromkeys(self.corners, self.radius), step=step
-            ),
-            3,
-        )
+        outer = self._outline()
         inner = outlines.inset(
             outer, min(self.taper, 0.5 * outlines.inset_limit(outer))
         )
         z = _add_lobby(self, inner)
-        gap = 3.4
-        room = (self.height - 1.2 - z - gap * (self.stacks - 1)) / self.stacks
+        gardens = _GARDEN_M * (self.stacks - 1)
+        room = (self.height - _CROWN_M - z - gardens) / self.stacks
         counts = tiers.storey_groups(
-            room, storey=self.storey, most=12 // self.stacks
+            room, storey=self.storey, most=_MOST_GROUPS // self.stacks
         )
         plans = {"wide": outer, "slim": inner}
         shapes = [
@@ -80,7 +90,25 @@ class BandedTower(Building):
             plan, place = shapes[k % 2]
             z = place(z, k)
             if k + 1 < self.stacks:
-                z = _add_garden_floor(self, plan, inner, z, gap, k)
+                z = _add_garden_floor(self, plan, inner, z, k)
+        self._add_roof(plan, z)
+
+    def _outline(self) -> np.ndarray:
+        """Returns the outline (N, 2) of the widest storeys [m]."""
+        x0, y0, x1, y1 = self.site.bounds
+        base = outlines.rectangle(
+            x0 + _MARGIN_M, y0 + _MARGIN_M, x1 - _MARGIN_M, y1 - _MARGIN_M
+        )
+        radii = dict.fromkeys(self.corners, self.radius)
+        chord = max(_LEAST_CHORD_M, 0.5 * self.radius)
+        return np.round(outlines.rounded(base, radii, step=chord), 3)
+
+    def _add_roof(self, plan: np.ndarray, z: float) -> None:
+        """Adds the topmost walls over an outline, and the roof behind them.
+
+        `plan` contains the corners (N, 2) of the walls, and `z` is the height
+        of their foot [m].
+        """
         rim = round(self.height - z, 3)
         crown = Facade(
             rim,
@@ -94,21 +122,23 @@ class BandedTower(Building):
 
 def _add_lobby(tower: BandedTower, plan: np.ndarray) -> float:
     """Adds the glazed ground floor with its entrance; returns its top [m]."""
-    h = tower.lobby
-    pane = bays.ribbon(sill=0.2, head=h - 0.9, depth=0.3, post=0.16)
+    height = tower.lobby
+    pane = bays.ribbon(
+        sill=0.2, head=height - 0.9, depth=_LOBBY_RECESS_M, post=0.16
+    )
     # Long walls may meet at right angles, where their recesses must not touch.
     short, long = (bays.rhythm(3.2, [pane], margin=m) for m in (0.1, 0.45))
 
     def glazing(edge: int, length: float) -> Sequence[Relief]:
-        return (short if length < 4.5 else long)(edge, length)
+        return (short if length < _CHORD_WALL_M else long)(edge, length)
 
     door = bays.entrance(width=3.4, height=3.0, depth=1.2, surround=0.1)
     layout = bays.with_door(glazing, door, width=5.2)
     facade = Facade(
-        h,
-        bands=(Band(z0=h - 0.6, z1=h, depth=-0.15),),
+        height,
+        bands=(top_band(height, height=0.6, reach=0.15),),
         layout=layout,
-        glass=(0.3,),
+        glass=(_LOBBY_RECESS_M,),
     )
     half = min(3.5, max(1.2, WallFrame(plan, 0).length / 2 - 0.5))
     lid = canopies.front_canopy(plan, half=half, reach=2.0, z=3.5)
@@ -120,7 +150,6 @@ def _add_garden_floor(
     plan: np.ndarray,
     inner: np.ndarray,
     z0: float,
-    height: float,
     number: int,
 ) -> float:
     """Adds an open garden floor; returns its top [m].
@@ -128,6 +157,7 @@ def _add_garden_floor(
     It has columns around a smaller glazed core. Its slab has the outline
     `plan`; `inner` is the smallest outline of the storeys above.
     """
+    height = _GARDEN_M
     limit = outlines.inset_limit(inner)
     core = outlines.inset(inner, min(2.8, 0.6 * limit))
     walls = tiers.lidded_walls(
@@ -137,7 +167,7 @@ def _add_garden_floor(
     columns = []
     for edge in range(len(ring)):
         wall = WallFrame(ring, edge)
-        count = max(1, round(wall.length / 7.0))
+        count = max(1, round(wall.length / _COLUMN_PITCH_M))
         for k in range(count):
             spot = wall.point((k + 0.5) * wall.length / count, 0.0)
             shaft = outlines.regular_polygon(radius=0.3, count=8, center=spot)
@@ -161,7 +191,7 @@ def _stack_adder(
     bands = (
         Band(z0=0.0, z1=tower.spandrel, depth=0.0),
         Band(z0=tower.spandrel, z1=storey, depth=tower.recess),
-        Band(z0=storey - 0.2, z1=storey, depth=-tower.ledge),
+        top_band(storey, height=0.2, reach=tower.ledge),
     )
     facade = Facade(storey, bands=bands, glass=(tower.recess,)).stacked(
         per_group
@@ -182,7 +212,7 @@ def _stack_adder(
             )
         )
     height = round(groups * step, 3)
-    pane = outlines.inset(plan, tower.recess - 0.004)
+    pane = outlines.inset(plan, tower.recess - tiers.PANE_OVERLAP)
     meshes = {
         name: merge_meshes(*pieces),
         f"{name}_glass": solids.skirt(pane, pane, z0=0.0, z1=height),
@@ -193,6 +223,7 @@ def _stack_adder(
     )
 
     def place(z0: float, number: int) -> float:
+        """Adds the stack at the height `z0`; returns the top's height [m]."""
         at = (0.0, 0.0, z0)
         part = f"stack_{number}"
         tower.place(f"{part}_glass", glass, at, finish=tower.glass)

@@ -10,17 +10,33 @@ from cns_drake.city.facades import (
     around,
     bays,
     boards,
+    foot_band,
     free_stretches,
     outlines,
     solids,
     wing_roofs,
 )
-from cns_drake.city.facades.reliefs import Band, Patch
+from cns_drake.city.facades.reliefs import Patch
+from cns_drake.city.geometry.mesh import Mesh
 
 # Free strip around the walls, for eaves [m].
 _MARGIN_M = 0.5
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.15
+# Least width of a lean-to [m].
+_LEAST_AISLE_M = 1.5
+# Part of the ridge along which ventilators stand.
+_VENTILATED_RIDGE = 0.8
+# Height of a ventilator above the ridge [m].
+_VENTILATOR_M = 0.7
+# Half the side of a ventilator's square shaft [m].
+_VENTILATOR_HALF_M = 0.45
+# Width of the boards of a door's frame [m].
+_FRAME_M = 0.18
+# Height of the foot of a door [m].
+_DOOR_FOOT_M = 0.08
+# Half the width of a batten [m].
+_BATTEN_HALF_M = 0.05
 
 
 class Barn(Building):
@@ -55,32 +71,42 @@ class Barn(Building):
         left, right = x0 + _MARGIN_M, x1 - _MARGIN_M
         front = y0 + _MARGIN_M + self.deck
         back = y1 - _MARGIN_M
-        a, b, low, high = left, right, front, back
-        if along_y:
-            a += self.aisle * self.aisle_left
-            b -= self.aisle * (not self.aisle_left)
-        else:
-            high -= self.aisle
-        top = self.height - (0.7 if self.ventilators else 0.0)
-        half = ((b - a) if along_y else (high - low)) / 2
-        wall_top = max(2.3, self.wall * top)
-        eaves = 0.35
-        if self.roof == "barrel":
-            # A vault is at most half a circle.
-            eaves = 0.0
-            wall_top = max(wall_top, top - 0.8 * half)
-        roof = Roof(
-            self.roof, along_y=along_y, eaves=eaves, verge=0.35, thickness=0.18
-        )
-        main = Wing.at((a, low, b, high), wall_top=wall_top, top=top, roof=roof)
+        main = self._main_wing(along_y, (left, front, right, back))
         boxes = [main]
-        if self.aisle > 1.5:
-            boxes.append(_lean_to(self, main, (left, right, back)))
+        if self.aisle > _LEAST_AISLE_M:
+            boxes.append(_lean_to(self, main, left, right, back))
         for wing in boxes:
             _add_box(self, wing, boxes)
         _add_ventilators(self, main)
         if self.deck > 0:
             _add_jetty(self, (left, right), y0, front)
+
+    def _main_wing(self, along_y: bool, area: outlines.Area) -> Wing:
+        """Returns the main box of the barn, without the lean-to.
+
+        Args:
+            along_y: whether the ridge runs from the front to the back.
+            area: ground of the main box and the lean-to together [m].
+        """
+        x0, y0, x1, y1 = area
+        if not along_y:
+            y1 -= self.aisle
+        elif self.aisle_left:
+            x0 += self.aisle
+        else:
+            x1 -= self.aisle
+        top = self.height - (_VENTILATOR_M if self.ventilators else 0.0)
+        half_span = ((x1 - x0) if along_y else (y1 - y0)) / 2
+        wall_top = max(2.3, self.wall * top)
+        eaves = 0.35
+        if self.roof == "barrel":
+            # A vault is at most half a circle.
+            eaves = 0.0
+            wall_top = max(wall_top, top - 0.8 * half_span)
+        roof = Roof(
+            self.roof, along_y=along_y, eaves=eaves, verge=0.35, thickness=0.18
+        )
+        return Wing.at((x0, y0, x1, y1), wall_top=wall_top, top=top, roof=roof)
 
 
 def _add_box(barn: Barn, wing: Wing, boxes: list[Wing]) -> None:
@@ -97,17 +123,24 @@ def _add_box(barn: Barn, wing: Wing, boxes: list[Wing]) -> None:
         width=1.0, z0=low, z1=low + 1.3, depth=_RECESS_M
     )
     openings.enclose(
-        (_RECESS_M,), bands=(Band(z0=0.0, z1=0.3, depth=-0.06),), attic=attic
+        (_RECESS_M,), bands=(foot_band(height=0.3, reach=0.06),), attic=attic
     )
     for edge in range(4):
         _add_battens(barn, wing, boxes, openings, edge)
 
 
 def _lean_to(
-    barn: Barn, main: Wing, limits: tuple[float, float, float]
+    barn: Barn, main: Wing, left: float, right: float, back: float
 ) -> Wing:
-    """Returns the lean-to against the long side of the barn."""
-    left, right, back = limits
+    """Returns the lean-to against the long side of the barn.
+
+    Args:
+        barn: the barn.
+        main: its main box.
+        left: least x of the barn and the lean-to [m].
+        right: greatest x of the barn and the lean-to [m].
+        back: greatest y of the barn and the lean-to [m].
+    """
     along_y = main.roof.along_y
     high = main.wall_top + 0.1
     low = max(1.9, high - 0.3 * barn.aisle)
@@ -116,10 +149,10 @@ def _lean_to(
     # falls.
     area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
     if along_y:
-        a, b = main.x1 - 0.05, right
+        x0, x1 = main.x1 - 0.05, right
         if barn.aisle_left:
-            a, b = left, main.x0 + 0.05
-        area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
+            x0, x1 = left, main.x0 + 0.05
+        area = (x0, main.y0 + 0.8, x1, main.y1 - 0.8)
     falling = not (along_y and barn.aisle_left)
     roof = Roof(
         "shed",
@@ -148,24 +181,18 @@ def _add_doors(barn: Barn, wing: Wing, openings: Openings, edge: int) -> None:
         openings.replace_by_bay(
             edge, x=x, width=width + 0.4, bay=lambda a, b: [gap]
         )
-        spots = (x - width, x + width / 2 + 0.05)
-        half = width / 2 - 0.05
+        # A boat house stands open: the leaves are pushed apart.
+        starts = (x - width, x + width / 2 + 0.05)
+        leaf_width = width / 2 - 0.05
     else:
-        spots = (x - width / 2, x + 0.03)
-        half = width / 2 - 0.03
-    for a in spots:
-        b = a + half
-        brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
-        frame = [
-            boards.board(x0=a, x1=a + 0.18, z0=0.08, z1=height, reach=0.15),
-            boards.board(x0=b - 0.18, x1=b, z0=0.08, z1=height, reach=0.15),
-            boards.board(x0=a, x1=b, z0=height - 0.18, z1=height, reach=0.15),
-            boards.board(x0=a, x1=b, z0=0.08, z1=0.26, reach=0.15),
-            solids.beam(*brace, 0.1),
-        ]
-        leaf = boards.board(x0=a, x1=b, z0=0.08, z1=height, reach=0.1)
+        starts = (x - width / 2, x + 0.03)
+        leaf_width = width / 2 - 0.03
+    for x0 in starts:
+        x1 = x0 + leaf_width
+        leaf = boards.board(x0=x0, x1=x1, z0=_DOOR_FOOT_M, z1=height, reach=0.1)
+        frame = _door_frame(x0, x1, height)
         barn.add_to("doors", wall.place(leaf))
-        barn.add_to("trim", *(wall.place(m) for m in frame))
+        barn.add_to("trim", *(wall.place(piece) for piece in frame))
     barn.add_to(
         "trim",
         wall.box(
@@ -176,47 +203,73 @@ def _add_doors(barn: Barn, wing: Wing, openings: Openings, edge: int) -> None:
     )
 
 
+def _door_frame(x0: float, x1: float, height: float) -> list[Mesh]:
+    """Returns the boards on a door leaf: a frame and a brace across it.
+
+    The meshes are in wall coordinates. The leaf extends from `x0` to `x1` along
+    the wall, and up to `height` [m].
+    """
+    low = _DOOR_FOOT_M
+    left = (x0, x0 + _FRAME_M, low, height)
+    right = (x1 - _FRAME_M, x1, low, height)
+    top = (x0, x1, height - _FRAME_M, height)
+    bottom = (x0, x1, low, 0.26)
+    frame = [
+        boards.board(*limits, reach=0.15)
+        for limits in (left, right, top, bottom)
+    ]
+    brace = solids.beam(
+        (x0 + 0.1, 0.1, 0.2), (x1 - 0.1, 0.1, height - 0.1), width=0.1
+    )
+    return [*frame, brace]
+
+
 def _add_battens(
     barn: Barn, wing: Wing, boxes: list[Wing], openings: Openings, edge: int
 ) -> None:
     """Adds upright battens on the free parts of a wall between openings."""
     wall = wing.wall(edge)
     reliefs = openings.layout(edge, wall.length)
-    for a, b in free_stretches(wing, edge, boxes, z=0.5):
-        for x, _ in bays.stretches(b - a, pitch=barn.batten, margin=0.12):
-            u = a + x
-            if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
+    half = _BATTEN_HALF_M
+    for start, end in free_stretches(wing, edge, boxes, z=0.5):
+        spots = bays.stretches(end - start, pitch=barn.batten, margin=0.12)
+        for offset, _ in spots:
+            x = start + offset
+            if any(r.x0 - 0.15 < x < r.x1 + 0.15 for r in reliefs):
                 continue
-            strip = boards.board(
-                x0=u - 0.05, x1=u + 0.05, z0=0.3, z1=wing.wall_top, reach=0.05
+            batten = boards.board(
+                x0=x - half, x1=x + half, z0=0.3, z1=wing.wall_top, reach=0.05
             )
-            barn.add_to("walls", wall.place(strip))
+            barn.add_to("walls", wall.place(batten))
 
 
 def _add_ventilators(barn: Barn, main: Wing) -> None:
     """Adds louvred ventilators on the ridge."""
-    z = main.top
+    ridge = main.top
     for k in range(barn.ventilators):
         share = (k + 0.5) / barn.ventilators - 0.5
         x, y = main.center
         if main.roof.along_y:
-            y += 0.8 * share * main.depth
+            y += _VENTILATED_RIDGE * share * main.depth
         else:
-            x += 0.8 * share * main.width
-        barn.add_to(
-            "walls", solids.post(x, y, half=0.45, z1=z + 0.3, z0=z - 0.6)
+            x += _VENTILATED_RIDGE * share * main.width
+        eaves = ridge + 0.3
+        shaft = solids.post(
+            x, y, half=_VENTILATOR_HALF_M, z1=eaves, z0=ridge - 0.6
         )
-        eaves = outlines.square(x, y, half=0.65)
-        barn.add_to("roof", solids.tent(eaves, (x, y), z0=z + 0.3, z1=z + 0.7))
+        outline = outlines.square(x, y, half=0.65)
+        lid = solids.tent(outline, (x, y), z0=eaves, z1=ridge + _VENTILATOR_M)
+        barn.add_to("walls", shaft)
+        barn.add_to("roof", lid)
 
 
 def _add_jetty(barn: Barn, xs: bays.Span, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
-    a, b = xs
+    left, right = xs
     y = y0 + 0.1
-    barn.add_to("doors", solids.box(x=(a, b), y=(y, front), z=(0.05, 0.3)))
-    for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
-        barn.add_to(
-            "doors",
-            solids.standing(x=around(x, 0.12), y=(y + 0.02, y + 0.26), z1=1.1),
+    barn.add_to("doors", solids.box(x=xs, y=(y, front), z=(0.05, 0.3)))
+    for x in np.linspace(left + 0.2, right - 0.2, 4).tolist():
+        post = solids.standing(
+            x=around(x, 0.12), y=(y + 0.02, y + 0.26), z1=1.1
         )
+        barn.add_to("doors", post)

@@ -7,13 +7,30 @@ from cns_drake.city.facades import (
     WallFrame,
     bays,
     canopies,
+    foot_band,
     piers,
     tiers,
 )
 from cns_drake.city.geometry import Finish
 
+# Greatest number of windows beside one another around the whole block.
+_MOST_BAYS = 46
+# Part of the crown below the parapet: the frieze and its cornice [m].
+_FRIEZE_M = 1.4
+# Distance of the outermost windows and pilasters from a corner [m].
+_END_M = 0.9
+# How far the details of windows (ledges and hoods) protrude [m].
+_DETAIL_REACH_M = 0.12
+# Depth of the shop windows [m].
+_SHOP_RECESS_M = 0.35
+# Width of the stretch of the front for the door [m].
+_DOOR_BAY_M = 3.4
 # Taller houses have their fire stairs inside.
 _MOST_FLIGHTS = 8
+# Shorter walls have no fire stairs [m].
+_LEAST_STAIRS_WALL_M = 9.0
+# Distance of the middle of the fire stairs from the corners [m].
+_STAIRS_END_M = 2.8
 # Height of the shared mesh of fire stairs, which is scaled to the storey [m].
 _FIRE_STAIRS_STOREY_M = 3.4
 # Finish of fire stairs.
@@ -31,10 +48,9 @@ class BrickBlock(Building):
             k for k in range(1, len(site.outline)) if k not in site.blind_edges
         ]
         on_top = ["water_tower"] if self.chance(0.6) else []
-        # Details of the windows: 0 mullions, 1 transoms, 2 ledges, 3 hoods.
-        style = self.whole(0, 4)
+        detail = self.pick(("mullion", "transom", "ledge", "hood"))
         self.ground_height = self.uniform(4.0, 4.8, digits=2)
-        self.pitch = max(self.uniform(2.3, 3.4), site.open_length / 46)
+        self.pitch = max(self.uniform(2.3, 3.4), site.open_length / _MOST_BAYS)
         self.window_width = self.uniform(1.0, 1.6, digits=2)
         self.sill = self.uniform(0.75, 0.95, digits=2)
         self.head = self.uniform(2.4, 2.7, digits=2)
@@ -45,11 +61,12 @@ class BrickBlock(Building):
         self.parapet = self.uniform(0.7, 1.3, digits=2)
         self.stairs_edge = self.pick(free) if free else None
         self.stairs_at = self.uniform(0.3, 0.7)
-        self.mullions = 1 if style == 0 else 0
-        self.transom = 1.65 if style == 1 else None
-        self.ledge = 0.12 if style == 2 else 0.0
-        self.hood = 0.12 if style == 3 else 0.0
-        self.sill_course = 0.1 if style < 2 else 0.0
+        self.mullions = 1 if detail == "mullion" else 0
+        self.transom = 1.65 if detail == "transom" else None
+        self.ledge = _DETAIL_REACH_M if detail == "ledge" else 0.0
+        self.hood = _DETAIL_REACH_M if detail == "hood" else 0.0
+        # How far a band below the windows protrudes.
+        self.sill_course = 0.1 if detail in ("mullion", "transom") else 0.0
         self.roof_items = [
             *on_top,
             "stair_house",
@@ -60,105 +77,143 @@ class BrickBlock(Building):
 
     def build(self) -> None:
         """Adds all parts of the brick block on a site of any outline."""
-        outline, blind = self.site.outline, self.site.blind_edges
+        outline = self.site.outline
         bottom = _add_shops(self)
-        room = self.height - self.ground_height - (self.parapet + 1.4)
-        groups, per_group, storey = tiers.storey_groups(
-            room, storey=self.storey_height
-        )
-        sash = bays.window(
-            width=self.window_width,
-            sill=self.sill,
-            head=min(self.head, storey - 0.5),
-            depth=self.recess,
-            mullions=self.mullions,
-            transom=self.transom,
-            ledge=self.ledge,
-            hood=self.hood,
-        )
-        layout = bays.rhythm(self.pitch, [sash], margin=0.9)
-        course = Band(z0=self.sill - 0.2, z1=self.sill, depth=-self.sill_course)
-        walls = Facade(
-            storey,
-            bands=(course,),
-            layout=layout,
-            glass=(self.recess,),
-            plain=blind,
+        frieze = self.parapet + _FRIEZE_M
+        storeys = tiers.storey_groups(
+            self.height - self.ground_height - frieze,
+            storey=self.storey_height,
         )
         top = tiers.add_storeys(
-            self, outline, walls, z0=bottom, groups=groups, per_group=per_group
-        )
-        if self.pilasters:
-            strips = piers.pilasters(
-                outline,
-                pitch=self.pitch,
-                margin=0.9,
-                every=3,
-                width=0.5,
-                reach=0.2,
-                z0=bottom,
-                z1=top,
-                skip=blind,
-            )
-            self.add("pilasters", strips)
-        crown = round(self.height - top, 3)
-        corbel = bays.bar(
-            width=0.35, z0=0.0, z1=crown - self.parapet - 0.9, depth=-0.3
-        )
-        cornice = tiers.cornice(
-            height=crown - self.parapet, reach=self.cornice_reach
-        )
-        layout = bays.rhythm(
-            self.pitch, [corbel if self.corbels else bays.blank], margin=0.9
-        )
-        frieze = Facade(crown, bands=cornice, layout=layout, plain=blind)
-        tiers.add_crown(
             self,
             outline,
-            frieze,
-            z0=top,
-            parapet=self.parapet,
-            items=self.roof_items,
+            _storey_walls(self, storeys.storey),
+            z0=bottom,
+            groups=storeys.groups,
+            per_group=storeys.per_group,
         )
-        if self.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
+        if self.pilasters:
+            _add_pilasters(self, bottom, top)
+        _add_crown(self, top)
+        if (
+            self.stairs_edge is not None
+            and storeys.num_storeys <= _MOST_FLIGHTS
+        ):
             wall = WallFrame(outline, self.stairs_edge)
-            _add_fire_stairs(self, wall, bottom, storey, top)
+            _add_fire_stairs(self, wall, bottom, storeys.storey, top)
+
+
+def _storey_walls(block: BrickBlock, storey: float) -> Facade:
+    """Returns the walls of a storey of the height `storey` [m]."""
+    window = bays.window(
+        width=block.window_width,
+        sill=block.sill,
+        head=min(block.head, storey - 0.5),
+        depth=block.recess,
+        mullions=block.mullions,
+        transom=block.transom,
+        ledge=block.ledge,
+        hood=block.hood,
+    )
+    course = Band(z0=block.sill - 0.2, z1=block.sill, depth=-block.sill_course)
+    return Facade(
+        storey,
+        bands=(course,),
+        layout=bays.rhythm(block.pitch, [window], margin=_END_M),
+        glass=(block.recess,),
+        plain=block.site.blind_edges,
+    )
+
+
+def _add_pilasters(block: BrickBlock, z0: float, z1: float) -> None:
+    """Adds pilasters between every third pair of windows, from z0 to z1 [m]."""
+    strips = piers.pilasters(
+        block.site.outline,
+        pitch=block.pitch,
+        margin=_END_M,
+        every=3,
+        width=0.5,
+        reach=0.2,
+        z0=z0,
+        z1=z1,
+        skip=block.site.blind_edges,
+    )
+    block.add("pilasters", strips)
+
+
+def _add_crown(block: BrickBlock, z0: float) -> None:
+    """Adds the frieze with its cornice, and the roof behind the parapet."""
+    height = round(block.height - z0, 3)
+    eaves = height - block.parapet
+    corbel = bays.bar(width=0.35, z0=0.0, z1=eaves - 0.9, depth=-0.3)
+    bay = corbel if block.corbels else bays.blank
+    walls = Facade(
+        height,
+        bands=tiers.cornice(height=eaves, reach=block.cornice_reach),
+        layout=bays.rhythm(block.pitch, [bay], margin=_END_M),
+        plain=block.site.blind_edges,
+    )
+    tiers.add_crown(
+        block,
+        block.site.outline,
+        walls,
+        z0=z0,
+        parapet=block.parapet,
+        items=block.roof_items,
+    )
 
 
 def _add_shops(block: BrickBlock) -> float:
-    outline, h = block.site.outline, block.ground_height
-    front = WallFrame(outline, 0)
+    """Adds the ground floor with shops and awnings; returns its top [m].
+
+    Shops are in front; on a site that is not a rectangle, they are on all
+    sides.
+    """
+    outline, height = block.site.outline, block.ground_height
+    shop_pitch = 2 * block.pitch
     shops = bays.rhythm(
-        2 * block.pitch, [bays.shop_front(head=h - 1.1)], margin=0.6
+        shop_pitch,
+        [bays.shop_front(head=height - 1.1, depth=_SHOP_RECESS_M)],
+        margin=0.6,
     )
+    entrance = bays.entrance(width=1.8, height=3.0)
+    front = bays.with_middle(shops, entrance, width=_DOOR_BAY_M)
     window = bays.window(
         width=block.window_width, sill=1.4, head=2.9, depth=block.recess
     )
-    back = bays.rhythm(block.pitch, [window], margin=0.8)
-    entry = bays.with_middle(
-        shops, bays.entrance(width=1.8, height=3.0), width=3.4
+    flats = bays.rhythm(block.pitch, [window], margin=0.8)
+    walls = Facade(
+        height,
+        bands=(
+            foot_band(height=0.4, reach=0.08),
+            Band(z0=height - 1.0, z1=height - 0.1, depth=-0.15),
+        ),
+        layout=bays.by_edge({0: front}, shops if len(outline) > 4 else flats),
+        glass=(_SHOP_RECESS_M, block.recess),
+        plain=block.site.blind_edges,
     )
-    layout = bays.by_edge({0: entry}, shops if len(outline) > 4 else back)
-    bands = (
-        Band(z0=0.0, z1=0.4, depth=-0.08),
-        Band(z0=h - 1.0, z1=h - 0.1, depth=-0.15),
-    )
-    glass = (0.35, block.recess)
-    blind = block.site.blind_edges
-    middle = front.length / 2
-    cells = [
-        (a, b)
-        for a, b in bays.stretches(
-            front.length, pitch=2 * block.pitch, margin=0.6
-        )
-        if b < middle - 1.7 or a > middle + 1.7
+    _add_awnings(block, shop_pitch)
+    canopy = canopies.front_canopy(outline, half=1.5, reach=1.3, z=3.1)
+    return tiers.add_ground(block, outline, walls, extras=[canopy])
+
+
+def _add_awnings(block: BrickBlock, pitch: float) -> None:
+    """Adds awnings to some of the shops beside the door.
+
+    `pitch` is the approximate width of a shop [m].
+    """
+    front = WallFrame(block.site.outline, 0)
+    middle, half = front.length / 2, _DOOR_BAY_M / 2
+    shops = [
+        (start, end)
+        for start, end in bays.stretches(front.length, pitch=pitch, margin=0.6)
+        if end < middle - half or start > middle + half
     ]
-    shape = canopies.AwningShape(narrower=0.4, reach=1.2, z0=2.6, z1=h - 0.9)
-    shades = canopies.awnings(front, cells, block.rng, share=0.6, shape=shape)
-    canopies.add_awnings(block, shades)
-    roof = canopies.front_canopy(outline, half=1.5, reach=1.3, z=3.1)
-    ground = Facade(h, bands=bands, layout=layout, glass=glass, plain=blind)
-    return tiers.add_ground(block, outline, ground, extras=[roof])
+    shape = canopies.AwningShape(
+        narrower=0.4, reach=1.2, z0=2.6, z1=block.ground_height - 0.9
+    )
+    awnings = canopies.awnings(front, shops, block.rng, share=0.6, shape=shape)
+    canopies.add_awnings(block, awnings)
 
 
 def _add_fire_stairs(
@@ -168,9 +223,19 @@ def _add_fire_stairs(
     storey: float,
     top: float,
 ) -> None:
-    if wall.length < 9.0:
+    """Adds one flight of fire stairs to each storey except the lowest.
+
+    Args:
+        block: the building.
+        wall: the wall with the stairs.
+        bottom: height of the lowest flight [m].
+        storey: height of a storey [m].
+        top: height of the topmost storey's top [m].
+    """
+    if wall.length < _LEAST_STAIRS_WALL_M:
         return
-    x, y = wall.point(2.8 + block.stairs_at * (wall.length - 5.6), 0.0)
+    room = wall.length - 2 * _STAIRS_END_M
+    x, y = wall.point(_STAIRS_END_M + block.stairs_at * room, 0.0)
     scale = (1.0, 1.0, round(storey / _FIRE_STAIRS_STOREY_M, 3))
     shape = block.shared("fire_stairs_flight", scale)
     for k in range(round((top - bottom) / storey) - 1):

@@ -1,9 +1,10 @@
 """The corner store: a shop at a cut corner, with flats above."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Facade,
     WallFrame,
@@ -11,11 +12,42 @@ from cns_drake.city.facades import (
     bays,
     canopies,
     equip_roof,
+    foot_band,
     outlines,
     tiers,
+    top_band,
 )
 from cns_drake.city.facades.site import FRONT_LEFT, FRONT_RIGHT
 from cns_drake.city.geometry.mesh import Mesh
+
+# Greatest number of windows along the front and one side together.
+_MOST_BAYS = 20
+# Least height above the shop for a storey of flats [m].
+_LEAST_STOREY_M = 2.4
+# Height of the walls above the topmost storey, except at the corner [m].
+_RIM_M = 0.6
+# Depth of the shop windows [m].
+_SHOP_RECESS_M = 0.3
+# Distance of the bays from the ends of a wall [m].
+_END_M = 0.5
+# Number of walls: the four sides, and the cut corner.
+_WALLS = 5
+
+
+class _Walls(NamedTuple):
+    """The outline of the store, and the numbers of its walls.
+
+    Attributes:
+        plan: corners (5, 2) of the outline [m].
+        corner: number of the wall across the corner, which has the door.
+        shops: numbers of the two walls with shop windows beside the corner.
+        blind: numbers of the walls against a neighbour.
+    """
+
+    plan: np.ndarray
+    corner: int
+    shops: tuple[int, int]
+    blind: frozenset[int]
 
 
 class CornerStore(Building):
@@ -33,7 +65,8 @@ class CornerStore(Building):
         # Length taken off each edge at the corner.
         self.cut = round(min(self.uniform(2.0, 3.0), 0.3 * site.depth), 2)
         self.storey = self.uniform(2.9, 3.3)
-        self.pitch = max(self.uniform(2.2, 3.0), (site.width + site.depth) / 20)
+        least_pitch = (site.width + site.depth) / _MOST_BAYS
+        self.pitch = max(self.uniform(2.2, 3.0), least_pitch)
         self.window_width = self.uniform(1.0, 1.5, digits=2)
         self.recess = self.uniform(0.12, 0.25, digits=2)
         self.ledge = self.pick((0.0, 0.1))
@@ -49,38 +82,31 @@ class CornerStore(Building):
 
         The building's site must be a rectangle.
         """
-        site = self.site
-        if self.corner not in site.free_corners:
-            site = site.detached(self.kind.overhang)
-        rectangle = site.outline
-        plan, front = _cut_rectangle(self, rectangle)
-        blind = outlines.edges_on(plan, rectangle, site.blind_edges)
-        along = -1 if self.corner == FRONT_LEFT else 1
-        side = (front + along) % 5
-        top = _add_shop(self, plan, (0, front, side), blind)
-        room = self.height - (self.raised + 0.6) - top
-        if room > 2.4:
-            groups, per_group, storey = tiers.storey_groups(
-                room, storey=self.storey, most=4
-            )
-            head = min(2.3, storey - 0.35)
-            window = bays.window(
-                width=self.window_width,
-                sill=0.85,
-                head=head,
-                depth=self.recess,
-                ledge=self.ledge,
-            )
-            rows = bays.rhythm(self.pitch, [window], margin=0.5)
-            walls = Facade(
-                storey, bands=(), layout=rows, glass=(self.recess,), plain=blind
-            )
-            top = tiers.add_storeys(
-                self, plan, walls, z0=top, groups=groups, per_group=per_group
-            )
-        _add_parapet(self, plan, front, top, blind)
-        wall = WallFrame(plan, front)
-        self.add("sign", *_corner_sign(self, wall), finish=self.colours["sign"])
+        walls = _walls(self)
+        top = _add_shop(self, walls)
+        room = self.height - (self.raised + _RIM_M) - top
+        if room > _LEAST_STOREY_M:
+            top = _add_flats(self, walls, top, room)
+        _add_parapet(self, walls, top)
+        corner = WallFrame(walls.plan, walls.corner)
+        sign = _corner_sign(self, corner)
+        self.add("sign", *sign, finish=self.colours["sign"])
+
+
+def _walls(store: CornerStore) -> _Walls:
+    """Returns the outline of the store, and the numbers of its walls.
+
+    If the corner touches a neighbour, all walls stand back from neighbours.
+    """
+    site = store.site
+    if store.corner not in site.free_corners:
+        site = site.detached(store.kind.overhang)
+    rectangle = site.outline
+    plan, corner = _cut_rectangle(store, rectangle)
+    blind = outlines.edges_on(plan, rectangle, site.blind_edges)
+    along = -1 if store.corner == FRONT_LEFT else 1
+    side = (corner + along) % _WALLS
+    return _Walls(plan, corner, (0, side), blind)
 
 
 def _cut_rectangle(
@@ -93,95 +119,129 @@ def _cut_rectangle(
         that replaces the corner.
     """
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
-    c = store.cut
+    cut = store.cut
     if store.corner == FRONT_RIGHT:
-        points = [(x0, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1), (x0, y1)]
+        points = [(x0, y0), (x1 - cut, y0), (x1, y0 + cut), (x1, y1), (x0, y1)]
         return np.array(points), 1
-    points = [(x0 + c, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0 + c)]
+    points = [(x0 + cut, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0 + cut)]
     return np.array(points), 4
 
 
-def _add_shop(
-    store: CornerStore,
-    plan: np.ndarray,
-    streets: tuple[int, int, int],
-    blind: frozenset[int],
-) -> float:
-    h = store.ground
-    pitch = 2 * store.pitch
-    head = round(h - 1.0, 2)
-    front = streets[1]
-    shop = bays.shop_front(head=head, depth=0.3, door=False)
-    glazed = bays.rhythm(pitch, [shop], margin=0.5)
-    entry = bays.alone(
+def _add_shop(store: CornerStore, walls: _Walls) -> float:
+    """Adds the ground floor with its shop; returns the height of its top [m].
+
+    The door is in the wall across the corner. The two walls beside it have shop
+    windows, and the others have windows and gates.
+    """
+    height = store.ground
+    head = round(height - 1.0, 2)
+    shop_window = bays.shop_front(head=head, depth=_SHOP_RECESS_M, door=False)
+    shop = bays.rhythm(2 * store.pitch, [shop_window], margin=_END_M)
+    entrance = bays.alone(
         bays.entrance(width=1.6, height=2.4, depth=0.7, surround=0.1),
         width=store.cut,
     )
-    back = [
-        bays.window(width=1.2, sill=1.3, head=2.3, depth=0.3),
+    service = [
+        bays.window(width=1.2, sill=1.3, head=2.3, depth=_SHOP_RECESS_M),
         bays.gate(width=1.8, height=2.2),
     ]
-    layouts = dict.fromkeys(streets, glazed) | {front: entry}
-    layout = bays.by_edge(layouts, bays.rhythm(4.0, back, margin=0.7))
-    bands = (
-        Band(z0=0.0, z1=0.3, depth=-0.05),
-        Band(z0=h - 0.25, z1=h, depth=-0.12),
+    layouts = dict.fromkeys(walls.shops, shop) | {walls.corner: entrance}
+    facade = Facade(
+        height,
+        bands=(
+            foot_band(height=0.3, reach=0.05),
+            top_band(height, height=0.25, reach=0.12),
+        ),
+        layout=bays.by_edge(layouts, bays.rhythm(4.0, service, margin=0.7)),
+        glass=(_SHOP_RECESS_M,),
+        plain=walls.blind,
     )
-    shades, boards = [], []
-    for edge in streets:
-        wall = WallFrame(plan, edge)
-        if edge == front or edge in blind:
-            continue
-        cells = bays.stretches(wall.length, pitch=pitch, margin=0.5)
-        for a, b in cells:
-            boards.append(
-                wall.box(
-                    x=(a + 0.3, b - 0.3),
-                    y=(-0.02, 0.1),
-                    z=(head + 0.1, head + 0.7),
-                )
-            )
-        shape = canopies.AwningShape(
-            narrower=0.2, reach=0.95, z0=2.4, z1=head + 0.05
-        )
-        shades += canopies.awnings(
-            wall, cells, store.rng, share=store.awnings, shape=shape
-        )
-    canopies.add_awnings(store, shades)
-    store.add("boards", *boards, finish=store.colours["sign"])
-    return tiers.add_ground(
-        store,
-        plan,
-        Facade(h, bands=bands, layout=layout, glass=(0.3,), plain=blind),
-    )
+    _add_awnings_and_boards(store, walls, head)
+    return tiers.add_ground(store, walls.plan, facade)
 
 
-def _add_parapet(
-    store: CornerStore,
-    plan: np.ndarray,
-    front: int,
-    z0: float,
-    blind: frozenset[int],
+def _add_awnings_and_boards(
+    store: CornerStore, walls: _Walls, head: float
 ) -> None:
-    """Adds the cornice and the roof; the parapet is higher at the corner."""
+    """Adds a board above each shop window, and awnings to some of them.
+
+    `head` is the height of the tops of the shop windows [m].
+    """
+    shape = canopies.AwningShape(
+        narrower=0.2, reach=0.95, z0=2.4, z1=head + 0.05
+    )
+    awnings, boards = [], []
+    for edge in walls.shops:
+        if edge in walls.blind:
+            continue
+        wall = WallFrame(walls.plan, edge)
+        windows = bays.stretches(
+            wall.length, pitch=2 * store.pitch, margin=_END_M
+        )
+        for start, end in windows:
+            board = wall.box(
+                x=(start + 0.3, end - 0.3),
+                y=(-0.02, 0.1),
+                z=(head + 0.1, head + 0.7),
+            )
+            boards.append(board)
+        awnings += canopies.awnings(
+            wall, windows, store.rng, share=store.awnings, shape=shape
+        )
+    canopies.add_awnings(store, awnings)
+    store.add("boards", *boards, finish=store.colours["sign"])
+
+
+def _add_flats(
+    store: CornerStore, walls: _Walls, z0: float, room: float
+) -> float:
+    """Adds the storeys above the shop; returns the height of their top [m].
+
+    `z0` is the height of their floor, and `room` the height of all storeys
+    together [m].
+    """
+    groups, per_group, storey = tiers.storey_groups(
+        room, storey=store.storey, most=4
+    )
+    window = bays.window(
+        width=store.window_width,
+        sill=0.85,
+        head=min(2.3, storey - 0.35),
+        depth=store.recess,
+        ledge=store.ledge,
+    )
+    facade = Facade(
+        storey,
+        layout=bays.rhythm(store.pitch, [window], margin=_END_M),
+        glass=(store.recess,),
+        plain=walls.blind,
+    )
+    return tiers.add_storeys(
+        store, walls.plan, facade, z0=z0, groups=groups, per_group=per_group
+    )
+
+
+def _add_parapet(store: CornerStore, walls: _Walls, z0: float) -> None:
+    """Adds the cornice and the roof; the parapet is higher at the corner.
+
+    `z0` is the height of the foot of the topmost walls [m].
+    """
     rim = round(store.height - store.raised - z0, 3)
-    bands = tiers.cornice(
+    cornice = tiers.cornice(
         height=rim - 0.1, reach=store.cornice, thickness=0.45, steps=2
     )
-    crown = Facade(rim, bands=bands, plain=blind)
+    crown = Facade(rim, bands=cornice, plain=walls.blind)
     roof = tiers.add_crown(
-        store, plan, crown, z0=z0, parapet=0.5, thickness=0.25
+        store, walls.plan, crown, z0=z0, parapet=0.5, thickness=0.25
     )
-    wall = WallFrame(plan, front)
-    store.add(
-        "pediment",
-        wall.box(
-            x=(0.1, wall.length - 0.1),
-            y=(-0.25, 0.04),
-            z=(z0 + rim - 0.3, store.height),
-        ),
+    corner = WallFrame(walls.plan, walls.corner)
+    pediment = corner.box(
+        x=(0.1, corner.length - 0.1),
+        y=(-0.25, 0.04),
+        z=(z0 + rim - 0.3, store.height),
     )
-    equip_roof(store, plan, roof, store.roof_items)
+    store.add("pediment", pediment)
+    equip_roof(store, walls.plan, roof, store.roof_items)
 
 
 def _corner_sign(store: CornerStore, wall: WallFrame) -> list[Mesh]:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from cns_drake.city.buildings.house_heights import ROOF_M, STOREY_M
 from cns_drake.city.facades import (
-    Band,
     Building,
     Openings,
     Roof,
     Wing,
+    foot_band,
     wing_openings,
     wing_roofs,
 )
@@ -70,7 +70,7 @@ def add_walls_and_roof(
     """
     wing_openings.add_casings(openings, (0,), house.casing)
     bands = (
-        (Band(z0=0.0, z1=house.floor, depth=-0.04),) if house.floor > 0 else ()
+        (foot_band(height=house.floor, reach=0.04),) if house.floor > 0 else ()
     )
     low = wing.wall_top + 0.4
     attic = wing_roofs.attic_window(

@@ -13,9 +13,11 @@ from cns_drake.city.facades import (
     around,
     balconies,
     bays,
+    foot_band,
     outlines,
     solids,
     tiers,
+    top_band,
 )
 from cns_drake.city.geometry.mesh import merge_meshes
 
@@ -100,8 +102,8 @@ def _add_ground(flats: GalleryFlats, slab: np.ndarray) -> float:
     front = bays.with_middle(rows, hall, width=5.0)
     layout = bays.by_edge({0: front, 2: rows}, bays.plain)
     bands = (
-        Band(z0=0.0, z1=0.4, depth=-0.05),
-        Band(z0=h - 0.2, z1=h, depth=-0.1),
+        foot_band(height=0.4, reach=0.05),
+        top_band(h, height=0.2, reach=0.1),
     )
     return tiers.add_ground(
         flats,

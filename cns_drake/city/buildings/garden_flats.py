@@ -8,7 +8,6 @@ from cns_drake.city.buildings.house_heights import (
     wall_top_for,
 )
 from cns_drake.city.facades import (
-    Band,
     Building,
     Openings,
     Roof,
@@ -17,6 +16,8 @@ from cns_drake.city.facades import (
     around,
     balconies,
     bays,
+    foot_band,
+    top_band,
     wing_openings,
     wing_roofs,
 )
@@ -131,8 +132,8 @@ def _add_house(
     wing_openings.add_casings(openings, (0,), flats.casing)
     z = round(_FLOOR_M + storey, 2)
     bands = (
-        Band(z0=0.0, z1=_FLOOR_M, depth=-0.05),
-        Band(z0=z - 0.2, z1=z, depth=-0.05),
+        foot_band(height=_FLOOR_M, reach=0.05),
+        top_band(z, height=0.2, reach=0.05),
     )
     low = wing.wall_top + 0.4
     attic = wing_roofs.attic_window(

@@ -3,13 +3,13 @@
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Openings,
     Wing,
     around,
     bays,
     equip_roof,
+    foot_band,
     outlines,
     roofs,
     solids,
@@ -161,7 +161,7 @@ def _add_shop(station: GasStation, xs: bays.Span, ys: bays.Span) -> None:
         pitch=4.5,
         choices=[bays.window(width=1.0, sill=1.6, head=2.3, depth=_RECESS_M)],
     )
-    openings.enclose((_RECESS_M,), bands=(Band(z0=0.0, z1=0.25, depth=-0.05),))
+    openings.enclose((_RECESS_M,), bands=(foot_band(height=0.25, reach=0.05),))
     station.add_to(
         "brand",
         shop.wall(0).box(

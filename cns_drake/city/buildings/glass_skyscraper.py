@@ -13,6 +13,7 @@ from cns_drake.city.facades import (
     piers,
     solids,
     tiers,
+    top_band,
 )
 
 # Equipment on the roof.
@@ -148,7 +149,7 @@ def _add_crown(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
         return
     if tower.crown == "stepped":
         low = round(0.45 * height, 2)
-        ledge = Facade(low, bands=(Band(z0=low - 0.5, z1=low, depth=-0.3),))
+        ledge = Facade(low, bands=(top_band(low, height=0.5, reach=0.3),))
         tiers.add_crown(
             tower, plan, ledge, z0=z0, parapet=1.0, part="crown_low"
         )

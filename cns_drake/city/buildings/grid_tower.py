@@ -11,6 +11,7 @@ from cns_drake.city.facades import (
     bays,
     canopies,
     equip_roof,
+    foot_band,
     outlines,
     solids,
     tiers,
@@ -71,7 +72,7 @@ class GridTower(Building):
         )
         louvres = bays.rhythm(self.pitch, [louvre], margin=self.margin)
         crown = Facade(
-            rim, bands=(Band(z0=0.0, z1=0.25, depth=-0.1),), layout=louvres
+            rim, bands=(foot_band(height=0.25, reach=0.1),), layout=louvres
         )
         roof = tiers.add_crown(
             self, plan, crown, z0=top, parapet=rim - 0.6, thickness=0.45

@@ -10,9 +10,11 @@ from cns_drake.city.facades import (
     around,
     balconies,
     bays,
+    foot_band,
     outlines,
     solids,
     tiers,
+    top_band,
 )
 from cns_drake.city.geometry import Finish
 
@@ -62,7 +64,7 @@ class Hotel(Building):
         edge = Facade(
             1.2,
             bands=(
-                Band(z0=0.0, z1=0.3, depth=-0.15),
+                foot_band(height=0.3, reach=0.15),
                 Band(z0=0.9, z1=1.2, depth=-0.2),
             ),
         )
@@ -89,7 +91,7 @@ def _add_lobby(hotel: Hotel, plan: np.ndarray, y0: float) -> float:
         glazing, bays.entrance(width=4.4, height=3.4, depth=1.5), width=6.4
     )
     bands = (
-        Band(z0=0.0, z1=0.4, depth=-0.1),
+        foot_band(height=0.4, reach=0.1),
         Band(z0=h - 0.8, z1=h - 0.3, depth=-0.4),
     )
     # The canopy of the drive stands on four pillars in the forecourt.
@@ -129,7 +131,7 @@ def _add_rooms(hotel: Hotel, plan: np.ndarray, z0: float, goal: float) -> float:
     front_rooms = {0: bays.rhythm(hotel.pitch, [french], margin=0.4)}
     others = bays.rhythm(hotel.side_pitch, [plain], margin=0.35)
     layout = bays.by_edge(front_rooms, others)
-    band = Band(z0=storey - 0.12, z1=storey, depth=-0.08)
+    band = top_band(storey, height=0.12, reach=0.08)
     walls = Facade(storey, bands=(band,), layout=layout, glass=(hotel.recess,))
     front = WallFrame(plan, 0)
     rails = []

@@ -3,7 +3,6 @@
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Openings,
     Patch,
@@ -13,6 +12,7 @@ from cns_drake.city.facades import (
     bays,
     boards,
     canopies,
+    foot_band,
     outlines,
     roofs,
     solids,
@@ -137,7 +137,7 @@ def _add_stall(kiosks: KioskRow, wing: Wing, boxes: list[Wing], k: int) -> None:
         x0=a, x1=b, z0=head + 0.02, z1=wing.wall_top - 0.02, reach=0.1
     )
     kiosks.add_to("awning", wall.place(sign))
-    bands = (Band(z0=0.0, z1=0.25, depth=-0.05),)
+    bands = (foot_band(height=0.25, reach=0.05),)
     openings.enclose((0.12,), bands=bands, material=material)
 
 

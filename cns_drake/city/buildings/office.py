@@ -10,8 +10,10 @@ from cns_drake.city.facades import (
     bays,
     canopies,
     equip_roof,
+    foot_band,
     outlines,
     tiers,
+    top_band,
 )
 
 
@@ -73,7 +75,7 @@ class Office(Building):
         rim = round(self.height - self.penthouse_height - top, 3)
         bands = (
             Band(z0=0.1, z1=0.4, depth=-0.2 if self.style == "ribbon" else 0.0),
-            Band(z0=rim - 0.3, z1=rim, depth=-0.35),
+            top_band(rim, height=0.3, reach=0.35),
         )
         edge = Facade(rim, bands=bands, plain=blind)
         roof = tiers.add_crown(
@@ -99,7 +101,7 @@ def _add_ground(office: Office) -> float:
     )
     layout = bays.by_edge({0: lobby}, shops if len(outline) > 4 else sides)
     bands = (
-        Band(z0=0.0, z1=0.35, depth=-0.06),
+        foot_band(height=0.35, reach=0.06),
         Band(z0=h - 0.9, z1=h - 0.1, depth=-0.15),
     )
     ground = Facade(
@@ -130,7 +132,7 @@ def _add_window_storeys(office: Office, z0: float, goal: float) -> float:
             sill=office.sill, head=head, depth=office.recess, post=0.12
         )
         cells = bays.rhythm(office.pitch, [pane], margin=0.8)
-        bands = (Band(z0=office.sill - 0.15, z1=office.sill, depth=-0.08),)
+        bands = (top_band(office.sill, height=0.15, reach=0.08),)
     else:
         frame = bays.window(
             width=office.pitch - 0.5,

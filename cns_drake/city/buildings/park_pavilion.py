@@ -6,7 +6,6 @@ import math
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Facade,
     WallFrame,
@@ -14,6 +13,7 @@ from cns_drake.city.facades import (
     around,
     bays,
     facade_mesh,
+    foot_band,
     glass_mesh,
     outlines,
     porches,
@@ -131,7 +131,7 @@ def _add_glazing(pavilion: ParkPavilion, plan: np.ndarray) -> None:
     )
     rows = bays.rhythm(2.0, [window], margin=0.1)
     layout = bays.by_edge({0: bays.alone(door, width=1.9)}, rows)
-    bands = (Band(z0=0.0, z1=0.15, depth=-0.05),)
+    bands = (foot_band(height=0.15, reach=0.05),)
     facade = Facade(
         round(pavilion.eaves - 0.2, 2),
         bands=bands,

@@ -12,6 +12,7 @@ from cns_drake.city.facades import (
     balconies,
     bays,
     canopies,
+    foot_band,
     outlines,
     solids,
     tiers,
@@ -111,7 +112,7 @@ def _add_shops(building: PodiumTower) -> float:
     service = bays.rhythm(pitch, gates, margin=1.0)
     layout = bays.by_edge({0: main, 2: service}, shops)
     bands = (
-        Band(z0=0.0, z1=0.3, depth=-0.06),
+        foot_band(height=0.3, reach=0.06),
         Band(z0=h - 1.1, z1=h - 0.2, depth=-0.2),
     )
     cells = bays.stretches(front.length, pitch=pitch, margin=0.8)
@@ -142,7 +143,7 @@ def _podium_storey(building: PodiumTower) -> Facade:
     layout = bays.rhythm(building.shop_pitch, [window], margin=0.8)
     return Facade(
         storey,
-        bands=(Band(z0=0.0, z1=0.25, depth=-0.12),),
+        bands=(foot_band(height=0.25, reach=0.12),),
         layout=layout,
         glass=(0.3,),
     )

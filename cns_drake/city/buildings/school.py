@@ -3,7 +3,6 @@
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Facade,
     Openings,
@@ -12,10 +11,12 @@ from cns_drake.city.facades import (
     Wing,
     around,
     bays,
+    foot_band,
     outlines,
     roofs,
     solids,
     tiers,
+    top_band,
 )
 
 # Free strip beside and behind the walls, for eaves [m].
@@ -102,7 +103,7 @@ def _add_classes(school: School, bar: np.ndarray) -> float:
     layout = bays.by_edge(layouts, bays.alone(small, width=2.4))
     walls = Facade(
         storey,
-        bands=(Band(z0=0.0, z1=0.3, depth=-0.06),),
+        bands=(foot_band(height=0.3, reach=0.06),),
         layout=layout,
         glass=(_RECESS_M,),
     )
@@ -117,7 +118,7 @@ def _add_classes(school: School, bar: np.ndarray) -> float:
         school.add("hip", roof, finish=school.colours["roof"])
         return top
     rim = 0.7
-    crown = Facade(rim, bands=(Band(z0=rim - 0.3, z1=rim, depth=-0.15),))
+    crown = Facade(rim, bands=(top_band(rim, height=0.3, reach=0.15),))
     tiers.add_crown(
         school, bar, crown, z0=top, parapet=0.5, items=school.roof_items
     )

@@ -3,7 +3,6 @@
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Openings,
     Roof,
@@ -11,6 +10,7 @@ from cns_drake.city.facades import (
     around,
     bays,
     equip_roof,
+    foot_band,
     wing_openings,
 )
 
@@ -115,7 +115,7 @@ def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
     openings.add_bays((2,), z=0.5, pitch=3.6, choices=back, margin=0.7)
     glass = (wing_openings.GLASS_M, *wing_openings.SHOP_GLASS_M)
     openings.enclose(
-        glass, bands=(Band(z0=0.0, z1=0.3, depth=-0.05),), material=cladding
+        glass, bands=(foot_band(height=0.3, reach=0.05),), material=cladding
     )
     if strip.canopy:
         z = strip.ground - 0.95

@@ -11,6 +11,7 @@ from cns_drake.city.facades import (
     WallFrame,
     around,
     bays,
+    foot_band,
     outlines,
     solids,
     tiers,
@@ -66,7 +67,7 @@ class SlabTower(Building):
             self, slab, walls, z0=top, groups=groups, per_group=per_group
         )
         bands = (
-            Band(z0=0.0, z1=0.25, depth=-0.12),
+            foot_band(height=0.25, reach=0.12),
             Band(z0=1.0, z1=_PARAPET_M, depth=-0.12),
         )
         crown = Facade(_PARAPET_M, bands=bands)
@@ -93,7 +94,7 @@ def _add_hall(block: SlabTower, slab: np.ndarray) -> float:
     layout = bays.by_edge({0: door, 2: door}, glazing)
     walls = Facade(
         h,
-        bands=(Band(z0=0.0, z1=0.5, depth=-0.1),),
+        bands=(foot_band(height=0.5, reach=0.1),),
         layout=layout,
         glass=(0.25,),
     )
@@ -131,7 +132,7 @@ def _storey_walls(block: SlabTower, storey: float) -> Facade:
     layout = bays.by_edge(layouts, slit)
     return Facade(
         storey,
-        bands=(Band(z0=0.0, z1=0.15, depth=-0.06),),
+        bands=(foot_band(height=0.15, reach=0.06),),
         layout=layout,
         glass=glass,
     )

@@ -8,12 +8,12 @@ from cns_drake.city.facades import (
     around,
     bays,
     equip_roof,
+    foot_band,
     free_stretches,
     outlines,
     roofs,
     solids,
 )
-from cns_drake.city.facades.reliefs import Band
 
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.2
@@ -146,7 +146,7 @@ def _add_hall(building: SportsHall, hall: Wing, halls: list[Wing]) -> None:
     openings.replace_by_bay(
         2, x=2.6, width=2.6, bay=bays.gate(width=1.9, height=2.3, depth=0.2)
     )
-    openings.enclose((_RECESS_M,), bands=(Band(z0=0.0, z1=0.5, depth=-0.08),))
+    openings.enclose((_RECESS_M,), bands=(foot_band(height=0.5, reach=0.08),))
     _add_frames(building, hall, halls)
 
 
@@ -189,7 +189,7 @@ def _add_annex(building: SportsHall, halls: list[Wing], y0: float) -> None:
         width=wide - 0.6, sill=0.05, head=h - 0.8, depth=_RECESS_M, mullions=3
     )
     openings.replace_by_bay(0, x=middle, width=wide, bay=glazing)
-    openings.enclose((_RECESS_M,), bands=(Band(z0=0.0, z1=0.3, depth=-0.05),))
+    openings.enclose((_RECESS_M,), bands=(foot_band(height=0.3, reach=0.05),))
     z = h - 0.65
     half = wide / 2 + 1.0
     building.add_to(

@@ -12,6 +12,7 @@ from cns_drake.city.facades import (
     around,
     bays,
     equip_roof,
+    foot_band,
     piers,
 )
 
@@ -87,7 +88,7 @@ class Supermarket(Building):
         ]
         openings.add_bays((2,), z=0.5, pitch=8.0, choices=service, margin=1.5)
         bands = (
-            Band(z0=0.0, z1=0.4, depth=-0.06),
+            foot_band(height=0.4, reach=0.06),
             Band(z0=self.eaves - 0.7, z1=self.eaves - 0.2, depth=-0.08),
         )
         openings.enclose((_RECESS_M,), bands=bands)

@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 
 from cns_drake.city.facades import (
-    Band,
     Building,
     Facade,
     WallFrame,
     around,
     bays,
     facade_mesh,
+    foot_band,
     glass_mesh,
     outlines,
     solids,
@@ -183,7 +183,7 @@ def _add_cladding(tower: UnfinishedTower, plan: np.ndarray) -> None:
     )
     facade = Facade(
         tower.storey,
-        bands=(Band(z0=0.0, z1=0.2, depth=-0.08),),
+        bands=(foot_band(height=0.2, reach=0.08),),
         layout=rows,
         glass=(0.2,),
     )

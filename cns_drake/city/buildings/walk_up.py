@@ -19,6 +19,7 @@ from cns_drake.city.facades import (
     porches,
     roofs,
     tiers,
+    top_band,
 )
 from cns_drake.city.geometry import Mesh
 
@@ -160,7 +161,7 @@ def _add_ground(
     layout = bays.by_edge({0: rows} | entries, others)
     bands = (
         Band(z0=flats.floor, z1=flats.floor + 0.12, depth=-0.08),
-        Band(z0=h - 0.2, z1=h, depth=-0.08),
+        top_band(h, height=0.2, reach=0.08),
     )
     pieces: list[Mesh] = []
     room = _FRONT_M - flats.bay_reach * (not stairs) - 0.05

@@ -9,12 +9,13 @@ from cns_drake.city.facades import (
     WallFrame,
     around,
     bays,
+    foot_band,
     outlines,
     piers,
     porches,
     solids,
+    top_band,
 )
-from cns_drake.city.facades.reliefs import Band
 from cns_drake.city.facades.walls import Facade, facade_mesh, glass_mesh
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
@@ -91,8 +92,8 @@ def _walls(hall: WaterfrontHall) -> Facade:
         layouts, bays.with_middle(rows, door, width=hall.pitch)
     )
     bands = (
-        Band(z0=0.0, z1=0.6, depth=-0.1),
-        Band(z0=hall.eaves - 0.5, z1=hall.eaves, depth=-0.3),
+        foot_band(height=0.6, reach=0.1),
+        top_band(hall.eaves, height=0.5, reach=0.3),
     )
     return Facade(
         hall.eaves, bands=bands, layout=layout, glass=(hall.window_depth,)

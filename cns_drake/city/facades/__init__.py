@@ -3,7 +3,14 @@
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.balconies import add_railing
 from cns_drake.city.facades.building import Building
-from cns_drake.city.facades.reliefs import Band, Patch, Relief, lifted
+from cns_drake.city.facades.reliefs import (
+    Band,
+    Patch,
+    Relief,
+    foot_band,
+    lifted,
+    top_band,
+)
 from cns_drake.city.facades.roof_equipment import add_chimney, equip_roof
 from cns_drake.city.facades.site import Site
 from cns_drake.city.facades.solids import around
@@ -36,8 +43,10 @@ __all__ = [
     "around",
     "equip_roof",
     "facade_mesh",
+    "foot_band",
     "free_stretches",
     "glass_mesh",
     "lifted",
     "single_wall",
+    "top_band",
 ]

@@ -22,6 +22,25 @@ class Band(NamedTuple):
     depth: float
 
 
+def foot_band(height: float, reach: float) -> Band:
+    """Returns the band at the foot of a wall, such as a plinth.
+
+    The band is `height` high, and protrudes by `reach` [m].
+    """
+    return Band(0.0, height, -reach)
+
+
+def top_band(wall_height: float, height: float, reach: float) -> Band:
+    """Returns the band at the top of a wall, such as a coping.
+
+    Args:
+        wall_height: height of the wall [m].
+        height: height of the band [m].
+        reach: how far the band protrudes [m].
+    """
+    return Band(wall_height - height, wall_height, -reach)
+
+
 class Patch(NamedTuple):
     """A rectangle of the wall, pushed in by `depth` [m].
 

@@ -18,7 +18,7 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # A pane reaches this far into the reveals in front of it, so that no ray passes
 # between them [m].
-_PANE_OVERLAP = 0.004
+PANE_OVERLAP = 0.004
 
 
 class StoreyGroups(NamedTuple):
@@ -33,6 +33,11 @@ class StoreyGroups(NamedTuple):
     groups: int
     per_group: int
     storey: float
+
+    @property
+    def num_storeys(self) -> int:
+        """Number of storeys in all groups together."""
+        return self.groups * self.per_group
 
 
 def storey_groups(height: float, storey: float, most: int = 10) -> StoreyGroups:
@@ -123,7 +128,7 @@ def add_storeys(
 def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
     """Returns one pane behind all walls except plain ones."""
     edges = range(len(np.asarray(outline)))
-    depth = facade.glass[0] - _PANE_OVERLAP
+    depth = facade.glass[0] - PANE_OVERLAP
     plan = outlines.inset(
         outline, [0.0 if k in facade.plain else depth for k in edges]
     )
