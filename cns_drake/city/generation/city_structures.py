@@ -50,7 +50,7 @@ class City(NamedTuple):
     cars: Mapping[str, float]
 
 
-class Streets(NamedTuple):
+class CityStreets(NamedTuple):
     """The streets along which a city is built; all areas are in W [m].
 
     Attributes:
@@ -113,7 +113,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         InputError: if the plan names something unknown, or something in the
             plan has no room.
     """
-    streets = Streets(
+    streets = CityStreets(
         areas=network.areas,
         surface=surface_heights.RoadSurface(network),
         kerb_height=kerb_height(network),
@@ -127,7 +127,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     return build_along(streets, plan, source)
 
 
-def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
+def build_along(streets: CityStreets, plan: CityPlan, source: str) -> City:
     """Returns a city along given streets.
 
     Args:

@@ -24,7 +24,7 @@ SHORTEST_PIECE = 1e-5
 
 def read_course(
     elements: Iterable[Element], name: str, faults: ImportFaults
-) -> list[road_model.Piece]:
+) -> list[road_model.CoursePiece]:
     """Returns the pieces of a road's course, in their order along the road.
 
     Args:
@@ -36,7 +36,7 @@ def read_course(
         ValueError: a piece has an impossible length or curve; the message names
             its line.
     """
-    found: list[road_model.Piece] = []
+    found: list[road_model.CoursePiece] = []
     for one in elements:
         length = one.number("length")
         if length < 0.0:
@@ -57,7 +57,7 @@ def read_course(
             prefix = "" if text.startswith("line") else at
             raise ValueError(prefix + text) from error
         s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
-        found.append(road_model.Piece(s, x, y, heading, length, shape))
+        found.append(road_model.CoursePiece(s, x, y, heading, length, shape))
     found.sort(key=lambda piece: piece.s)
     for piece, after in pairwise(found):
         end = piece.evaluate(np.array([after.s]))[0]

@@ -81,8 +81,11 @@ class KerbHeights:
     """The height of imported sidewalks above the road, by place.
 
     An object is called with places (N, 2) in W [m], and returns heights (N,)
-    [m]. `differ` says whether the height of any kerb differs from the usual
-    height.
+    [m].
+
+    Attributes:
+        usual: usual height of a kerb [m].
+        differ: whether the height of any kerb differs from the usual height.
     """
 
     def __init__(self, bands: Sequence[LaneBand], usual: float):
@@ -91,7 +94,7 @@ class KerbHeights:
         Kerbs without a height in the file, or away from sidewalks, have the
         usual height.
         """
-        self._usual = usual
+        self.usual = usual
         rows = [np.zeros((0, 6))]
         for band in bands:
             if is_raised(band.kind, band.lane.height):
@@ -114,7 +117,7 @@ class KerbHeights:
         low, high = self._rise[k].T
         own = low + np.clip(part, 0.0, 1.0) * (high - low)
         near = distance < np.sqrt(width2) / 2.0 + _BESIDE
-        return np.where(near, own, self._usual)
+        return np.where(near, own, self.usual)
 
 
 def _middle_places(band: LaneBand) -> np.ndarray:

@@ -50,7 +50,7 @@ _COLOURS: dict[str, Rgb] = {
 _STYLES = ("solid", "broken")
 
 
-def moved_off_kerbs(
+def _moved_off_kerbs(
     border: np.ndarray,
     left: np.ndarray,
     reach: tuple[float, float],
@@ -90,12 +90,12 @@ def moved_off_kerbs(
     return np.where(moved == 0.0, near, moved)
 
 
-def as_triangles(quads: np.ndarray) -> np.ndarray:
+def _as_triangles(quads: np.ndarray) -> np.ndarray:
     """Splits quadrilaterals (K, 4, 3) into triangles (2 K, 3, 3)."""
     return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
 
 
-def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
+def _on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
     """Returns the parts of quadrilaterals that lie on a carriageway [m].
 
     Args:
@@ -108,7 +108,7 @@ def on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
-    found = [as_triangles(quads[inside])]
+    found = [_as_triangles(quads[inside])]
     rest = quads[~inside]
     outlines = outlines[~inside]
     squares = np.floor(rest[:, 0, :2] / _SQUARE).astype(int)
@@ -182,9 +182,9 @@ def road_marks(
         for colour, pieces in colours.items():
             quads = np.concatenate(pieces)
             if carriageway is None:
-                corners = as_triangles(quads)
+                corners = _as_triangles(quads)
             else:
-                corners = on_carriageway(quads, carriageway)
+                corners = _on_carriageway(quads, carriageway)
             z = corners[..., 2]
             if heights is not None:
                 ground = heights(corners[..., :2].reshape(-1, 2))
@@ -235,7 +235,7 @@ def _painted_quads(
                 max(line.width / 2.0 + line.aside for line in lines),
                 max(line.width / 2.0 - line.aside for line in lines),
             )
-            moved = moved_off_kerbs(border, left, reach, carriageway)
+            moved = _moved_off_kerbs(border, left, reach, carriageway)
         for line in lines:
             aside = left * (line.aside + moved)[:, None]
             for a, b in _stretches(line, mark.start, last):

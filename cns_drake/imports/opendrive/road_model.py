@@ -14,7 +14,7 @@ from cns_drake.imports.opendrive.curves import Shape
 
 
 @dataclass(frozen=True)
-class Piece:
+class CoursePiece:
     """One element of a road's course in plan view.
 
     Attributes:
@@ -290,7 +290,7 @@ class ImportedRoad:
     name: str
     junction: str | None
     length: float
-    pieces: tuple[Piece, ...]
+    pieces: tuple[CoursePiece, ...]
     elevation: Cubics
     superelevation: Cubics
     lane_offset: Cubics

@@ -14,7 +14,11 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing
-from cns_drake.city.generation.city_structures import City, Streets, build_along
+from cns_drake.city.generation.city_structures import (
+    City,
+    CityStreets,
+    build_along,
+)
 from cns_drake.city.generation.starter import starter_plan, starter_stages
 from cns_drake.city.geometry import Structure
 from cns_drake.city.ground.streets import street_surfaces
@@ -119,60 +123,22 @@ def _build(
     options: ImportOptions,
     own: Sequence[WaypointRoute] | None,
 ) -> Town:
-    with value_errors(source):
-        bands = [band for road in roads.roads for band in lane_bands(road)]
-    ground, raised = split_levels(bands)
-    _count_raised_kerbs(raised, faults)
-    ends = bridges.bridge_ends(raised)
-    streets = ImportedStreets(ground, ends)
-    _check_extent(source, streets.areas.carriageway)
-    plan = CityPlan.model_validate(starter_plan(streets.areas, options.seed))
-    surface = RoadHeights(ground)
-    of_file = _structures_of_file(
-        roads, ground, raised, streets, surface, options.dressed, faults
-    )
-    kerb = _median_kerb_height(ground)
-    kerbs = KerbHeights(ground, kerb)
-    own_kerbs = kerbs if kerbs.differ else None
-    surfaces = street_surfaces(
-        streets.areas,
-        surface,
-        kerb if own_kerbs is None else own_kerbs,
-        streets.coverings,
-        ends,
-    )
+    streets = _read_streets(source, roads, faults)
+    of_file = _structures_of_file(roads, streets, options.dressed, faults)
     doing(f"building along {len(roads.roads)} roads")
-    city = build_along(
-        Streets(
-            areas=streets.areas,
-            surface=surface,
-            kerb_height=kerb,
-            kerbs=own_kerbs,
-            junctions=streets.junctions,
-            margins=streets.margins,
-            reserved=_reserved_area(raised, of_file.things),
-            structures=(
-                *surfaces,
-                *of_file.decks,
-                *of_file.things,
-                *of_file.marks,
-            ),
-            furnish=lambda draft: None,
-            park=lambda draft: _park_cars(draft, ground, plan.cars),
-        ),
-        plan,
-        str(source),
-    )
+    city = _city_along(source, streets, of_file, options.seed)
     drives = (
-        search.find_drives(BandGraph(bands))
+        search.find_drives(BandGraph(streets.bands))
         if own is None
-        else steerable_drives.with_ground_heights(own, surface.heights, faults)
+        else steerable_drives.with_ground_heights(
+            own, streets.surface.heights, faults
+        )
     )
     if options.within is not None:
         city = _near_drives(city, drives, options.within, faults)
     imported = {one.name for some in of_file for one in some}
     generated = [one for one in city.structures if one.name not in imported]
-    lanes_of_traffic = lane_text_of_bands(bands, kerbs)
+    lanes_of_traffic = lane_text_of_bands(streets.bands, streets.kerbs)
     if lanes_of_traffic is None:
         faults.add(
             "no lanes for traffic: each comes to a dead end", source.name
@@ -182,11 +148,60 @@ def _build(
         seed=options.seed,
         city=city,
         stages=_make_stages(City(tuple(generated), city.cars), options.grow),
-        streets=streets,
+        streets=streets.on_ground,
         drives=drives,
         lanes=lanes_of_traffic,
         kinds=_counts_by_kind(roads, of_file, generated),
         faults=faults,
+    )
+
+
+class _TownStreets(NamedTuple):
+    """The streets of a town, as the file determines them.
+
+    Attributes:
+        bands: all lanes.
+        ground: the lanes on the ground.
+        raised: the lanes on bridges.
+        bridge_ends: strips across the lanes at both ends of bridges, in W.
+        on_ground: areas of the streets on the ground.
+        surface: heights of these streets.
+        kerbs: heights of their kerbs.
+    """
+
+    bands: list[LaneBand]
+    ground: list[LaneBand]
+    raised: list[LaneBand]
+    bridge_ends: BaseGeometry
+    on_ground: ImportedStreets
+    surface: RoadHeights
+    kerbs: KerbHeights
+
+
+def _read_streets(
+    source: Path, roads: RoadMap, faults: ImportFaults
+) -> _TownStreets:
+    """Returns the streets of a town.
+
+    Raises:
+        InputError: a lane cannot be used, or the lanes on the ground have no
+            area or are too far apart.
+    """
+    with value_errors(source):
+        bands = [band for road in roads.roads for band in lane_bands(road)]
+    ground, raised = split_levels(bands)
+    _count_raised_kerbs(raised, faults)
+    ends = bridges.bridge_ends(raised)
+    on_ground = ImportedStreets(ground, ends)
+    _check_extent(source, on_ground.areas.carriageway)
+    return _TownStreets(
+        bands,
+        ground,
+        raised,
+        ends,
+        on_ground,
+        RoadHeights(ground),
+        KerbHeights(ground, _median_kerb_height(ground)),
     )
 
 
@@ -217,38 +232,74 @@ class _StructuresOfFile(NamedTuple):
 
 
 def _structures_of_file(
-    roads: RoadMap,
-    ground: Sequence[LaneBand],
-    raised: Sequence[LaneBand],
-    streets: ImportedStreets,
-    surface: RoadHeights,
-    dressed: bool,
-    faults: ImportFaults,
+    roads: RoadMap, streets: _TownStreets, dressed: bool, faults: ImportFaults
 ) -> _StructuresOfFile:
     """Returns the structures of a town that the file determines.
 
     Args:
         roads: the roads of the file.
-        ground: the lanes on the ground.
-        raised: the lanes on bridges.
-        streets: areas of the streets on the ground.
-        surface: heights of these streets.
+        streets: the streets of the town.
         dressed: whether the town has road marks.
         faults: counts parts that are left out.
     """
+    areas, raised = streets.on_ground.areas, streets.raised
     things = [
         one
         for road in roads.roads
-        for one in thing_structures(road, streets.areas.lane_area, faults)
+        for one in thing_structures(road, areas.lane_area, faults)
     ]
     marks: list[Structure] = []
     if dressed:
         _count_spans(roads, {band.road.name for band in raised}, faults)
         marks += road_marks(
-            "marks", ground, surface.heights, streets.areas.carriageway
+            "marks", streets.ground, streets.surface.heights, areas.carriageway
         )
         marks += road_marks("bridge_marks", raised)
     return _StructuresOfFile(list(bridges.bridge_decks(raised)), things, marks)
+
+
+def _city_along(
+    source: Path, streets: _TownStreets, of_file: _StructuresOfFile, seed: int
+) -> City:
+    """Returns a city along the streets of a town, sampled at random.
+
+    Args:
+        source: the file, named in error messages.
+        streets: the streets.
+        of_file: the structures that the file determines, which the city also
+            contains.
+        seed: seed of the city.
+    """
+    on_ground, kerbs = streets.on_ground, streets.kerbs
+    plan = CityPlan.model_validate(starter_plan(on_ground.areas, seed))
+    surfaces = street_surfaces(
+        on_ground.areas,
+        streets.surface,
+        kerbs if kerbs.differ else kerbs.usual,
+        on_ground.coverings,
+        streets.bridge_ends,
+    )
+    return build_along(
+        CityStreets(
+            areas=on_ground.areas,
+            surface=streets.surface,
+            kerb_height=kerbs.usual,
+            kerbs=kerbs if kerbs.differ else None,
+            junctions=on_ground.junctions,
+            margins=on_ground.margins,
+            reserved=_reserved_area(streets.raised, of_file.things),
+            structures=(
+                *surfaces,
+                *of_file.decks,
+                *of_file.things,
+                *of_file.marks,
+            ),
+            furnish=lambda draft: None,
+            park=lambda draft: _park_cars(draft, streets.ground, plan.cars),
+        ),
+        plan,
+        str(source),
+    )
 
 
 def _reserved_area(
