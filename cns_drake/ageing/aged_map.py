@@ -99,9 +99,7 @@ def age_map(
     folder = MapFolder(source.resolve())
     drives = folder.recordable_drives()
     if not drives:
-        raise InputError(
-            f"{source}: no sequence_NN.yaml whose stage_NN.sdf is there"
-        )
+        raise map_folder.no_drives(source)
     doing(f"reading {folder.name}")
     ways = [plan_drive(load_scenario(path)) for path in drives]
     world = OldWorld(folder)
@@ -112,35 +110,55 @@ def age_map(
             "past needs"
         )
     doing("looking for lots")
-    city = AgeingCity(
-        world, rates, seed, shapely.union_all([*map(_swept_area, ways)])
-    )
-    # Today is the first stage.
-    others = [year for year in wanted if year != 0]
-    stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
+    kept_free = shapely.union_all([*map(_swept_area, ways)])
+    city = AgeingCity(world, rates, seed, kept_free)
     with draft_folder(output) as draft:
-        (draft / map_folder.MESH_FOLDER).mkdir()
-        _copy_inputs(folder, drives, draft)
-        writing = StageWriter(world, draft, seed)
-        events = _write_stages(writing, world, city, stages)
-        writing.table(city.standing.new)
-        names = [field.name for field in fields(Event)]
-        write_csv(draft / HISTORY_NAME, names, map(astuple, events))
-        (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
-        _write_drives(folder, drives, draft, stages, seed)
-        write_table(draft, sizes=writing.sizes)
-        counts = Counter(one.event for one in events)
-        aged = AgedMap(
-            stages,
-            {stage: number for stage, (number, _) in writing.sizes.items()},
-            counts,
-            _changed_places(city.standing),
-            ways[-1],
-        )
-        # Frees memory that the pictures need.
-        del world, city, writing, events
+        aged = _write_map(draft, world, city, wanted, seed, drives, ways[-1])
+        del world, city  # The pictures need their memory.
         finish(draft, aged)
     return aged
+
+
+def _write_map(
+    draft: Path,
+    world: OldWorld,
+    city: AgeingCity,
+    years: Sequence[int],
+    seed: int,
+    drives: Sequence[Path],
+    trajectory: Trajectory,
+) -> AgedMap:
+    """Writes all files of an aged map, except those of `finish`.
+
+    Args:
+        draft: the folder to write.
+        world: the city of today.
+        city: the same city, which ages up to the last year.
+        years: ascending years relative to today.
+        seed: the seed of the ageing.
+        drives: scenario files of the drives of today's map.
+        trajectory: the trajectory of the last of these drives.
+    """
+    # Today is the first stage.
+    others = [year for year in years if year != 0]
+    stages = {f"{k:02d}": year for k, year in enumerate([0, *others], start=1)}
+    (draft / map_folder.MESH_FOLDER).mkdir()
+    _copy_inputs(world.folder, drives, draft)
+    writing = StageWriter(world, draft, seed)
+    events = _write_stages(writing, world, city, stages)
+    writing.table(city.standing.new)
+    names = [field.name for field in fields(Event)]
+    write_csv(draft / HISTORY_NAME, names, map(astuple, events))
+    (draft / RATES_NAME).write_text(city.tally.to_csv(), "utf-8")
+    _write_drives(world.folder, drives, draft, stages, seed)
+    write_table(draft, sizes=writing.sizes)
+    return AgedMap(
+        stages,
+        {stage: number for stage, (number, _) in writing.sizes.items()},
+        Counter(one.event for one in events),
+        _changed_places(city.standing),
+        trajectory,
+    )
 
 
 def _write_stages(

@@ -62,14 +62,13 @@ def list_drives(
     with uninterrupted():
         from cns_drake.scenarios.drive_table import drive_rows
         from cns_drake.scenarios.shipped import shipped_maps
+        from cns_drake.scene.map_folder import no_drives
 
     rows = []
     for folder in folders or shipped_maps().values():
         of_map = drive_rows(folder)
         if folders and not of_map:
-            raise InputError(
-                f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
-            )
+            raise no_drives(folder)
         rows += of_map
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     show(

@@ -12,7 +12,7 @@ import tempfile
 
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.file_names import cache_folder
-from cns_drake.scene.map_folder import MapFolder, drive_name
+from cns_drake.scene.map_folder import MapFolder, drive_name, no_drives
 
 
 @functools.cache
@@ -79,9 +79,7 @@ def recordable_map(name: str) -> Path:
             f"folder{did_you_mean(name, maps)}"
         )
     if not MapFolder(folder).recordable_drives():
-        raise InputError(
-            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
-        )
+        raise no_drives(folder)
     return folder
 
 

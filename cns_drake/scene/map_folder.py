@@ -126,6 +126,16 @@ def drive_name(path: Path) -> str:
     return path.stem
 
 
+def no_drives(folder: Path) -> InputError:
+    """Returns the error that a map's folder has no drive that can be recorded.
+
+    The message names `folder`; see `MapFolder.recordable_drives`.
+    """
+    return InputError(
+        f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+    )
+
+
 def check_new_map(output: Path) -> None:
     """Checks that a new map can be written to a folder.
 
