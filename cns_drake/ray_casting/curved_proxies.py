@@ -31,14 +31,18 @@ _SIDES = 16
 _MARGIN = 0.005
 # Least distance in addition [m]. It exceeds the errors of single precision.
 _GAP = 1e-3
+# No point of a polyhedron is farther than this from the axis or centre of its
+# shape: a multiple of the shape's radius, and a length in addition [m].
+_BOUND_RATIO = 1.1
+_BOUND_GAP = 2.0 * _GAP
 
 
 @lru_cache(maxsize=1000)
 def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     """Returns a polyhedron that contains a curved shape.
 
-    No point of the polyhedron is farther than 1.1 radii + 2 mm from the shape's
-    axis or centre.
+    No point of the polyhedron is farther from the shape's axis or centre than
+    `_BOUND_RATIO` radii + `_BOUND_GAP`.
     """
     # The faces of an inscribed ball are nearest to its centre at the equator.
     side = np.cos(np.pi / _SIDES)
@@ -74,7 +78,7 @@ class NearCurvedShapes:
                     half, radius = surface.length / 2.0, surface.radius
                 rows.append(row)
                 X_LGs.append(X_LG.GetAsMatrix4())
-                sizes.append((half, 1.1 * radius + 2.0 * _GAP))
+                sizes.append((half, _BOUND_RATIO * radius + _BOUND_GAP))
         X_LGset = np.reshape(X_LGs, (-1, 4, 4))
         halves, radii = np.reshape(sizes, (-1, 2)).T
         # Greatest stretch of a vector from G to O.

@@ -210,12 +210,18 @@ def _mismatch_notes(
 ) -> tuple[str, ...]:
     """Returns a note if names in the table and in the world differ.
 
-    Rows without a structure are normal: another stage may have the structure.
+    Rows without a structure are normal, because another stage may have the
+    structure. So are structures without a row, in a world without a table of
+    its own. Only both together suggest that names do not match.
 
     Args:
         table: file of the table.
         listed: names in the table.
         found: names in the world.
+
+    Returns:
+        One note, if rows lack a structure and structures lack a row; otherwise
+        none.
     """
     unlabelled, unused = sorted(found - listed), sorted(listed - found)
     if not (unlabelled and unused):
