@@ -101,7 +101,7 @@ def storey_on(
             "roof", (w + 0.5, d + 0.5, 0.25), (*middle, z + 3.2), rgb=_CONCRETE
         ),
     )
-    return plot.thing(name, "building", model)
+    return plot.structure(name, "building", model)
 
 
 def annex_to(
@@ -152,7 +152,7 @@ def annex_to(
             ),
             block("roof", (w + 0.3, d + 0.3, 0.2), (x, y, 3.1), rgb=_CONCRETE),
         )
-        return plot.thing(name, "building", model)
+        return plot.structure(name, "building", model)
     return None
 
 
@@ -200,7 +200,7 @@ def balconies_on(
                 ]
     if len(parts) < 4 or z > 45.0:
         return None
-    return plot.thing(name, "building", assemble(*parts))
+    return plot.structure(name, "building", assemble(*parts))
 
 
 def renovated(
@@ -265,7 +265,7 @@ def scaffold_before(
     xy = plot.place((x0 + x1) / 2, y0)
     moved = Plot(plot.area, xy, round(plot.yaw + math.pi, 5), plot.z)
     model = scaffold(length, min(height, _HIGHEST_SCAFFOLD), rng)
-    return moved.thing(name, "other-structure", model)
+    return moved.structure(name, "other-structure", model)
 
 
 def _draw_colour(rng: np.random.Generator) -> Rgb:

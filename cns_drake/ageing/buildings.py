@@ -38,7 +38,11 @@ _LEAST_WITH_BALCONIES = 8.0
 _NO_SCAFFOLD = 3.5
 # Cars on an empty lot -> their weight in the random choice.
 _CARS = {"hatchback": 3.0, "saloon": 3.0, "estate": 2.0, "van": 1.0}
-_PASSING = ("car", "truck", "bus", "bicycle", "other-vehicle")
+# Classes of what leaves a building site even if it stands there in part.
+_LOOSE = (
+    "car", "truck", "bus", "bicycle", "other-vehicle", "other-object",
+    "vegetation",
+)  # fmt: skip
 
 
 class Buildings:
@@ -166,16 +170,17 @@ class Buildings:
         """Removes what stands in an area, except buildings."""
         standing = self._standing
         for name in standing.near(area):
-            kind = standing.entry(name).semantic_class
+            semantic_class = standing.entry(name).semantic_class
+            if semantic_class in ("building", "other-structure"):
+                continue
             footprint = standing.footprint(name)
             inside = footprint.intersection(area).area > 0.5 * footprint.area
-            is_loose = kind in (*_PASSING, "other-object", "vegetation")
-            is_solid = kind in ("building", "other-structure")
-            if is_solid or not (inside or is_loose):
+            if not inside and semantic_class not in _LOOSE:
                 continue
             standing.remove(name)
             self._trees.clear(name)
-            event = "felled" if kind == "vegetation" else "removed"
+            is_plant = semantic_class == "vegetation"
+            event = "felled" if is_plant else "removed"
             standing.record(event, name, detail="for a building site")
 
     def _remove_parts(self, lot: AgeingLot) -> None:
@@ -201,7 +206,7 @@ class Buildings:
         """Uses an empty lot as a car park, a market, a yard or a garden."""
         name = f"lot_{self._standing.year:03d}y_{lot.number:03d}"
         ground = lot.plot.inside(lot.plot.area.buffer(-0.5))
-        bare = lot.plot.thing(name, "building", Model((), {}, ground))
+        bare = lot.plot.structure(name, "building", Model((), {}, ground))
         rng = self._draws.generator("lot", name)
         for one in lot_objects(bare, use_by_size(bare), _CARS, rng):
             self._put_part(lot, one, "empty plot")

@@ -87,7 +87,7 @@ def new_building(
         except ValueError:
             continue
         at = replace(plot, xy=plot.place(*middle))
-        built = at.thing(f"{name}_{ending}", "building", model)
+        built = at.structure(f"{name}_{ending}", "building", model)
         return replace(built, tags=(name,))
     return None
 
@@ -117,7 +117,7 @@ def building_site_on(
     inner = plot.inside(plot.area.buffer(-0.4))
     lot = largest_rectangle(max(polygons_of(inner), key=lambda one: one.area))
     x0, y0, x1, y1 = lot.bounds
-    things = []
+    structures = []
     for k, (x, y, turn, length) in enumerate(
         (
             ((x0 + x1) / 2, y0, 0.0, x1 - x0),
@@ -128,16 +128,16 @@ def building_site_on(
     ):
         fence = OBJECTS["site_fence"].build(rng, length=length)
         moved = Plot(plot.area, plot.place(x, y), plot.yaw + turn, plot.z)
-        things.append(moved.thing(f"{name}_fence_{k}", "fence", fence))
-    empty = plot.thing(name, "building", Model((), {}, lot.buffer(-0.8)))
+        structures.append(moved.structure(f"{name}_fence_{k}", "fence", fence))
+    empty = plot.structure(name, "building", Model((), {}, lot.buffer(-0.8)))
     digger = OBJECTS["excavator"]
     middle = plot.place(*lot.centroid.coords[0])
     turned = Plot(plot.area, middle, float(rng.uniform(-3.1, 3.1)), plot.z)
     model = digger.build(rng)
-    digging = turned.thing(f"{name}_digger", digger.semantic_class, model)
+    digging = turned.structure(f"{name}_digger", digger.semantic_class, model)
     if plot.area.buffer(-0.8).contains(digging.footprint_W):
-        things.append(digging)
-    return things + list(lot_objects(empty, "yard", {}, rng))
+        structures.append(digging)
+    return structures + list(lot_objects(empty, "yard", {}, rng))
 
 
 def unfinished_frame(building: Structure, seed: int) -> Model:

@@ -83,15 +83,19 @@ class Plot:
         """Returns a large rectangle inside the plot, in S [m]."""
         return largest_rectangle(self.inside(self.area))
 
-    def thing(self, name: str, kind: str, model: Model) -> Structure:
+    def structure(
+        self, name: str, semantic_class: str, model: Model
+    ) -> Structure:
         """Returns a structure that stands on the plot.
 
         Args:
             name: name of the structure.
-            kind: semantic class of the structure.
+            semantic_class: class of the structure.
             model: shape of the structure, expressed in S.
         """
-        return Structure(name, kind, model, (*self.xy, self.z), self.yaw)
+        return Structure(
+            name, semantic_class, model, (*self.xy, self.z), self.yaw
+        )
 
 
 def building_plot(building: Structure) -> Plot:

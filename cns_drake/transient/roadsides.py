@@ -82,6 +82,14 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
                 # Objects that a smaller share leaves out take up room as well.
                 areas.append(area)
                 if is_put_up:
-                    kind = builder.semantic_class
-                    stretch.put(around, name, kind, model, x, y, turn, length)
+                    stretch.put(
+                        around,
+                        name,
+                        builder.semantic_class,
+                        model,
+                        x,
+                        y,
+                        turn,
+                        length,
+                    )
                 break

@@ -132,8 +132,13 @@ class _Site:
                 and standing.is_free(area)
                 and not any(area.intersects(other) for other in taken)
             ):
-                kind = OBJECTS[name].semantic_class
                 self.stretch.put(
-                    self.around, f"{name}_{len(taken)}", kind, model, x, y, turn
+                    self.around,
+                    f"{name}_{len(taken)}",
+                    OBJECTS[name].semantic_class,
+                    model,
+                    x,
+                    y,
+                    turn,
                 )
                 taken.append(area)

@@ -28,18 +28,19 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
     of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     for band in bands:
         # The sides of parts without a lane are closed as well.
-        kind = lane_class(band.kind) or "other-ground"
+        semantic_class = lane_class(band.kind) or "other-ground"
         left, right = band.inner, band.outer
         if band.lane.number > 0:
             left, right = right, left
-        of_road[band.road.name, kind].append(_triangles_between(right, left))
+        upper = _triangles_between(right, left)
+        of_road[band.road.name, semantic_class].append(upper)
         low_left, low_right = left - _DECK_DEPTH, right - _DECK_DEPTH
         of_road[band.road.name, "other-structure"] += [
             _triangles_between(low_left, low_right),
             _triangles_between(low_right, right),
             _triangles_between(left, low_left),
         ]
-    for (road, kind), pieces in of_road.items():
+    for (road, semantic_class), pieces in of_road.items():
         triangles = np.concatenate(pieces)
         edges = np.cross(
             triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
@@ -47,7 +48,11 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
         triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
         if len(triangles):
             yield make_object(
-                f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}
+                f"bridge_{road}_{semantic_class}",
+                semantic_class,
+                "Bridge",
+                {"deck": triangles},
+                {},
             ).structure
 
 
