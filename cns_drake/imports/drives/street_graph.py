@@ -40,7 +40,7 @@ _OFFSET_WINDOW = 15
 
 
 @dataclass(frozen=True, eq=False)
-class Lane:
+class StreetLane:
     """A lane from one junction to the next.
 
     Attributes:
@@ -65,23 +65,25 @@ class Lane:
         return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
 
 
-def make_lanes(streets: Sequence[Street]) -> list[Lane]:
+def make_lanes(streets: Sequence[Street]) -> list[StreetLane]:
     """Returns the outermost lane of each street in each allowed direction.
 
     Streets are cut where they meet.
     """
-    lanes: list[Lane] = []
+    lanes: list[StreetLane] = []
     for number, piece in enumerate(cut_at_nodes(streets)):
         begin, end = piece.nodes
         aside = piece.street.aside
         if piece.street.forward:
-            lanes.append(Lane(piece.line, begin, end, aside, number))
+            lanes.append(StreetLane(piece.line, begin, end, aside, number))
         if piece.street.backward:
-            lanes.append(Lane(piece.line[::-1], end, begin, aside, number))
+            lanes.append(
+                StreetLane(piece.line[::-1], end, begin, aside, number)
+            )
     return [lane for lane in lanes if lane.length > 0.0]
 
 
-def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
+def lane_links(lanes: Sequence[StreetLane]) -> tuple[np.ndarray, np.ndarray]:
     """Returns pairs of lanes, where the first lane leads into the second.
 
     The result is two arrays (L,): the numbers of the first lanes, and the
@@ -100,7 +102,7 @@ def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
     return before, after
 
 
-def _leads_on(lane: Lane, after: Lane) -> bool:
+def _leads_on(lane: StreetLane, after: StreetLane) -> bool:
     """Returns whether cars may turn from a lane into one that begins there."""
     if lane.way == after.way:
         return False
@@ -110,7 +112,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
     return bool(abs(np.degrees(np.arctan2(cross, dot))) <= SHARPEST_TURN_DEG)
 
 
-def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
+def lane_path(lanes: Sequence[StreetLane], spacing: float) -> np.ndarray:
     """Returns a line (N, 3) along lanes: x, y and lateral offset [m].
 
     x and y are in the middle of the street; the offset is the `aside` of the
