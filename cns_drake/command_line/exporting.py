@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cns_drake.base.drives.drive import Drive
     from cns_drake.base.jobs.cluster import Cluster
     from cns_drake.scenarios.scenario import Scenario
+    from cns_drake.studies.exports.pair_export import ExportOptions
 
 
 class Format(str, Enum):
@@ -198,16 +199,17 @@ def export(
             max_range = max_range or _OVERLAP_RANGE
             _write_overlap_table(learned, output, spacing, max_range, json=json)
             return
+        with uninterrupted():
+            from cns_drake.studies.exports.pair_export import ExportOptions
+
+        settings = ExportOptions(
+            "overlap" if layout == Format.OVERLAP else "pointnetvlad",
+            spacing,
+            scans,
+            max_range or _CLOUD_RANGE,
+        )
         _write_training_data(
-            learned,
-            held_out or (),
-            output,
-            layout,
-            spacing=spacing,
-            num_scans=scans,
-            max_range=max_range or _CLOUD_RANGE,
-            cluster=cluster,
-            json=json,
+            learned, held_out or (), output, settings, cluster, json=json
         )
         return
     number = 2 if layout in _MAPS else 1
@@ -264,7 +266,7 @@ def _check_options(names: Iterable[str], layout: Format) -> None:
         if layout not in formats:
             raise InputError(
                 f"--{name.replace('_', '-')}: not with --format {layout.value};"
-                f" only with {', '.join(one.value for one in formats)}"
+                f" only with {', '.join(known.value for known in formats)}"
             )
 
 
@@ -392,7 +394,7 @@ def _learned_drives(
     learned = [load_scenario(name) for name in names]
     if vary is not None:
         varied = varied_drives(vary, output, cluster)
-        learned += [one for one in varied if one not in learned]
+        learned += [drive for drive in varied if drive not in learned]
     return learned
 
 
@@ -420,7 +422,7 @@ def _write_overlap_table(
     next_command(
         "cns-eval",
         "pr",
-        *(f"drives/{one.name}" for one in drives),
+        *(f"drives/{drive.name}" for drive in drives),
         "--method",
         "solid",
         "--truth",
@@ -434,12 +436,9 @@ def _write_training_data(
     learned: Sequence[Scenario],
     held_out: Sequence[str],
     output: Path,
-    layout: Format,
-    *,
-    spacing: float,
-    num_scans: int,
-    max_range: float,
+    settings: ExportOptions,
     cluster: Cluster,
+    *,
     json: bool,
 ) -> None:
     """Writes training data: clouds, and their positives or overlaps.
@@ -452,15 +451,9 @@ def _write_training_data(
         from cns_drake.studies.exports import pair_export
 
     tested = [load_scenario(name) for name in held_out]
-    taken = {one.name for one in tested}
-    settings = pair_export.ExportOptions(
-        "overlap" if layout == Format.OVERLAP else "pointnetvlad",
-        spacing,
-        num_scans,
-        max_range,
-    )
+    taken = {drive.name for drive in tested}
     paths = pair_export.export_pairs(
-        [one for one in learned if one.name not in taken],
+        [drive for drive in learned if drive.name not in taken],
         tested,
         output,
         settings,
@@ -493,8 +486,11 @@ def _write_truth(
     first, second = open_labelled(a), open_labelled(b)
     counts, table = write_truth(first, second, output, spacing)
     result: dict[str, Any] = {"output": str(output)}
-    for side, found in counts.items():
-        named = {Label(one).name.lower(): n for one, n in sorted(found.items())}
+    for side, numbers in counts.items():
+        named = {
+            Label(label).name.lower(): number
+            for label, number in sorted(numbers.items())
+        }
         result[side] = named
         text = ", ".join(
             f"{number} {name.replace('_', ' ')}"
@@ -535,8 +531,9 @@ def _write_sessions(
         from evaluation.map_update.labels import SIDES
         from evaluation.map_update.sessions import write_session
 
-    for text in (one for drive in drives for one in drive.notes):
-        note(text)
+    for drive in drives:
+        for text in drive.notes:
+            note(text)
     check_same_world(*drives)
     with draft_folder(output) as draft:
         for side, drive in zip(SIDES, drives, strict=True):

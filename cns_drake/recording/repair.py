@@ -16,6 +16,7 @@ from mcap.records import (
     Metadata,
     Schema,
 )
+from mcap.writer import Writer
 
 from cns_drake.base.complete_files import check_writable, completing
 from cns_drake.base.drives.mcap_messages import STAMPED_RECORD
@@ -173,25 +174,13 @@ def _write_repaired(
     output: Path,
 ) -> Repair:
     """Writes records as a whole MCAP file, which will be `output`."""
-    profile, schemas, channels = definitions
     chunks = TopicChunks(stream)
     writer = chunks.writer
-    writer.start(profile=profile, library=f"cns-drake {__version__} repair")
-    schema_ids = {0: 0} | {
-        number: writer.register_schema(
-            schema.name, schema.encoding, schema.data
-        )
-        for number, schema in schemas.items()
-    }
-    channel_ids = {
-        number: writer.register_channel(
-            channel.topic,
-            channel.message_encoding,
-            schema_ids[channel.schema_id],
-            channel.metadata,
-        )
-        for number, channel in channels.items()
-    }
+    writer.start(
+        profile=definitions.profile,
+        library=f"cns-drake {__version__} repair",
+    )
+    channel_ids = _register(definitions, writer)
     counts: Counter[int] = Counter()
     start_ns = end_ns = num_faults = 0
     first_fault = ""
@@ -227,21 +216,12 @@ def _write_repaired(
         if fault:
             num_faults += 1
             first_fault = first_fault or fault
-    if profile == "ros2":
-        topics = [
-            rosbag2_metadata.describe_topic(
-                channel.topic,
-                schemas[channel.schema_id].name
-                if channel.schema_id in schemas
-                else "",
-                counts[number],
-                channel.metadata,
-                channel.message_encoding,
-            )
-            for number, channel in channels.items()
-        ]
+    if definitions.profile == "ros2":
         information = rosbag2_metadata.make_bag_information(
-            output.name, topics, start_ns=start_ns, end_ns=end_ns
+            output.name,
+            _described_topics(definitions, counts),
+            start_ns=start_ns,
+            end_ns=end_ns,
         )
         writer.add_metadata(
             _ROSBAG2,
@@ -250,9 +230,52 @@ def _write_repaired(
     chunks.finish(
         {
             channel_ids[number]: channel.topic
-            for number, channel in channels.items()
+            for number, channel in definitions.channels.items()
         }
     )
     seconds = (end_ns - start_ns) / 1e9
     total = sum(counts.values())
     return Repair(output, total, seconds, num_faults, first_fault)
+
+
+def _register(definitions: _Definitions, writer: Writer) -> dict[int, int]:
+    """Registers schemas and channels; returns the new id of each channel."""
+    schema_ids = {0: 0} | {
+        number: writer.register_schema(
+            schema.name, schema.encoding, schema.data
+        )
+        for number, schema in definitions.schemas.items()
+    }
+    return {
+        number: writer.register_channel(
+            channel.topic,
+            channel.message_encoding,
+            schema_ids[channel.schema_id],
+            channel.metadata,
+        )
+        for number, channel in definitions.channels.items()
+    }
+
+
+def _described_topics(
+    definitions: _Definitions, counts: Counter[int]
+) -> list[dict]:
+    """Returns the descriptions of all topics for rosbag2.
+
+    Args:
+        definitions: schemas and channels.
+        counts: id of a channel -> number of its messages.
+    """
+    schemas = definitions.schemas
+    return [
+        rosbag2_metadata.describe_topic(
+            channel.topic,
+            schemas[channel.schema_id].name
+            if channel.schema_id in schemas
+            else "",
+            counts[number],
+            channel.metadata,
+            channel.message_encoding,
+        )
+        for number, channel in definitions.channels.items()
+    ]

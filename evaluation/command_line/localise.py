@@ -14,7 +14,12 @@ from evaluation.command_line import options
 from evaluation.command_line.trajectories import measure_estimate
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from evaluation.drives import Drive
+    from evaluation.study.engine import Engine
+    from evaluation.study.tasks.localise import LocaliseTask
+    from evaluation.study.tasks.pair import Pair
 
 # Parameters that have an effect together with `--estimate`.
 _WITH_ESTIMATE = (
@@ -118,8 +123,7 @@ def localise(
     from evaluation.localisation.settings import default_settings
     from evaluation.study import one_pair
     from evaluation.study.chosen_methods import method_settings
-    from evaluation.study.one_pair import OpenSource
-    from evaluation.study.tasks.localise import NOT_LOCALISED, LocaliseTask
+    from evaluation.study.tasks.localise import LocaliseTask
 
     if estimate is not None:
         commands.check_only_with(context, "estimate", _WITH_ESTIMATE)
@@ -137,10 +141,8 @@ def localise(
     name = Path(method).stem
     given = method_settings(parameter or [], [name])[name]
     # Faults are told before the slow work.
-    make_estimator(
-        method,
-        default_settings(method).with_values(given.items(), method),
-    )
+    chosen = default_settings(method).with_values(given.items(), method)
+    make_estimator(method, chosen)
     source, drive = _opened(place, query, align, lidar, columns)
     if output is not None:
         make_folder(output)
@@ -153,23 +155,20 @@ def localise(
     }
     if query_spacing is not None:
         settings["spacing"] = query_spacing
-    notes: list[str] = []
     pair = one_pair.pair_of(
-        OpenSource(source, columns),
-        OpenSource(drive),
+        one_pair.OpenSource(source, columns),
+        one_pair.OpenSource(drive),
         (source.name, drive.name),
     )
-    engine = one_pair.measure_pairs(
-        "localise",
-        [pair],
-        [LocaliseTask(settings, "localise")],
-        output,
-        on_note=notes.append,
-        processes=num_jobs,
-    )
-    if not (measured := engine.found(pair, LocaliseTask.name)):
-        raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
-    (rows,) = measured
+    task = LocaliseTask(settings, "localise")
+    engine, rows, notes = _localised(pair, task, output, num_jobs)
+    if all(map(math.isnan, rows["unmapped"])):
+        raise InputError(
+            f"{drive.name}: no scan has {FEWEST_POINTS} points in"
+            f" different voxels of {chosen.scan_voxel:g} m"
+        )
+    for note in notes:
+        terminal.note(note)
     values: dict = {
         "method": name,
         "map": source.name,
@@ -181,24 +180,55 @@ def localise(
     if track:
         values |= {"odometry_drift": odometry_drift}
         values |= tracking.summary(rows)
-    if all(map(math.isnan, rows["unmapped"])):
-        least = default_settings(method).with_values(given.items(), method)
-        raise InputError(
-            f"{drive.name}: no scan has {FEWEST_POINTS} points in"
-            f" different voxels of {least.scan_voxel:g} m"
-        )
-    for note in notes:
-        terminal.note(note)
     values |= results.summary(rows)
     if output is not None:
-        if track:
-            from evaluation.report.curve_figures import draw_track
-
-            draw_track(rows, output / "track")
-        results.write_rows(rows, output / "localisation.csv")
-        terminal.note(f"wrote {output / 'localisation.csv'}")
-        options.write_tables(engine)
+        _write_results(engine, rows, output, track=track)
     terminal.show(values, _rows(values), json=json)
+
+
+def _localised(
+    pair: Pair, task: LocaliseTask, output: Path | None, num_jobs: int
+) -> tuple[Engine, np.ndarray, list[str]]:
+    """Localises the scans of a pair.
+
+    Returns:
+        The engine; (K,) results, one per query; the notes.
+
+    Raises:
+        InputError: the scans cannot be localised.
+    """
+    from cns_drake.base.errors import InputError
+    from evaluation.study import one_pair
+    from evaluation.study.tasks.localise import NOT_LOCALISED
+
+    notes: list[str] = []
+    engine = one_pair.measure_pairs(
+        "localise",
+        [pair],
+        [task],
+        output,
+        on_note=notes.append,
+        processes=num_jobs,
+    )
+    if not (measured := engine.found(pair, task.name)):
+        raise InputError(notes[-1].removesuffix(NOT_LOCALISED))
+    (rows,) = measured
+    return engine, rows, notes
+
+
+def _write_results(
+    engine: Engine, rows: np.ndarray, output: Path, *, track: bool
+) -> None:
+    """Writes the tables and, of a tracked drive, the picture."""
+    from evaluation.localisation import results
+
+    if track:
+        from evaluation.report.curve_figures import draw_track
+
+        draw_track(rows, output / "track")
+    results.write_rows(rows, output / "localisation.csv")
+    terminal.note(f"wrote {output / 'localisation.csv'}")
+    options.write_tables(engine)
 
 
 def _check_together(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -22,10 +22,13 @@ if TYPE_CHECKING:
     import numpy as np
 
     from evaluation.drives import Drive
+    from evaluation.drives.drive_views import CountedDrive
     from evaluation.methods.method import Method
     from evaluation.recognition.metrics import Mode
     from evaluation.recognition.place_outcome import PlaceOutcome
+    from evaluation.recognition.pose_errors import PoseMetrics
     from evaluation.study.chosen_methods import MethodChoice
+    from evaluation.study.engine import Engine
 
 
 # Parameters that have an effect together with `--scores`.
@@ -125,9 +128,6 @@ def pr(
     from evaluation.drives.drive_views import CountedDrive
     from evaluation.recognition import overlap_truth
     from evaluation.recognition.place_outcome import check_has_match
-    from evaluation.study import one_pair
-    from evaluation.study.one_pair import OpenSource
-    from evaluation.study.tasks.place import PlaceTask, PoseTask
 
     if turn_queries is not None:
         protocol = replace(protocol, turn_queries=turn_queries)
@@ -152,38 +152,14 @@ def pr(
         across_maps=across_maps,
     )
     check_same_world(*drives, across_maps=across_maps)
-    places, queries = counted = [CountedDrive(one) for one in drives]
+    places, queries = counted = [CountedDrive(drive) for drive in drives]
     shares = _overlaps(places, queries, protocol, exact_overlaps)
-    pair = one_pair.pair_of(
-        OpenSource(places),
-        OpenSource(queries),
-        (places.name, queries.name),
-        protocol,
-        overlaps=shares,
-    )
-    engine = one_pair.measure_pairs(
-        "pr",
-        [pair],
-        [PlaceTask({}, "pr"), PoseTask({}, "pr")],
-        output,
-        # The height is in the protocol's digest.
-        [(choice, given.columns)],
-        terminal.note,
-    )
-    (outcome,) = (
-        replace(one, method=choice.name)
-        for one in engine.found(pair, PlaceTask.name)
-        if one.is_gated == protocol.gate
+    # The height is in the protocol's digest.
+    engine, outcome = _measured(
+        places, queries, protocol, shares, (choice, given.columns), output
     )
     check_has_match(outcome)
-    for note in dict.fromkeys(
-        chosen.assumption(one.lidar_field) for one in counted
-    ):
-        if note is not None:
-            terminal.note(note)
-    for one in counted:
-        if one.num_ignored:
-            terminal.note(f"{one.name}: {one.num_ignored} {NOT_FINITE}")
+    _show_notes(chosen, counted)
     if overlaps is not None:
         assert shares is not None
         overlap_truth.write_overlaps(
@@ -203,6 +179,63 @@ def pr(
     values = outcome.to_json(mode)
     values["parameters"] = chosen.config.model_dump(mode="json")
     terminal.show(values, _recognition_rows(outcome, mode), json=json)
+
+
+def _measured(
+    places: Drive,
+    queries: Drive,
+    protocol: RetrievalProtocol,
+    overlaps: np.ndarray | None,
+    method: tuple[MethodChoice, Mapping[str, Any]],
+    output: Path | None,
+) -> tuple[Engine, PlaceOutcome]:
+    """Returns the engine that measured two drives, and the outcome.
+
+    Args:
+        places: drive that provides the places.
+        queries: drive that provides the queries.
+        protocol: the protocol.
+        overlaps: (Q, D) overlaps of queries and places; None if matches are not
+            by overlap.
+        method: the method, and its columns in the tables.
+        output: folder for the tables; None if there is none.
+    """
+    from evaluation.study import one_pair
+    from evaluation.study.one_pair import OpenSource
+    from evaluation.study.tasks.place import PlaceTask, PoseTask
+
+    pair = one_pair.pair_of(
+        OpenSource(places),
+        OpenSource(queries),
+        (places.name, queries.name),
+        protocol,
+        overlaps=overlaps,
+    )
+    engine = one_pair.measure_pairs(
+        "pr",
+        [pair],
+        [PlaceTask({}, "pr"), PoseTask({}, "pr")],
+        output,
+        [method],
+        terminal.note,
+    )
+    (outcome,) = (
+        replace(outcome, method=method[0].name)
+        for outcome in engine.found(pair, PlaceTask.name)
+        if outcome.is_gated == protocol.gate
+    )
+    return engine, outcome
+
+
+def _show_notes(method: Method, drives: Sequence[CountedDrive]) -> None:
+    """Shows what the method assumes, and what was ignored of the scans."""
+    assumptions = (method.assumption(drive.lidar_field) for drive in drives)
+    for note in dict.fromkeys(assumptions):
+        if note is not None:
+            terminal.note(note)
+    for drive in drives:
+        if drive.num_ignored:
+            terminal.note(f"{drive.name}: {drive.num_ignored} {NOT_FINITE}")
 
 
 def _check_together(
@@ -308,13 +341,7 @@ def _recognition_rows(
     outcome: PlaceOutcome, mode: Mode
 ) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `pr`."""
-    from evaluation.recognition.pose_errors import (
-        SUCCESS_ROTATION_DEG,
-        SUCCESS_TRANSLATION,
-    )
-
-    metrics, pose = outcome.by_mode[mode], outcome.pose
-    outcomes = outcome.outcomes
+    metrics = outcome.by_mode[mode]
     with_match = metrics.num_with_match
     yield "method", outcome.method
     yield "database -> query", f"{outcome.database} -> {outcome.query}"
@@ -344,6 +371,7 @@ def _recognition_rows(
         "recall at full precision",
         number_text(curve.recall_at_full_precision),
     )
+    outcomes = outcome.outcomes
     yield "mean reciprocal rank", number_text(outcomes.mean_reciprocal_rank)
     if not isnan(outcomes.match_auroc):
         yield "match AUROC", number_text(outcomes.match_auroc)
@@ -354,18 +382,28 @@ def _recognition_rows(
             for radius, auc in outcome.auc_over_radius().items()
         ),
     )
-    if not isnan(pose.success):
-        yield (
-            "translation error, median, 90 %",
-            f"{number_text(pose.translation_median)} m,"
-            f" {number_text(pose.translation_90)} m"
-            f"  ({pose.num_accepted} accepted matches)",
-        )
-        yield (
-            "rotation error, median, 90 %",
-            f"{number_text(pose.rotation_median_deg)} deg,"
-            f" {number_text(pose.rotation_90_deg)} deg",
-        )
-        limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
-        yield f"within {limits}", f"{number_text(pose.success)}  (of N)"
+    if not isnan(outcome.pose.success):
+        yield from _pose_rows(outcome.pose)
     yield "protocol", outcome.protocol.to_text()
+
+
+def _pose_rows(pose: PoseMetrics) -> Iterator[tuple[str, str]]:
+    """Yields names and values of the errors of poses."""
+    from evaluation.recognition.pose_errors import (
+        SUCCESS_ROTATION_DEG,
+        SUCCESS_TRANSLATION,
+    )
+
+    yield (
+        "translation error, median, 90 %",
+        f"{number_text(pose.translation_median)} m,"
+        f" {number_text(pose.translation_90)} m"
+        f"  ({pose.num_accepted} accepted matches)",
+    )
+    yield (
+        "rotation error, median, 90 %",
+        f"{number_text(pose.rotation_median_deg)} deg,"
+        f" {number_text(pose.rotation_90_deg)} deg",
+    )
+    limits = f"{SUCCESS_TRANSLATION:g} m and {SUCCESS_ROTATION_DEG:g} deg"
+    yield f"within {limits}", f"{number_text(pose.success)}  (of N)"

@@ -47,7 +47,9 @@ _HEADLINES = {
     "change": ("tcr_sym", "tcr_sym_masked"),
     "cost": COSTS,
 }
+# Greatest number of columns of the table of conditions.
 _MOST_COLUMNS = 12
+# Line style of Matplotlib -> dashes of an SVG line.
 _DASHES = {"-": "none", "--": "6 3", "-.": "8 3 2 3", ":": "2 3", "": "0 99"}
 
 
@@ -91,8 +93,45 @@ def write_page(
         InputError: a file cannot be written.
     """
     make_folder(folder)
-    shown = []
-    notes = list(notes)
+    shown, missing = _drawn_charts(results, queries, folder, charts)
+    for note in missing:
+        on_note(note)
+    numbers = summarised(results, queries, charts)
+    if numbers:
+        for number in numbers:
+            check_all(number.what, (number.value, number.low, number.high))
+        write_csv(folder / _SUMMARIES, Summary._fields, numbers)
+    protocols = ", ".join(filter(None, results.distinct("protocol")))
+    about = f". {about}" if about else ""
+    text = framed_page(
+        title,
+        str(shown[0]["message"]) if shown else title,
+        Markup("<p><strong>{}</strong>{}</p>").format(title, about),
+        _sections(results, queries, shown, numbers, experiment_text),
+        made_by=[f"cns-drake {__version__}", f"protocol: {protocols}"],
+        notes=[*notes, *missing],
+    )
+    path = folder / "index.html"
+    write_text(path, text)
+    return path
+
+
+def _drawn_charts(
+    results: Results,
+    queries: QueryRows | None,
+    folder: Path,
+    charts: Iterable[Mapping[str, Any]],
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Draws all charts, and writes those for print into a folder.
+
+    The arguments are the same as for `write_page`.
+
+    Returns:
+        For each chart, its message, its legend, and the drawings for the page,
+        by the names in the template; and a note on each chart that is left out,
+        because it has no data.
+    """
+    drawn, missing = [], []
     for number, chart in enumerate(charts, start=1):
         try:
             alone = draw_chart(chart, results, alone=True, queries=queries)
@@ -101,22 +140,32 @@ def write_page(
             )
             svgs = {
                 name: _svg(draw_chart(chart, results, width), f"{name}{number}")
-                for name, width in (
-                    ("wide", WIDE),
-                    ("narrow", NARROW),
-                )
+                for name, width in (("wide", WIDE), ("narrow", NARROW))
             }
         except InputError as error:
             # What was measured does not depend on it.
-            notes.append(f"Chart {number} is left out: {error}.")
-            on_note(notes[-1])
+            missing.append(f"Chart {number} is left out: {error}.")
             continue
-        shown.append({"message": alone.message, "legend": alone.legend, **svgs})
-    numbers = summarised(results, queries, charts)
-    if numbers:
-        for one in numbers:
-            check_all(one.what, (one.value, one.low, one.high))
-        write_csv(folder / _SUMMARIES, Summary._fields, numbers)
+        drawn.append({"message": alone.message, "legend": alone.legend, **svgs})
+    return drawn, missing
+
+
+def _sections(
+    results: Results,
+    queries: QueryRows | None,
+    charts: Sequence[Mapping[str, Any]],
+    numbers: Sequence[Summary],
+    experiment_text: str,
+) -> list[PageSection]:
+    """Returns the sections of the page, without those that would be empty.
+
+    Args:
+        results: the table of results.
+        queries: the table of queries; None if there is none.
+        charts: the charts as `_drawn_charts` returns them.
+        numbers: the numbers behind the charts.
+        experiment_text: the experiment as YAML.
+    """
     templates = environment(
         __package__, _TEMPLATES, {"shown": _value_text, "corners": _corners}
     )
@@ -127,54 +176,35 @@ def write_page(
         body = templates.get_template(f"{name}.html").render(values)
         return PageSection(name, word, Markup(body), is_open)
 
+    sections = []
+    if charts:
+        sections.append(
+            section(
+                "charts",
+                "Charts",
+                is_open=True,
+                charts=charts,
+                wide=WIDE,
+                dashes=_DASHES,
+            )
+        )
+    summary = [_summary(results, task) for task in results.distinct("task")]
+    sections.append(section("means", "Results", is_open=True, summary=summary))
+    if numbers:
+        sections.append(section("summaries", "Summaries", numbers=numbers))
+    sections.append(
+        section("conditions", "Conditions", table=_wide_table(results))
+    )
     answers = queries.answers if queries else ()
-    table = _wide_table(results)
-    sections = [
-        section(
-            "means",
-            "Results",
-            is_open=True,
-            summary=[
-                _summary(results, task) for task in results.distinct("task")
-            ],
-        ),
-        section(
-            "conditions",
-            "Conditions",
-            table=table,
-        ),
+    sections.append(
         section(
             "made_by",
             "Files",
             experiment_text=experiment_text,
-            queries=sum(len(one.columns["correct"]) for one in answers),
-        ),
-    ]
-    if numbers:
-        sections.insert(1, section("summaries", "Summaries", numbers=numbers))
-    if shown:
-        charts_shown = section(
-            "charts",
-            "Charts",
-            is_open=True,
-            charts=shown,
-            wide=WIDE,
-            dashes=_DASHES,
+            queries=sum(len(answer.columns["correct"]) for answer in answers),
         )
-        sections.insert(0, charts_shown)
-    protocols = ", ".join(filter(None, results.distinct("protocol")))
-    about = f". {about}" if about else ""
-    text = framed_page(
-        title,
-        str(shown[0]["message"]) if shown else title,
-        Markup("<p><strong>{}</strong>{}</p>").format(title, about),
-        sections,
-        made_by=[f"cns-drake {__version__}", f"protocol: {protocols}"],
-        notes=notes,
     )
-    path = folder / "index.html"
-    write_text(path, text)
-    return path
+    return sections
 
 
 def _svg(drawn: DrawnChart, prefix: str) -> Markup:

@@ -159,17 +159,8 @@ def add_lidar(
         pattern = model.sheet.aimed(pattern)
     if model is not None:
         _check_no_noise(measurement, range_noise, dropout)
-    elif range_noise or dropout or seed:
-        if measurement is not None:
-            raise ValueError(
-                "measurement: give either it or range_noise, dropout and seed"
-            )
-        measurement = MeasurementModel(
-            range_noise=range_noise,
-            dropout=dropout,
-            seed=seed,
-            sensor_name=name,
-        )
+    else:
+        measurement = _noise_model(measurement, range_noise, dropout, seed)
     measurement = _with_name(measurement or IDEAL, name)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
@@ -205,13 +196,7 @@ def add_lidar(
             causal=causal,
         ),
     )
-    if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
-        warnings.warn(
-            f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
-            "has nothing to see. RegisterVisualGeometry of a plant gives the "
-            "perception role.",
-            stacklevel=2,
-        )
+    _warn_of_no_geometry(scene_graph, role)
     connect_lidar(builder, scene_graph, lidar)
     if motion_distortion and isinstance(body, RigidBody):
         port = "body_spatial_velocities"
@@ -373,6 +358,28 @@ def _returns_model(
     return _with_name(returns, name)
 
 
+def _noise_model(
+    measurement: MeasurementModel | None,
+    range_noise: float,
+    dropout: float,
+    seed: int,
+) -> MeasurementModel | None:
+    """Returns the model of noise of ideal returns, if there is any noise.
+
+    The arguments are the same as for `add_lidar`.
+
+    Raises:
+        ValueError: the noise is given twice.
+    """
+    if not (range_noise or dropout or seed):
+        return measurement
+    if measurement is not None:
+        raise ValueError(
+            "measurement: give either it or range_noise, dropout and seed"
+        )
+    return MeasurementModel(range_noise=range_noise, dropout=dropout, seed=seed)
+
+
 def _check_no_noise(
     measurement: MeasurementModel | None, range_noise: float, dropout: float
 ) -> None:
@@ -416,6 +423,17 @@ def _check_registered(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
         )
 
 
+def _warn_of_no_geometry(scene_graph: SceneGraph, role: Role) -> None:
+    """Warns the caller of `add_lidar` if the LiDAR has nothing to see."""
+    if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
+        warnings.warn(
+            f"the SceneGraph holds no geometry of {role}: so far the LiDAR "
+            "has nothing to see. RegisterVisualGeometry of a plant gives the "
+            "perception role.",
+            stacklevel=3,
+        )
+
+
 def _body_frames(plant: MultibodyPlant) -> dict[FrameId, int]:
     """Returns the index of each body with a SceneGraph frame, by this frame."""
     frames = map(
@@ -448,14 +466,14 @@ def _welded_to(body: RigidBody) -> list[RigidBody]:
         joint = plant.get_joint(index)
         if isinstance(joint, WeldJoint):
             ends = joint.parent_body(), joint.child_body()
-            for one, other in (ends, ends[::-1]):
-                neighbours.setdefault(int(one.index()), []).append(other)
-    found: dict[int, RigidBody] = {}
+            for end, other in (ends, ends[::-1]):
+                neighbours.setdefault(int(end.index()), []).append(other)
+    welded: dict[int, RigidBody] = {}
     rest = [] if body.index() == world else [body]
     while rest:
-        place = rest.pop()
-        if int(place.index()) in found or place.index() == world:
+        nearest = rest.pop()
+        if int(nearest.index()) in welded or nearest.index() == world:
             continue
-        found[int(place.index())] = place
-        rest += neighbours.get(int(place.index()), [])
-    return list(found.values())
+        welded[int(nearest.index())] = nearest
+        rest += neighbours.get(int(nearest.index()), [])
+    return list(welded.values())
