@@ -106,6 +106,7 @@ def _divide_nodes(
     bins = np.empty((_BINS, 2, 3))
     in_bin = np.empty(_BINS, np.int64)
     behind, side = np.empty(_BINS), np.empty((2, 3))
+    # Nodes that may be divided: node, and range of its triangles in `order`.
     pending = np.empty((2 * MOST_DEPTH, 3), np.int64)
     pending[0, 0], pending[0, 1], pending[0, 2] = 0, 0, len(order)
     waiting = 1
@@ -117,10 +118,10 @@ def _divide_nodes(
         _empty_box(boxes[node])
         _empty_box(side)
         for k in range(begin, end):
-            one = order[k]
-            _widen_box(boxes[node], low[one], high[one])
+            triangle = order[k]
+            _widen_box(boxes[node], low[triangle], high[triangle])
             for i in range(3):
-                middle = low[one, i] + high[one, i]
+                middle = low[triangle, i] + high[triangle, i]
                 side[0, i] = min(side[0, i], middle)
                 side[1, i] = max(side[1, i], middle)
         begins[node], counts[node] = begin, end - begin
@@ -139,35 +140,21 @@ def _divide_nodes(
                 _empty_box(bins[k])
                 in_bin[k] = 0
             for k in range(begin, end):
-                one = order[k]
-                place = int(scale * (low[one, axis] + high[one, axis] - start))
-                _widen_box(bins[place], low[one], high[one])
+                triangle = order[k]
+                middle = low[triangle, axis] + high[triangle, axis]
+                place = int(scale * (middle - start))
+                _widen_box(bins[place], low[triangle], high[triangle])
                 in_bin[place] += 1
-            _empty_box(side)
-            number = 0
-            for k in range(_BINS - 1, 0, -1):
-                _widen_box(side, bins[k, 0], bins[k, 1])
-                number += in_bin[k]
-                behind[k] = number * _half_area(side)
-            _empty_box(side)
-            number = 0
-            least = np.inf
-            best = 1
-            for k in range(1, _BINS):
-                _widen_box(side, bins[k - 1, 0], bins[k - 1, 1])
-                number += in_bin[k - 1]
-                cost = number * _half_area(side) + behind[k]
-                if cost < least:
-                    least, best = cost, k
+            best = _cheapest_plane(bins, in_bin, behind, side)
             other = end
             while split < other:
-                one = order[split]
-                place = int(scale * (low[one, axis] + high[one, axis] - start))
-                if place < best:
+                triangle = order[split]
+                middle = low[triangle, axis] + high[triangle, axis]
+                if int(scale * (middle - start)) < best:
                     split += 1
                 else:
                     other -= 1
-                    order[split], order[other] = order[other], one
+                    order[split], order[other] = order[other], triangle
         # Halves, if all middles are the same, or nodes would be too deep.
         if split in (begin, end) or waiting > MOST_DEPTH:
             split = (begin + end) // 2
@@ -179,3 +166,37 @@ def _divide_nodes(
             waiting += 1
         size += 2
     return size
+
+
+@compiled
+def _cheapest_plane(
+    bins: np.ndarray, in_bin: np.ndarray, behind: np.ndarray, side: np.ndarray
+) -> int:
+    """Returns the bin before which a plane makes the expected cost least.
+
+    The cost of each side is the number of its triangles times half the area of
+    its box.
+
+    Args:
+        bins: (B, 2, 3) box of the triangles in each bin.
+        in_bin: (B,) number of the triangles in each bin.
+        behind: (B,) room for the costs behind each plane.
+        side: (2, 3) room for the box of a side.
+    """
+    _empty_box(side)
+    number = 0
+    for k in range(_BINS - 1, 0, -1):
+        _widen_box(side, bins[k, 0], bins[k, 1])
+        number += in_bin[k]
+        behind[k] = number * _half_area(side)
+    _empty_box(side)
+    number = 0
+    least = np.inf
+    best = 1
+    for k in range(1, _BINS):
+        _widen_box(side, bins[k - 1, 0], bins[k - 1, 1])
+        number += in_bin[k - 1]
+        cost = number * _half_area(side) + behind[k]
+        if cost < least:
+            least, best = cost, k
+    return best

@@ -1,6 +1,6 @@
 """Recording the sensors of any diagram."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from pydrake.math import RigidTransform
@@ -94,14 +94,8 @@ def add_mcap_recorder(
             simulator.AdvanceTo(10.0)
     """
     cameras = cameras or {}
-    for lidar in lidars:
-        if lidar.causal:
-            raise ValueError(
-                f"lidars: '{lidar.get_name()}' is causal: its scan begins a "
-                "revolution before the time with which a recording stamps it"
-            )
     check_unused_names(builder, name)
-    check_sensor_names((*(lidar.get_name() for lidar in lidars), *cameras))
+    _check_sensors(lidars, cameras)
     X_BSs = {
         lidar.get_name(): _pose_at_odometry(lidar, odometry) for lidar in lidars
     }
@@ -147,6 +141,37 @@ def add_mcap_recorder(
             start_ns=start_ns,
         ),
     )
+    connect_by_name(
+        builder, _recorded_ports(lidars, cameras, imu, odometry), recorder
+    )
+    return bag
+
+
+def _check_sensors(
+    lidars: Collection[Lidar], camera_names: Iterable[str]
+) -> None:
+    """Checks sensors before they are recorded.
+
+    Raises:
+        ValueError: a LiDAR is causal, or names are not unique or cannot be
+            parts of ROS 2 topics.
+    """
+    for lidar in lidars:
+        if lidar.causal:
+            raise ValueError(
+                f"lidars: '{lidar.get_name()}' is causal: its scan begins a "
+                "revolution before the time with which a recording stamps it"
+            )
+    check_sensor_names((*(lidar.get_name() for lidar in lidars), *camera_names))
+
+
+def _recorded_ports(
+    lidars: Iterable[Lidar],
+    cameras: Mapping[str, RgbdSensor],
+    imu: Imu | None,
+    odometry: OdometrySensor | None,
+) -> dict[str, OutputPort]:
+    """Returns the ports to record, by the names of the recorder's inputs."""
     ports: dict[str, OutputPort] = {}
     for lidar in lidars:
         ports[f"{lidar.get_name()}_scan"] = lidar.GetOutputPort("scan")
@@ -160,8 +185,7 @@ def add_mcap_recorder(
         ports["odometry"] = odometry.GetOutputPort("odometry")
     if imu is not None:
         ports |= imu.ports()
-    connect_by_name(builder, ports, recorder)
-    return bag
+    return ports
 
 
 def connect_by_name(

@@ -112,34 +112,7 @@ def social_forces(
     """
     force = np.zeros((len(walkers), 2))
     for i in range(len(walkers)):
-        one = walkers[i]
-        path = paths.paths[walkers[i].path]
-        here = path.first + one.at
-        low, high = paths.limits[here]
-        right = (paths.tangents[here, 1], -paths.tangents[here, 0])
-        force[i] -= one.velocity / _RELAXATION
-        if is_waiting[i]:
-            # In a narrow gap, the edges would push it back and forth.
-            continue
-        target = path.first + min(one.at + _AHEAD, path.num_points - 1)
-        left, most = paths.limits[target]
-        aside = 0.5 * (left + most + one.aside * (most - left))
-        x = paths.points[target, 0] + aside * right[0] - one.xy[0]
-        y = paths.points[target, 1] + aside * right[1] - one.xy[1]
-        wanted = one.speed / max(np.sqrt(x * x + y * y), 1e-6)
-        force[i, 0] += wanted * x / _RELAXATION
-        force[i, 1] += wanted * y / _RELAXATION
-        across = -(
-            (paths.points[here, 0] - one.xy[0]) * right[0]
-            + (paths.points[here, 1] - one.xy[1]) * right[1]
-        )
-        for side in (-1.0, 1.0):
-            room = high - across if side > 0.0 else across - low
-            push = (
-                side * _EDGE_REPULSION * np.exp(-max(room, 0.0) / _EDGE_RANGE)
-            )
-            force[i, 0] -= push * right[0]
-            force[i, 1] -= push * right[1]
+        force[i, 0], force[i, 1] = _own_force(paths, walkers[i], is_waiting[i])
     for i in range(len(walkers)):
         for j in range(i):
             x = walkers[i].xy[0] - walkers[j].xy[0]
@@ -177,6 +150,44 @@ def social_forces(
 
 
 @compiled
+def _own_force(
+    paths: Paths, walker: Any, is_waiting: bool
+) -> tuple[float, float]:
+    """Returns the force on a pedestrian who is alone on its path [m/s^2].
+
+    The pedestrian approaches its wanted speed, and keeps away from the edges. A
+    waiting pedestrian only brakes.
+    """
+    path = paths.paths[walker.path]
+    here = path.first + walker.at
+    force_x = 0.0 - walker.velocity[0] / _RELAXATION
+    force_y = 0.0 - walker.velocity[1] / _RELAXATION
+    if is_waiting:
+        # In a narrow gap, the edges would push it back and forth.
+        return force_x, force_y
+    low, high = paths.limits[here]
+    right = (paths.tangents[here, 1], -paths.tangents[here, 0])
+    target = path.first + min(walker.at + _AHEAD, path.num_points - 1)
+    left, most = paths.limits[target]
+    aside = 0.5 * (left + most + walker.aside * (most - left))
+    x = paths.points[target, 0] + aside * right[0] - walker.xy[0]
+    y = paths.points[target, 1] + aside * right[1] - walker.xy[1]
+    wanted = walker.speed / max(np.sqrt(x * x + y * y), 1e-6)
+    force_x += wanted * x / _RELAXATION
+    force_y += wanted * y / _RELAXATION
+    across = -(
+        (paths.points[here, 0] - walker.xy[0]) * right[0]
+        + (paths.points[here, 1] - walker.xy[1]) * right[1]
+    )
+    for side in (-1.0, 1.0):
+        room = high - across if side > 0.0 else across - low
+        push = side * _EDGE_REPULSION * np.exp(-max(room, 0.0) / _EDGE_RANGE)
+        force_x -= push * right[0]
+        force_y -= push * right[1]
+    return force_x, force_y
+
+
+@compiled
 def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
     """Moves pedestrians, as far as paths are free, by forces (N, 2) [m/s^2].
 
@@ -186,15 +197,20 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
     previous step.
     """
     for i in range(len(walkers)):
-        one = walkers[i]
-        x, y, vx, vy = one.xy[0], one.xy[1], one.velocity[0], one.velocity[1]
+        walker = walkers[i]
+        x, y, vx, vy = (
+            walker.xy[0],
+            walker.xy[1],
+            walker.velocity[0],
+            walker.velocity[1],
+        )
         rest_x, rest_y = _stopping_place(x, y, vx, vy)
-        off = _distance_to_path(paths, one, rest_x, rest_y)
+        off = _distance_to_path(paths, walker, rest_x, rest_y)
         change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
             if attempt == 1:
                 # Try only the lateral part of the step, and slightly back.
-                c, s = np.cos(one.yaw), np.sin(one.yaw)
+                c, s = np.cos(walker.yaw), np.sin(walker.yaw)
                 aside = change_y * c - change_x * s
                 back = vx * c + vy * s + 0.5 * abs(aside)
                 change_x = -aside * s - back * c
@@ -205,15 +221,15 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
             part = min(1.0, _STRONGEST * STEP / max(part, 1e-9))
             new_vx, new_vy = vx + part * change_x, vy + part * change_y
             speed = np.sqrt(new_vx * new_vx + new_vy * new_vy)
-            part = min(1.0, _HURRY * one.speed / max(speed, 1e-9))
+            part = min(1.0, _HURRY * walker.speed / max(speed, 1e-9))
             new_vx, new_vy = part * new_vx, part * new_vy
             new_x = x + 0.5 * (vx + new_vx) * STEP
             new_y = y + 0.5 * (vy + new_vy) * STEP
             if attempt == 2 and speed == 0.0:
                 new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stopping_place(new_x, new_y, new_vx, new_vy)
-            yaw = one.yaw
-            row = _nearest_row(paths, one, new_x, new_y)
+            yaw = walker.yaw
+            row = _nearest_row(paths, walker, new_x, new_y)
             tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
             if paths.narrow[row] or speed > STANDING_SPEED:
                 turn = np.arctan2(new_vy, new_vx) - yaw
@@ -224,17 +240,17 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
                 turn = (turn + np.pi) % (2 * np.pi) - np.pi
                 yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
             if attempt < 2 and (
-                _distance_to_path(paths, one, stop_x, stop_y) > off + 1e-9
+                _distance_to_path(paths, walker, stop_x, stop_y) > off + 1e-9
             ):
                 continue
             if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
-                one.yaw = yaw
+                walker.yaw = yaw
                 break
-            yaw = one.yaw
+            yaw = walker.yaw
             if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
                 break
-        one.xy[0], one.xy[1] = new_x, new_y
-        one.velocity[0], one.velocity[1] = new_vx, new_vy
+        walker.xy[0], walker.xy[1] = new_x, new_y
+        walker.velocity[0], walker.velocity[1] = new_vx, new_vy
 
 
 @compiled

@@ -105,13 +105,9 @@ class KittiDrive(BinDrive):
                 f" {times_path}"
             )
         calibration = path / "calib.txt"
-        X_CS = np.eye(4)
-        unit = None
+        X_CS, unit = np.eye(4), None
         if is_there(calibration):
-            rows = _read_calibration(calibration)
-            X_CS = pose_matrices(calibration, rows["Tr"])[0]
-            if "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH:
-                unit = "hdl-64e"
+            X_CS, unit = _calibrated(calibration)
         else:
             notes.append(
                 f"{calibration}: not there; the poses in {poses_path.name} are"
@@ -266,6 +262,21 @@ def _read_first_pose(path: Path) -> np.ndarray:
     if len(rows) != 1:
         raise InputError(f"{path}: {len(rows)} rows instead of one")
     return rows[0]
+
+
+def _calibrated(path: Path) -> tuple[np.ndarray, str | None]:
+    """Returns what the file of a drive's calibration says about its LiDAR.
+
+    Returns:
+        X_CS (4, 4), the pose of the LiDAR in the camera's frame; and the model
+        of the LiDAR, None if it is unknown.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    rows = _read_calibration(path)
+    is_kitti = "P0" in rows and rows["P0"][0, 0] > _KITTIS_FOCAL_LENGTH
+    return pose_matrices(path, rows["Tr"])[0], "hdl-64e" if is_kitti else None
 
 
 def _read_calibration(path: Path) -> dict[str, np.ndarray]:

@@ -196,15 +196,7 @@ def climb(
         (3 + layers,) int64: the pose, and how many of the query's cells overlap
         the place in each layer.
     """
-    # A grid of the place's filled cells and their neighbours, with a margin.
-    size = GRID + 2 * _MARGIN
-    place = np.zeros((NUM_LAYERS, size, size), np.uint8)
-    for layer in range(NUM_LAYERS):
-        for i in range(place_starts[layer], place_starts[layer + 1]):
-            row, column = int(place_cells[i]) >> 8, int(place_cells[i]) & 255
-            for r in range(max(row - 1, 0), min(row + 2, GRID)):
-                for c in range(max(column - 1, 0), min(column + 2, GRID)):
-                    place[layer, _MARGIN + r, _MARGIN + c] = 1
+    place = _widened_grid(place_cells, place_starts)
     common = np.zeros((3, 3, NUM_LAYERS), np.int64)
     pose = start.copy()
     _count_common(cells, starts, place, turns, pose, 1, common)
@@ -248,6 +240,24 @@ def climb(
                 break
             last = move
     return best
+
+
+@compiled
+def _widened_grid(cells: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Returns a grid (layers, S, S) of filled cells and their neighbours.
+
+    The grid has a margin of empty cells around the map. The arguments are the
+    cells of a place as for `climb`.
+    """
+    size = GRID + 2 * _MARGIN
+    grid = np.zeros((NUM_LAYERS, size, size), np.uint8)
+    for layer in range(NUM_LAYERS):
+        for i in range(starts[layer], starts[layer + 1]):
+            row, column = int(cells[i]) >> 8, int(cells[i]) & 255
+            for r in range(max(row - 1, 0), min(row + 2, GRID)):
+                for c in range(max(column - 1, 0), min(column + 2, GRID)):
+                    grid[layer, _MARGIN + r, _MARGIN + c] = 1
+    return grid
 
 
 @compiled

@@ -96,14 +96,7 @@ def with_texture(
         grain = cell_number(a / _GRAIN_SIZE, b / _GRAIN_SIZE, c / _GRAIN_SIZE)
         patch = cell_number(a / _PATCH_SIZE, b / _PATCH_SIZE, c / _PATCH_SIZE)
         area = cell_number(a / _AREA_SIZE, b / _AREA_SIZE, c / _AREA_SIZE)
-        # Most patches are a little brighter than the mean, few much darker.
-        dull = 0.4 - 0.085 * (1.0 - patch) ** 4
-        share = part * (dull + grain * grain * grain) + _AREA_CONTRAST * area
-        # Stains lie in dark areas, most of all; the square has a mean of 4 / 3.
-        stain = 1.5 * stains[geometry[k]] * (1.0 - area) ** 2
-        if patch + 1.0 < stain:
-            share -= _DARKEST_STAIN * (1.0 - (patch + 1.0) / stain)
-        share = min(max(share, _DARKEST), -_DARKEST)
+        share = _albedo_share(part, stains[geometry[k]], grain, patch, area)
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
         if tufts[geometry[k]] + swell[geometry[k]] > 0.0:
@@ -126,6 +119,28 @@ def with_texture(
             if thing > 1.0 - 2.0 * _FITTING_SHARE:
                 distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
+
+
+@compiled
+def _albedo_share(
+    contrast: float, stains: float, grain: float, patch: float, area: float
+) -> float:
+    """Returns the share from which a spot's albedo follows; see `_DARKEST`.
+
+    Args:
+        contrast: how much the albedo varies within the surface.
+        stains: part of the surface that is stained.
+        grain, patch, area: numbers from -1 to 1 of the spot's small, medium and
+            large cell.
+    """
+    # Most patches are a little brighter than the mean, few much darker.
+    dull = 0.4 - 0.085 * (1.0 - patch) ** 4
+    share = contrast * (dull + grain * grain * grain) + _AREA_CONTRAST * area
+    # Stains lie in dark areas, most of all; the square has a mean of 4 / 3.
+    stain = 1.5 * stains * (1.0 - area) ** 2
+    if patch + 1.0 < stain:
+        share -= _DARKEST_STAIN * (1.0 - (patch + 1.0) / stain)
+    return min(max(share, _DARKEST), -_DARKEST)
 
 
 @compiled

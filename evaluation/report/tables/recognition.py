@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -95,26 +95,24 @@ def recognition_table(
     measures = _PUBLISHED_MEASURES if mode is None else _MEASURES
     tcr = symmetric_changes(changes)
     rows = []
-    for pair, some in by_pair(results).items():
-        of_method = {
-            one.method: _ModeResult.of(
-                one, mode or reference.mode(one.method), reference
+    for pair, of_pair in by_pair(results).items():
+        by_method = {
+            outcome.method: _ModeResult.of(
+                outcome, mode or reference.mode(outcome.method), reference
             )
-            for one in some
+            for outcome in of_pair
         }
-        found = [of_method.get(method) for method in methods]
-        columns = [
-            ranked(
-                [one and getattr(one.metrics, name) for one in found],
-                [one and getattr(one.printed, name, None) for one in found],
-            )
-            for name in measures.values()
-        ]
-        cells = [column[i] for i in range(len(methods)) for column in columns]
-        drives = some[0].database, some[0].query
+        drives = of_pair[0].database, of_pair[0].query
         change = visible_change(evidence, *drives)
-        shown = tcr.get(pair), Cell(change.share, change.added)
-        rows.append((pair[0], " → ".join(pair[1:]), *shown, *cells))
+        rows.append(
+            (
+                pair[0],
+                " → ".join(pair[1:]),
+                tcr.get(pair),
+                Cell(change.share, change.added),
+                *_cells([by_method.get(m) for m in methods], measures.values()),
+            )
+        )
     captions = {
         None: f", {reference.counting}",
         "all": ", all queries counted (mode all)",
@@ -145,6 +143,28 @@ def recognition_table(
         " lower, too. Bold: best of a row; underlined: second. Beside"
         " visible change: the same minus that of the control.",
     )
+
+
+def _cells(
+    results: Sequence[_ModeResult | None], metric_names: Iterable[str]
+) -> list[Cell]:
+    """Returns the cells of a pair of drives: all metrics of each method.
+
+    Args:
+        results: result of each method; None if there is none.
+        metric_names: names of the metrics.
+    """
+    columns = [
+        ranked(
+            [result and getattr(result.metrics, name) for result in results],
+            [
+                result and getattr(result.printed, name, None)
+                for result in results
+            ],
+        )
+        for name in metric_names
+    ]
+    return [column[i] for i in range(len(results)) for column in columns]
 
 
 def _place_pose_text(results: Sequence[PlaceOutcome]) -> str:
