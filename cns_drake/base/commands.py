@@ -37,8 +37,8 @@ class Command(TyperCommand):
         for entry in re.split(r"\n(?! )", textwrap.dedent(entries)):
             name, _, meaning = entry.partition(": ")
             helps[name] = " ".join(meaning.split())
-        for one in params:
-            one.help = helps.get(one.name, one.help)
+        for param in params:
+            param.help = helps.get(param.name, param.help)
         super().__init__(*args, help=text, params=params, **settings)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -57,9 +57,10 @@ class Command(TyperCommand):
         # option's type.
         check_finite(
             {
-                str(one.name): ctx.params[str(one.name)]
-                for one in self.params
-                if getattr(getattr(one, "type", one), "min", None) is not None
+                str(param.name): ctx.params[str(param.name)]
+                for param in self.params
+                if getattr(getattr(param, "type", param), "min", None)
+                is not None
             }
         )
         return super().invoke(ctx)
@@ -95,10 +96,10 @@ def check_finite(values: Mapping[str, object]) -> None:
         InputError: a value is infinite or NaN; the message names the option.
     """
     for name, value in values.items():
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, float) and not math.isfinite(one):
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, float) and not math.isfinite(number):
                 option = name.replace("_", "-")
-                raise InputError(f"--{option}: {one} is not a finite number")
+                raise InputError(f"--{option}: {number} is not a finite number")
 
 
 def given_options(context: typer.Context) -> list[str]:
@@ -108,8 +109,8 @@ def given_options(context: typer.Context) -> list[str]:
     environment.
     """
     sources = {
-        str(one.name): context.get_parameter_source(str(one.name))
-        for one in context.command.params
+        str(param.name): context.get_parameter_source(str(param.name))
+        for param in context.command.params
     }
     return [
         name
@@ -177,14 +178,16 @@ def with_options(
         own = inspect.signature(command, eval_str=True).parameters.values()
         parameters = [
             *(
-                one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-                for one in own
-                if one.name != keyword
+                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+                for parameter in own
+                if parameter.name != keyword
             ),
             *added,
         ]
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {one.name: one.annotation for one in parameters}
+        run.__annotations__ = {
+            parameter.name: parameter.annotation for parameter in parameters
+        }
         return run
 
     return decorate

@@ -31,7 +31,11 @@ class InputModel(BaseModel):
 
 def _inner_types(annotation: Any) -> list[Any]:
     """Returns a type and all types that it is made of."""
-    inner = [kind for one in get_args(annotation) for kind in _inner_types(one)]
+    inner = [
+        kind
+        for argument in get_args(annotation)
+        for kind in _inner_types(argument)
+    ]
     return [annotation, *inner]
 
 
@@ -41,5 +45,5 @@ def _refuse_truth(value: Any) -> None:
     if isinstance(value, dict):
         value = list(value.values())
     if isinstance(value, list | tuple):
-        for one in value:
-            _refuse_truth(one)
+        for entry in value:
+            _refuse_truth(entry)

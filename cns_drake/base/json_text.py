@@ -21,9 +21,9 @@ def json_values(value: Any) -> Any:
     A dictionary or a list is copied, with all that is in it.
     """
     if isinstance(value, dict):
-        return {name: json_values(one) for name, one in value.items()}
+        return {name: json_values(entry) for name, entry in value.items()}
     if isinstance(value, list):
-        return [json_values(one) for one in value]
+        return [json_values(entry) for entry in value]
     return None if value != value else value
 
 
@@ -37,7 +37,7 @@ def parse_json(data: bytes) -> Any:
     """
     text = data.decode("utf-8-sig")
     brackets = _NO_BRACKET.sub(b"", _STRING.sub(b"", data))
-    steps = (1 if one in b"[{" else -1 for one in brackets)
+    steps = (1 if bracket in b"[{" else -1 for bracket in brackets)
     if max(itertools.accumulate(steps), default=0) > _DEEPEST:
         raise ValueError(f"nested more than {_DEEPEST} deep")
     if _SUSPECT.search(data):

@@ -36,7 +36,7 @@ class Pace:
         work, seconds = self._seen[-1]
         if work < _LEAST_SHARE * total or seconds < _LEAST_TIME:
             return None
-        half = next(one for one in self._seen if one[0] >= work / 2)
+        half = next(point for point in self._seen if point[0] >= work / 2)
         if half[0] >= work:
             return None
         first = half[1] / half[0]

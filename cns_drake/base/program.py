@@ -88,10 +88,10 @@ def make_program(
                     formatter.write_dl(
                         [
                             (
-                                f"{one:<{widest}}",
-                                self.commands[one].get_short_help_str(500),
+                                f"{name:<{widest}}",
+                                self.commands[name].get_short_help_str(500),
                             )
-                            for one in names
+                            for name in names
                         ]
                     )
 

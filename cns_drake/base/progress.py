@@ -84,12 +84,12 @@ def listener() -> Listener:
 
 
 @contextlib.contextmanager
-def heard_by(one: Listener) -> Iterator[None]:
+def heard_by(listener: Listener) -> Iterator[None]:
     """Makes a listener receive the progress reports of the `with` block.
 
     It does not receive the reports of other threads.
     """
-    token = _listener.set(one)
+    token = _listener.set(listener)
     before = _latest.set(None)
     try:
         yield

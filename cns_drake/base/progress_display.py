@@ -343,7 +343,7 @@ class _JobsDisplay(JobsListener):
         tasks = list(self._tasks.values())
         return [
             (f"{self._summary()}, {times}", self._left.share()),
-            *((one.text(), _share(one)) for one in tasks),
+            *((task.text(), _share(task)) for task in tasks),
         ]
 
     def _summary(self) -> str:

@@ -81,7 +81,7 @@ def train(
         fields["cities"] = cities
     if steps is not None:
         fields["steps"] = steps
-    fields |= {one.value: False for one in without or ()}
+    fields |= {part.value: False for part in without or ()}
     fields |= {"drawn_streets": drawn_streets, "graded": graded}
     plan = TrainingPlan.of_minutes(minutes, **fields)
     command = shlex.join(["cns-drake", *sys.argv[1:]])

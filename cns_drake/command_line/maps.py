@@ -72,7 +72,7 @@ def list_drives(
         rows += of_map
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     show(
-        {"drives": [asdict(one) for one in rows]},
+        {"drives": [asdict(row) for row in rows]},
         "\n".join(table_lines(rows, width)),
         json=json,
     )

@@ -305,7 +305,9 @@ def generate(
     scenarios = [load_scenario(name) for name in names or ()]
     if vary is not None:
         varied = varied_drives(vary, output, cluster)
-        scenarios += [one for one in varied if one not in scenarios]
+        scenarios += [
+            scenario for scenario in varied if scenario not in scenarios
+        ]
     if frames is not None:
         scenarios = [s.replaced(frames=frames) for s in scenarios]
     record_all(scenarios, output, cluster, overwrite=overwrite)

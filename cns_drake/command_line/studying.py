@@ -216,5 +216,7 @@ def _chosen_experiment(
         if names:
             # Methods of the experiment keep their settings.
             given = getattr(experiment, field) or {}
-            chosen.append((field, {one: given.get(one, {}) for one in names}))
+            chosen.append(
+                (field, {name: given.get(name, {}) for name in names})
+            )
     return load_experiment(name, chosen, quick=quick)

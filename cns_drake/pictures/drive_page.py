@@ -160,9 +160,9 @@ def _animate(
         frame: [] for frame in drive.X_WFs
     }
     inspector = world.scene_graph.model_inspector()
-    for one in read_perception_geometry(inspector, led.__contains__):
-        leading, X_FL = led[one.frame_id]
-        drawn[leading].append(replace(one, X_FG=X_FL @ one.X_FG))
+    for shape in read_perception_geometry(inspector, led.__contains__):
+        leading, X_FL = led[shape.frame_id]
+        drawn[leading].append(replace(shape, X_FG=X_FL @ shape.X_FG))
     for leading, geometries in drawn.items():
         path = _path(world, drive, leading)
         drawing.draw_body(meshcat, path, geometries)

@@ -81,15 +81,15 @@ class CapsuleAxes:
             # A sum over the last axis takes twenty times as long.
             d_along = sum(d_Sset[:, :, n] * axes_S[:, n] for n in range(3))
             ray = np.flatnonzero(d_along**2 >= 1.0 - _LARGEST_SINE**2)
-            some = rays.select(ray, rays.max_ranges_of(ray))
-            X_OC = product(group.X_OL_at(some.times), X_LC)
+            near = rays.select(ray, rays.max_ranges_of(ray))
+            X_OC = product(group.X_OL_at(near.times), X_LC)
             R_CO = X_OC[:, :, :3].swapaxes(1, 2)
             ranges, normals_C = _meet_capsule(
-                rotated(R_CO, some.p_OSset - X_OC[:, :, 3]),
-                rotated(R_CO, some.d_Oset()),
+                rotated(R_CO, near.p_OSset - X_OC[:, :, 3]),
+                rotated(R_CO, near.d_Oset()),
                 *size,
             )
-            is_nearer = ranges <= some.max_ranges
+            is_nearer = ranges <= near.max_ranges
             is_nearer &= ranges < hits.ranges[ray] - _RANGE_TOLERANCE
             ray = ray[is_nearer]
             hits.ranges[ray] = ranges[is_nearer]

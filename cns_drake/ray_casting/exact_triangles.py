@@ -99,14 +99,14 @@ def _entry_distance(
     """
     near, far = 0.0, limit
     for axis in range(3):
-        one = (boxes[node, 0, axis] - p[axis]) * r[axis]
-        other = (boxes[node, 1, axis] - p[axis]) * r[axis]
-        if one > other:
-            one, other = other, one
-        if one > near:
-            near = one
-        if other < far:
-            far = other
+        enters = (boxes[node, 0, axis] - p[axis]) * r[axis]
+        leaves = (boxes[node, 1, axis] - p[axis]) * r[axis]
+        if enters > leaves:
+            enters, leaves = leaves, enters
+        if enters > near:
+            near = enters
+        if leaves < far:
+            far = leaves
     return near if near <= far else np.inf
 
 

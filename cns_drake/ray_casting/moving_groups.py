@@ -51,7 +51,7 @@ class Placed(NamedTuple):
     def below(self, row: int) -> Placed:
         """Returns only the groups with row numbers less than `row`."""
         kept = self.rows < row
-        return Placed(*(one[kept] for one in self))
+        return Placed(*(column[kept] for column in self))
 
 
 NO_MOTIONS: Mapping[FrameId, Motion] = {}

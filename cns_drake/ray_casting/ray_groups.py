@@ -151,13 +151,15 @@ class RayGroup:
         shapes = tuple(
             (
                 # Comparing all triangles would take too long.
-                id(one) if isinstance(one, surfaces.TriangleSurface) else one,
+                id(surface)
+                if isinstance(surface, surfaces.TriangleSurface)
+                else surface,
                 X_LG.GetAsMatrix34().tobytes(),
             )
-            for _, X_LG, one in self.members
+            for _, X_LG, surface in self.members
         )
         # Curved shapes that never move are built in another way.
-        is_flat = all(isinstance(one, int) for one, _ in shapes)
+        is_flat = all(isinstance(shape, int) for shape, _ in shapes)
         return is_flat or self.frame_id is None, shapes
 
 

@@ -66,7 +66,7 @@ class BackgroundWriter:
                 written.
         """
         self._held.append(message)
-        size = sum([len(one) for one in message if isinstance(one, bytes)])
+        size = sum([len(part) for part in message if isinstance(part, bytes)])
         if not 0 < size < _SMALL_BYTES or len(self._held) >= _MOST_HELD:
             self._submit_held(_MOST_WAITING)
 

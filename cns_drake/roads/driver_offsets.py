@@ -275,8 +275,8 @@ def _ornstein_uhlenbeck(
     value = float(noise[0])
     values = [value]
     innovation = math.sqrt(1.0 - decay**2)
-    for one in noise[1:].tolist():
-        value = decay * value + innovation * one
+    for sample in noise[1:].tolist():
+        value = decay * value + innovation * sample
         values.append(value)
     return np.array(values)
 

@@ -332,7 +332,7 @@ def _make_junction(
             f"{wanted} must{advice}"
         )
     ends = sorted(
-        one._replace(heading=one.heading % (2 * np.pi)) for one in ends
+        end._replace(heading=end.heading % (2 * np.pi)) for end in ends
     )
     arms = []
     for k, (heading, road_name, end, half_width) in enumerate(ends):

@@ -138,14 +138,20 @@ def make_lane_path(
                 f"{source}: route.{k} ({leg.road} {leg.direction}): {error}"
             ) from error
     return sample_lane_path(
-        np.concatenate([one.points for one in stretches]),
+        np.concatenate([stretch.points for stretch in stretches]),
         np.concatenate(
-            [np.full(len(one.points), one.speed_limit) for one in stretches]
+            [
+                np.full(len(stretch.points), stretch.speed_limit)
+                for stretch in stretches
+            ]
         ),
         spacing,
         f"{source}: route",
         np.concatenate(
-            [np.tile(one.beside, (len(one.points), 1)) for one in stretches]
+            [
+                np.tile(stretch.beside, (len(stretch.points), 1))
+                for stretch in stretches
+            ]
         ),
     )
 
@@ -291,12 +297,12 @@ def _turning_loop(
         offsets = [
             _offsets_moved_right(
                 road,
-                one.direction,
-                np.array([road.lane_offset(one.direction, lane.lane)]),
+                of_leg.direction,
+                np.array([road.lane_offset(of_leg.direction, lane.lane)]),
                 np.array([from_entry]),
                 aside,
             )[0]
-            for one, lane, from_entry in (
+            for of_leg, lane, from_entry in (
                 (leg, leg.exit_lane, travelled),
                 (after, after.entry_lane, road.length - travelled),
             )

@@ -116,7 +116,7 @@ def _known_rows(path: Path) -> list[DriveRow]:
     types = get_type_hints(DriveRow)
     try:
         return [
-            DriveRow(**{name: one(row[name]) for name, one in types.items()})
+            DriveRow(**{name: kind(row[name]) for name, kind in types.items()})
             for _, row in read_records(path, list(types))
         ]
     except (InputError, ValueError):

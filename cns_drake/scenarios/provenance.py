@@ -59,7 +59,7 @@ def digest_inputs(
         InputError: a file cannot be read.
     """
     inputs = _input_files(scenario)
-    digests = {name: digest_file(one, watch) for name, one in inputs.items()}
+    digests = {name: digest_file(file, watch) for name, file in inputs.items()}
     if watch and scenario.imu.kalibr is not None:
         watch.record(str(scenario.imu.kalibr))
     kalibr = scenario.imu.describe_kalibr(scenario.fastest_rate)

@@ -236,10 +236,10 @@ class Scenario(Section):
     def _check_scan_rates(cls, lidars: dict) -> dict:
         # Every scan has the odometry of its own time.
         fastest = _fastest_rate(lidars)
-        for name, one in lidars.items():
-            if fastest % one.rate:
+        for name, lidar in lidars.items():
+            if fastest % lidar.rate:
                 raise ValueError(
-                    f"{name}.rate: {one.rate} does not divide {fastest}, the "
+                    f"{name}.rate: {lidar.rate} does not divide {fastest}, the "
                     "rate of the fastest LiDAR"
                 )
         return lidars
@@ -345,7 +345,11 @@ class Scenario(Section):
     @property
     def further_sensors(self) -> dict[str, SensorConfig]:
         """Sensors of user-defined kinds, by the name of their field."""
-        return {n: one for n, one in self if isinstance(one, SensorConfig)}
+        return {
+            n: section
+            for n, section in self
+            if isinstance(section, SensorConfig)
+        }
 
     def with_returns(
         self,
@@ -367,7 +371,9 @@ class Scenario(Section):
         else:
             ideal_fields = ("range_noise", "dropout", "faint_dropout")
             update = {"returns": returns, **dict.fromkeys(ideal_fields, 0.0)}
-        lidars = {n: one.replaced(**update) for n, one in self.lidars.items()}
+        lidars = {
+            n: lidar.replaced(**update) for n, lidar in self.lidars.items()
+        }
         return self.replaced(lidars=lidars, weather=weather or self.weather)
 
     def with_fields(
@@ -444,7 +450,7 @@ class Scenario(Section):
         """
         units = self.lidars.items()
         return self.replaced(
-            lidars={name: one.with_preset(preset) for name, one in units}
+            lidars={name: lidar.with_preset(preset) for name, lidar in units}
         )
 
 

@@ -151,7 +151,7 @@ def _find_base(
             f"{path}: base: {base!r} is neither a file nor a shipped drive "
             f"({', '.join(drives)}){did_you_mean(base, drives)}"
         )
-    if any(file.samefile(one) for one in found):
+    if any(file.samefile(known) for known in found):
         raise InputError(f"{path}: base: '{base}' has this drive as its base")
     return file
 

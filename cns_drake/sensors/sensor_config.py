@@ -142,14 +142,14 @@ def check_rate(
             allowed rates.
     """
     allowed = [
-        one
-        for one in range(lowest, HIGHEST_RATE + 1)
-        if _NS_PER_S % one == 0 and one % multiple_of == 0
+        candidate
+        for candidate in range(lowest, HIGHEST_RATE + 1)
+        if _NS_PER_S % candidate == 0 and candidate % multiple_of == 0
     ]
     if rate in allowed:
         return
-    below = [one for one in allowed if one < rate][-1:]
-    above = [one for one in allowed if one > rate][:1]
+    below = [candidate for candidate in allowed if candidate < rate][-1:]
+    above = [candidate for candidate in allowed if candidate > rate][:1]
     kind = "a number"
     if multiple_of > 1:
         kind = f"a multiple of {multiple_of}"

@@ -57,7 +57,7 @@ def plan_recording(scenario: Scenario) -> RecordingPlan:
         InputError: Kalibr's file cannot be used.
     """
     fastest = scenario.fastest_rate
-    layouts = {name: one.layout for name, one in scenario.lidars.items()}
+    layouts = {name: lidar.layout for name, lidar in scenario.lidars.items()}
     # Messages per second, for topics of further sensors and of cameras.
     further = {
         sensor.topic(name): sensor.rate or fastest
@@ -94,15 +94,15 @@ def _topic_schedule(scenario: Scenario, rates: dict[str, int]) -> Schedule:
     assert scenario.frames is not None
     last_scan = (scenario.frames - 1) * scenario.frame_period
     complete = max(
-        (math.floor(last_scan * one.rate + _TOLERANCE) + 1) / one.rate
-        for one in scenario.lidars.values()
+        (math.floor(last_scan * lidar.rate + _TOLERANCE) + 1) / lidar.rate
+        for lidar in scenario.lidars.values()
     )
     until = dict.fromkeys(periods, last_scan)
     if not scenario.imu.is_ideal:
         until[IMU_TOPIC.name] = complete
     if scenario.odometry.rate is not None:
         until[ODOMETRY_TOPIC.name] = until[TF_TOPIC.name] = complete
-    elif any(one.motion_distortion for one in scenario.lidars.values()):
+    elif any(lidar.motion_distortion for lidar in scenario.lidars.values()):
         until[TF_TOPIC.name] = complete
     # The number of the first sample at or after the end.
     return make_schedule(

@@ -291,7 +291,9 @@ def _add_cameras(
         return {}
     scene = _copy_for_cameras(
         drive,
-        classes=any(one.depth or one.label for one in cameras.values()),
+        classes=any(
+            camera.depth or camera.label for camera in cameras.values()
+        ),
         with_vehicle=see_vehicle,
     )
     scene.connect(builder, poses)
@@ -343,9 +345,11 @@ def _make_recorder(
         further=further,
         schedule=drive.recording.schedule,
         layouts=drive.recording.layouts,
-        num_rings={n: make_pattern(one).num_rings for n, one in lidars.items()},
+        num_rings={
+            n: make_pattern(lidar).num_rings for n, lidar in lidars.items()
+        },
         calibrated=[
-            n for n, one in lidars.items() if one.returns == "calibrated"
+            n for n, lidar in lidars.items() if lidar.returns == "calibrated"
         ],
         imu_variances=scenario.imu.noise(scenario.seed).variances(
             scenario.imu.sample_rate(scenario.fastest_rate)

@@ -64,8 +64,8 @@ def find_conflicts(
             for piece in graph.pieces
         ]
         areas = [
-            shapely.Polygon() if one is None else shapely.union_all(one[1])
-            for one in swept
+            shapely.Polygon() if entry is None else shapely.union_all(entry[1])
+            for entry in swept
         ]
         areas += [crossing.area for crossing in graph.crossings]
         tree = shapely.STRtree(areas)

@@ -115,7 +115,7 @@ def read_fcd(path: Path) -> FcdTrace:
         if names
     ]
     vehicles, jumps = _without_jumps(
-        vehicles, [kind_name(one) for one in vehicles], times
+        vehicles, [kind_name(vehicle) for vehicle in vehicles], times
     )
     persons, others = _without_jumps(persons, ["person"] * len(persons), times)
     jumps += others
@@ -151,15 +151,16 @@ def _remove_riders(steps: list[Element]) -> set[str]:
     riders = set()
     for step in steps:
         fronts = {
-            (one.number("x"), one.number("y")) for one in step.all("vehicle")
+            (vehicle.number("x"), vehicle.number("y"))
+            for vehicle in step.all("vehicle")
         }
         places = np.reshape(list(fronts), (-1, 2))
-        for one in list(step.all("person")):
-            away = places - (one.number("x"), one.number("y"))
+        for person in list(step.all("person")):
+            away = places - (person.number("x"), person.number("y"))
             apart = np.hypot(*away.T).min(initial=np.inf)
-            if one.value("vehicle", "") or apart < _RIDING:
-                riders.add(one.value("id"))
-                step.remove(one)
+            if person.value("vehicle", "") or apart < _RIDING:
+                riders.add(person.value("id"))
+                step.remove(person)
     return riders
 
 
@@ -170,9 +171,11 @@ def _other_elements(steps: list[Element]) -> dict[str, set[str]]:
     """
     found: dict[str, set[str]] = {}
     for step in steps:
-        for one in step.all("*"):
-            if one.tag not in ("vehicle", "person"):
-                found.setdefault(one.tag, set()).add(one.value("id", ""))
+        for element in step.all("*"):
+            if element.tag not in ("vehicle", "person"):
+                found.setdefault(element.tag, set()).add(
+                    element.value("id", "")
+                )
     return dict(sorted(found.items()))
 
 
@@ -208,17 +211,17 @@ def _traced_objects(steps: list[Element], tag: str) -> tuple[TracedObject, ...]:
     found: dict[str, list[tuple[float, ...]]] = {}
     types: dict[str, str] = {}
     for number, step in enumerate(steps):
-        for one in step.all(tag):
-            name = one.value("id")
+        for element in step.all(tag):
+            name = element.value("id")
             rows = found.setdefault(name, [])
             if rows and rows[-1][0] == number:
                 raise ValueError(
-                    f"line {one.line}: {tag} {name[:40]!r} is there twice"
+                    f"line {element.line}: {tag} {name[:40]!r} is there twice"
                 )
-            types.setdefault(name, one.value("type", ""))
-            place = [one.number(key) for key in ("x", "y", "angle")]
-            z = one.number("z") if "z" in one.attrib else np.nan
-            rows.append((number, *place, one.number("slope", 0.0), z))
+            types.setdefault(name, element.value("type", ""))
+            place = [element.number(key) for key in ("x", "y", "angle")]
+            z = element.number("z") if "z" in element.attrib else np.nan
+            rows.append((number, *place, element.number("slope", 0.0), z))
     objects = []
     for name, rows in found.items():
         number, x, y, angle, slope, z = np.transpose(rows)
@@ -252,25 +255,25 @@ def _without_jumps(
     """
     found = []
     jumps: list[str] = []
-    for one, kind in zip(objects, kinds, strict=True):
-        steps = np.diff(one.steps)
-        speeds = np.linalg.norm(np.diff(one.xy, axis=0), axis=1) / np.diff(
-            times[one.steps]
+    for traced, kind in zip(objects, kinds, strict=True):
+        steps = np.diff(traced.steps)
+        speeds = np.linalg.norm(np.diff(traced.xy, axis=0), axis=1) / np.diff(
+            times[traced.steps]
         )
         is_jump = (steps == 1) & (speeds > _FASTEST_OF.get(kind, _FASTEST))
         ends = np.flatnonzero(is_jump) + 1
         jumps += [
-            f"{one.name[:40]!r} at {times[one.steps[k]]:g} s, by"
+            f"{traced.name[:40]!r} at {times[traced.steps[k]]:g} s, by"
             f" {speeds[k - 1]:.0f} m/s"
             for k in ends
         ]
-        for begin, end in pairwise([0, *ends, len(one.steps)]):
+        for begin, end in pairwise([0, *ends, len(traced.steps)]):
             part = slice(begin, end)
             found.append(
                 replace(
-                    one,
+                    traced,
                     **{
-                        name: getattr(one, name)[part]
+                        name: getattr(traced, name)[part]
                         for name in ("steps", "xy", "yaw", "slope", "z")
                     },
                 )
@@ -278,12 +281,12 @@ def _without_jumps(
     return tuple(found), jumps
 
 
-def kind_name(one: TracedObject) -> str:
+def kind_name(vehicle: TracedObject) -> str:
     """Returns the name of a vehicle's kind; "" if its type does not state it.
 
     The result is one of `KINDS`.
     """
-    text = one.type_name.lower().replace("default_biketype", "bicycle")
+    text = vehicle.type_name.lower().replace("default_biketype", "bicycle")
     for word, name in _KINDS_BY_WORD:
         if word in text:
             return name

@@ -68,7 +68,7 @@ def play_trace(
         )
     lanes = np.concatenate([piece.points for piece in graph.pieces])
     _check_place(trace, path, lanes)
-    kinds = [_vehicle_kind(one, seed) for one in trace.vehicles]
+    kinds = [_vehicle_kind(vehicle, seed) for vehicle in trace.vehicles]
     heights = LaneHeights(lanes)
     trace = _at_map_heights(trace, heights)
     pairs = zip(trace.vehicles, kinds, strict=True)
@@ -76,7 +76,7 @@ def play_trace(
     vehicles = _make_tracks(trace, trace.vehicles, rows)
     strips = [walkway.points for walkway in walkways]
     ground = LaneHeights(np.concatenate([lanes, *strips]))
-    rows = [_person_rows(one, ground, trace.dt) for one in trace.persons]
+    rows = [_person_rows(person, ground, trace.dt) for person in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
     # The steps are short enough to notice everything that crosses the ego car's
@@ -87,7 +87,9 @@ def play_trace(
     half = [(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * len(trace.persons)
     kept_walkers = ~_meet_ego(walkers, half, times, ego, ego_box)
     return TrafficPlan(
-        tuple(kind for kind, one in zip(kinds, kept, strict=True) if one),
+        tuple(
+            kind for kind, is_kept in zip(kinds, kept, strict=True) if is_kept
+        ),
         vehicles.select(kept),
         walkers.select(kept_walkers),
         int((~kept).sum() + (~kept_walkers).sum()),
@@ -102,7 +104,7 @@ def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
         InputError: half of the trace is too far from the lanes.
     """
     traced = trace.vehicles or trace.persons
-    places = np.concatenate([one.xy for one in traced])
+    places = np.concatenate([road_user.xy for road_user in traced])
     distances, _ = cKDTree(lanes[:, :2]).query(places)
     off_road = _OFF_ROAD if trace.vehicles else 10.0 * _OFF_ROAD
     if np.median(distances) > off_road:
@@ -124,51 +126,56 @@ def _at_map_heights(trace: FcdTrace, heights: LaneHeights) -> FcdTrace:
 
     A trace without heights stays as it is.
     """
-    some = [one for one in trace.vehicles if np.isfinite(one.z).all()]
-    if not some:
+    with_heights = [
+        vehicle for vehicle in trace.vehicles if np.isfinite(vehicle.z).all()
+    ]
+    if not with_heights:
         return trace
-    z = np.concatenate([one.z for one in some])
+    z = np.concatenate([vehicle.z for vehicle in with_heights])
     zero = float(
-        np.median(heights.at(np.concatenate([o.xy for o in some])) - z)
+        np.median(
+            heights.at(np.concatenate([vehicle.xy for vehicle in with_heights]))
+            - z
+        )
     )
     vehicles, persons = (
-        tuple(replace(one, z=one.z + zero) for one in traced)
+        tuple(replace(road_user, z=road_user.z + zero) for road_user in traced)
         for traced in (trace.vehicles, trace.persons)
     )
     return replace(trace, vehicles=vehicles, persons=persons)
 
 
-def _vehicle_kind(one: TracedObject, seed: int) -> VehicleKind:
+def _vehicle_kind(vehicle: TracedObject, seed: int) -> VehicleKind:
     """Returns the kind of a vehicle: from its type, or else a random car."""
-    name = kind_name(one)
+    name = kind_name(vehicle)
     for kind in KINDS:
         if kind.name == name:
             return kind
-    rng = np.random.default_rng([seed, zlib.crc32(one.name.encode())])
+    rng = np.random.default_rng([seed, zlib.crc32(vehicle.name.encode())])
     return _CARS[int(rng.integers(len(_CARS)))]
 
 
 def _vehicle_rows(
-    one: TracedObject, kind: VehicleKind, heights: LaneHeights
+    vehicle: TracedObject, kind: VehicleKind, heights: LaneHeights
 ) -> np.ndarray:
     """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`."""
-    ahead = np.column_stack([cos(one.yaw), sin(one.yaw)])
-    xy = one.xy - kind.size[0] / 2 * ahead
+    ahead = np.column_stack([cos(vehicle.yaw), sin(vehicle.yaw)])
+    xy = vehicle.xy - kind.size[0] / 2 * ahead
     # An upward slope is a rotation about -y.
-    z = heights.along(xy, one.z, one.yaw)
-    return np.column_stack([xy, z, one.yaw, -one.slope])
+    z = heights.along(xy, vehicle.z, vehicle.yaw)
+    return np.column_stack([xy, z, vehicle.yaw, -vehicle.slope])
 
 
 def _person_rows(
-    one: TracedObject, heights: LaneHeights, dt: float
+    person: TracedObject, heights: LaneHeights, dt: float
 ) -> np.ndarray:
     """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`."""
-    steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(person.xy, axis=0), axis=1)
     turned = dt * gait_rate(steps / dt)
-    start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi
+    start = zlib.crc32(person.name.encode()) % 1000 * 2e-3 * np.pi
     phase = start + np.concatenate([[0.0], np.cumsum(turned)])
-    z = heights.along(one.xy, one.z, None)
-    return np.column_stack([one.xy, z, one.yaw, phase])
+    z = heights.along(person.xy, person.z, None)
+    return np.column_stack([person.xy, z, person.yaw, phase])
 
 
 def _make_tracks(
@@ -178,19 +185,19 @@ def _make_tracks(
     values = np.zeros((trace.num_steps, len(traced), 5))
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)
-    for k, (one, own) in enumerate(zip(traced, rows, strict=True)):
+    for k, (road_user, own) in enumerate(zip(traced, rows, strict=True)):
         # It already moves when it appears and disappears, for a LiDAR that is
         # turning then.
         steps = np.concatenate(
-            [one.steps[:1] - 1, one.steps, one.steps[-1:] + 1]
+            [road_user.steps[:1] - 1, road_user.steps, road_user.steps[-1:] + 1]
         )
         own = np.concatenate([own[:1], own, own[-1:]])
-        if len(one.steps) > 1:
+        if len(road_user.steps) > 1:
             own[[0, -1]] += own[[1, -2]] - own[[2, -3]]
         values[:, k] = np.transpose(
             [np.interp(times, steps, column) for column in own.T]
         )
-        present[one.steps, k] = True
+        present[road_user.steps, k] = True
     return Tracks(trace.dt, values, present)
 
 

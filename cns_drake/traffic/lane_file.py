@@ -128,9 +128,11 @@ def lane_text(
     return json.dumps(content, separators=(",", ":")) + "\n"
 
 
-def _numbers_except_none(one: Piece | Walkway, *names: str) -> dict[str, int]:
+def _numbers_except_none(
+    stretch: Piece | Walkway, *names: str
+) -> dict[str, int]:
     """Returns those of an object's named fields that are not -1."""
-    values = {name: getattr(one, name) for name in names}
+    values = {name: getattr(stretch, name) for name in names}
     return {name: value for name, value in values.items() if value != -1}
 
 
@@ -144,7 +146,7 @@ def read_lanes(path: Path) -> LaneFile:
         found = validated(_File, parse_json(read_bytes(path)), path)
     count = len(found.lanes)
     for k, lane in enumerate(found.lanes):
-        wrong = [one for one in lane.after if one >= count]
+        wrong = [following for following in lane.after if following >= count]
         if wrong or not lane.after:
             raise InputError(
                 f"{path}: lanes: {k}: after: "
@@ -156,10 +158,10 @@ def read_lanes(path: Path) -> LaneFile:
                 raise InputError(
                     f"{path}: lanes: {k}: {key}: {beside} is no lane"
                 )
-    for k, one in enumerate(found.walkways):
-        if one.crossing >= len(found.crossings):
+    for k, walkway in enumerate(found.walkways):
+        if walkway.crossing >= len(found.crossings):
             raise InputError(
-                f"{path}: walkways: {k}: crossing: {one.crossing} is none"
+                f"{path}: walkways: {k}: crossing: {walkway.crossing} is none"
             )
     pieces = tuple(
         Piece(
@@ -180,8 +182,8 @@ def read_lanes(path: Path) -> LaneFile:
         for way in found.walkways
     ]
     crossings = tuple(
-        lane_graph.make_crossing(np.array(one.line), one.width)
-        for one in found.crossings
+        lane_graph.make_crossing(np.array(crossing.line), crossing.width)
+        for crossing in found.crossings
     )
     return LaneFile(
         LaneGraph(pieces, crossings), walkways, tuple(found.in_the_way)

@@ -170,9 +170,11 @@ def _way_line(
     parts = [_shortened(lines[first], length - _trims_of(first, trims)[1], 0)]
     length = length_of(lines[last])
     head = _shortened(lines[last], 0, length - _trims_of(last, trims)[0])
-    for one in way:
-        after = head if one.outgoing == last else lines[one.outgoing]
-        parts += [one.points, after]
+    for connection in way:
+        after = (
+            head if connection.outgoing == last else lines[connection.outgoing]
+        )
+        parts += [connection.points, after]
     return np.concatenate(parts)
 
 

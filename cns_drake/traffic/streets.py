@@ -115,7 +115,7 @@ def make_streets(
         np.concatenate([piece.points for piece in pieces]),
         np.concatenate([_allowed_speeds(piece) for piece in pieces]),
         np.array([a for piece in pieces for a in piece.after]),
-        np.concatenate([np.cumsum(one) for one in shares]),
+        np.concatenate([np.cumsum(of_piece) for of_piece in shares]),
         make_signals(graph, conflicts[0][0]),
         *conflicts,
         _places_on_crossings(graph),
@@ -126,7 +126,9 @@ def make_streets(
 def _places_on_crossings(graph: LaneGraph) -> np.ndarray:
     """Returns `Streets.over` of a graph."""
     ways = [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
-    lines = [shapely.LineString(one.line[:, :2]) for one in graph.crossings]
+    lines = [
+        shapely.LineString(crossing.line[:, :2]) for crossing in graph.crossings
+    ]
     over = np.full((len(ways), len(lines)), np.nan)
     tree = shapely.STRtree(ways)
     for c, line in enumerate(lines):

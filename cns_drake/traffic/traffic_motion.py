@@ -346,18 +346,18 @@ def _register(
     for limb in limbs:
         frame = geometry.GeometryFrame(f"{name}_{limb.name}")
         frames.append(scene_graph.RegisterFrame(source, frame))
-        for one in limb.shapes:
-            label = f"{name}/{limb.name}_{one.name}"
+        for shape in limb.shapes:
+            label = f"{name}/{limb.name}_{shape.name}"
             number = scene_graph.RegisterGeometry(
                 source,
                 frames[-1],
-                geometry.GeometryInstance(one.X_LS, one.shape, label),
+                geometry.GeometryInstance(shape.X_LS, shape.shape, label),
             )
             for properties in (
                 geometry.PerceptionProperties(),
                 geometry.IllustrationProperties(),
             ):
-                rgba = geometry.Rgba(*one.rgb, 1.0)
+                rgba = geometry.Rgba(*shape.rgb, 1.0)
                 properties.AddProperty("phong", "diffuse", rgba)
                 scene_graph.AssignRole(source, number, properties)
     return tuple(frames)

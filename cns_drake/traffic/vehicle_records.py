@@ -125,12 +125,12 @@ def make_crossings(graph: LaneGraph) -> np.ndarray:
     crossings["waits"] = np.inf
     crossings["opened"] = crossings["closed"] = -np.inf
     crossings["to_end"], crossings["to_start"] = -np.inf, np.inf
-    for row, one in zip(crossings, graph.crossings, strict=True):
-        start, end = one.line[[0, -1], :2]
+    for row, crossing in zip(crossings, graph.crossings, strict=True):
+        start, end = crossing.line[[0, -1], :2]
         x, y = end - start
         row["length"] = np.sqrt(x * x + y * y)
         row["start"], row["along"] = start, (end - start) / row["length"]
-        row["marked"] = one.marked
+        row["marked"] = crossing.marked
     return crossings
 
 

@@ -242,9 +242,9 @@ class Crowd:
         A pedestrian who has waited too long for a gap in the traffic will draw
         another path.
         """
-        one = self._crossings[crossing]
-        one["waits"] = min(one["waits"], t)
-        if not one["marked"] and t - one["waits"] > _GIVES_UP:
+        record = self._crossings[crossing]
+        record["waits"] = min(record["waits"], t)
+        if not record["marked"] and t - record["waits"] > _GIVES_UP:
             self.walkers["next_path"][i] = -1
 
     def _begin_path(self, i: int, t: float) -> None:

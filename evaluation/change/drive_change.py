@@ -92,9 +92,11 @@ class ChangeReport:
             "tcr_target_to_source": sides["target"].ratio,
             "in_hull": change.num_in_hull,
             "unchanged": change.num_unchanged,
-            "voxels": {k: len(one.in_hull) for k, one in sides.items()},
-            "in_hull_of": {k: one.num_in_hull for k, one in sides.items()},
-            "unchanged_of": {k: one.num_unchanged for k, one in sides.items()},
+            "voxels": {k: len(side.in_hull) for k, side in sides.items()},
+            "in_hull_of": {k: side.num_in_hull for k, side in sides.items()},
+            "unchanged_of": {
+                k: side.num_unchanged for k, side in sides.items()
+            },
             "voxel_size": VOXEL_SIZE,
             "grids": len(GRIDS),
             "tau": TAU,
@@ -132,7 +134,7 @@ def change_between(source: DriveMap, target: DriveMap) -> ChangeReport:
     masked = None
     if source.positions is not None and target.positions is not None:
         both = (source.positions, target.positions)
-        masked = change.restricted(*(covered(one, both) for one in clouds))
+        masked = change.restricted(*(covered(cloud, both) for cloud in clouds))
     spread = change.symmetric, change.symmetric
     return ChangeReport(source.name, target.name, change, spread, masked)
 
@@ -164,7 +166,8 @@ def _change_on_grid(
 ) -> tuple[TemporalChange, list[np.ndarray]]:
     """Returns the change on a shifted grid, and the centroids of A and B."""
     clouds = [
-        one.voxels.merged(shift=shift).centroids_W for one in (source, target)
+        drive_map.voxels.merged(shift=shift).centroids_W
+        for drive_map in (source, target)
     ]
     return temporal_change(*clouds), clouds
 

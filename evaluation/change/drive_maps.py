@@ -76,7 +76,11 @@ def maps_in_one_world(
         InputError: if a path cannot be read, or a drive cannot be aligned.
     """
     opened = [open_source(path, lidar, columns) for path in paths]
-    drives = {i: one for i, one in enumerate(opened) if isinstance(one, Drive)}
+    drives = {
+        i: source
+        for i, source in enumerate(opened)
+        if isinstance(source, Drive)
+    }
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
     reports = []
@@ -96,8 +100,8 @@ def maps_in_one_world(
                 drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
     return [
-        _drive_map_of(drives.get(i, one), columns)
-        for i, one in enumerate(opened)
+        _drive_map_of(drives.get(i, source), columns)
+        for i, source in enumerate(opened)
     ], reports
 
 

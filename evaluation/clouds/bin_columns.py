@@ -141,7 +141,7 @@ def _read_windows(
             for k in np.unique(np.linspace(0, last, _WINDOWS).astype(int)):
                 stream.seek(4 * _WINDOW * int(k))
                 windows.append(np.fromfile(stream, "<f4", _WINDOW))
-    positions = np.concatenate([np.arange(len(one)) for one in windows])
+    positions = np.concatenate([np.arange(len(window)) for window in windows])
     return np.concatenate(windows), positions, sizes
 
 

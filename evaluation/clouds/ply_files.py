@@ -56,13 +56,15 @@ def read_ply(path: Path, block: int, on_note: OnNote) -> Iterator[np.ndarray]:
     alone = element is elements[-1]
     if encoding == "ascii":
         offset = _offset_after_lines(
-            path, offset, sum(one.number for one in before)
+            path, offset, sum(element.number for element in before)
         )
         # A vertex takes at least one byte.
         check_size(path, offset + count, exactly=False)
         more = not alone
         return read_text_records(path, offset, count, block, dtype, "PLY", more)
-    offset += sum(one.number * one.dtype(order).itemsize for one in before)
+    offset += sum(
+        element.number * element.dtype(order).itemsize for element in before
+    )
     check_size(path, offset + count * dtype.itemsize, exactly=alone)
     return read_records(path, dtype, offset, count, block)
 

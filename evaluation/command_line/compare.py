@@ -67,23 +67,23 @@ def compare(
         terminal.note(note)
     rows = [
         (
-            one.method,
-            f"{number_text(one.value)}{_spaced_interval(one.interval)}",
+            mean.method,
+            f"{number_text(mean.value)}{_spaced_interval(mean.interval)}",
         )
-        for one in found.ranked
+        for mean in found.ranked
     ]
     if rows:
         where = f"mean of {found.conditions or 'its own'} conditions"
-        known = any(_spaced_interval(one.interval) for one in found.ranked)
+        known = any(_spaced_interval(mean.interval) for mean in found.ranked)
         level = "  [95 %]" if known else ""
         rows.insert(0, ("method", f"{metric}, {where}{level}"))
-    for one in found.differences:
-        interval = interval_text(one.difference.interval)
+    for compared in found.differences:
+        interval = interval_text(compared.difference.interval)
         rows.append(
             (
-                f"{one.first} - {one.second}",
-                f"{number_text(one.difference.value)}  {interval}"
-                f"  p {number_text(one.p_value)}",
+                f"{compared.first} - {compared.second}",
+                f"{number_text(compared.difference.value)}  {interval}"
+                f"  p {number_text(compared.p_value)}",
             )
         )
     for alike in found.agreements:

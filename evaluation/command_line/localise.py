@@ -284,8 +284,8 @@ def _opened(
     source = open_source(place, lidar, columns)
     asked = open_source(query, lidar, columns)
     drive = asked if isinstance(asked, Drive) else OneScan(asked, columns)
-    for one in (source, drive):
-        for note in one.notes if isinstance(one, Drive) else ():
+    for opened in (source, drive):
+        for note in opened.notes if isinstance(opened, Drive) else ():
             terminal.note(note)
     if align == "always" and not isinstance(source, Drive):
         raise InputError(f"--align: {place} is no drive, and stays as it is")
@@ -332,7 +332,7 @@ def _rows(values: dict) -> Iterator[tuple[str, str]]:
         )
     yield (
         "  along, across, up",
-        ", ".join(text(f"{one}_median") for one in ("along", "across", "up")),
+        ", ".join(text(f"{axis}_median") for axis in ("along", "across", "up")),
     )
     yield (
         "AUROC of the estimator's score",

@@ -64,15 +64,15 @@ def map_update(
     if output is not None:
         make_folder(output)
     pair = sessions.read_pair(folder)
-    given = [one for one in (labels_a, labels_b) if one is not None]
+    given = [file for file in (labels_a, labels_b) if file is not None]
     method = (baseline or BaselineName.FREE_SPACE).value
     name = GIVEN if given else method
-    one = one_pair.pair_of_maps(
+    maps = one_pair.pair_of_maps(
         pair.A.folder, pair.B.folder, folder.resolve().name
     )
     task = LabelledMapTask(folder, [] if given else [method], given)
-    engine = one_pair.measure_pairs("map-update", [one], [task], output)
-    found = engine.found(one, task.name)[name]
+    engine = one_pair.measure_pairs("map-update", [maps], [task], output)
+    found = engine.found(maps, task.name)[name]
     if output is not None:
         for session, labels in zip(pair, found.labels, strict=True):
             sessions.write_labels(output / f"{session.side}.npy", labels)
@@ -85,8 +85,8 @@ def map_update(
 def _rows(name: str, scores: dict) -> Iterator[tuple[str, str]]:
     yield "method", name
     yield "mean IoU", terminal.number_text(scores["miou"])
-    for one in ("kept", "gone", "new", "unobserved"):
-        yield f"  {one}", terminal.number_text(scores[f"iou_{one}"])
+    for label in ("kept", "gone", "new", "unobserved"):
+        yield f"  {label}", terminal.number_text(scores[f"iou_{label}"])
     for title, part in (
         ("by point", scores),
         ("within 0.2 m", scores["within_02m"]),

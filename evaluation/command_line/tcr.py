@@ -76,7 +76,8 @@ def tcr(
     maps, alignments = maps_in_one_world(named, align, lidar, columns)
     before, after, *controls = maps
     compared = [(before, after)] + [
-        (one, change.same_stage_partner(before, after, one)) for one in controls
+        (third, change.same_stage_partner(before, after, third))
+        for third in controls
     ]
     pairs = [
         one_pair.pair_of_drive_maps(
@@ -93,20 +94,20 @@ def tcr(
     engine = one_pair.measure_pairs(
         "tcr", pairs, [ChangeTask({}, "tcr")], output
     )
-    report, *beside = (engine.found(one, ChangeTask.name) for one in pairs)
-    for one in beside:
-        report = report.beside(one)
+    report, *beside = (engine.found(pair, ChangeTask.name) for pair in pairs)
+    for other in beside:
+        report = report.beside(other)
     report = replace(
         report,
         spread=change.spread_over_grids(before, after, report.change),
         alignment=alignments[0] if alignments else None,
     )
-    for one in maps:
-        for note in one.notes:
+    for drive_map in maps:
+        for note in drive_map.notes:
             terminal.note(note)
-        ignored = one.voxels.num_ignored
+        ignored = drive_map.voxels.num_ignored
         if ignored:
-            terminal.note(f"{one.name}: {ignored} {NOT_FINITE}")
+            terminal.note(f"{drive_map.name}: {ignored} {NOT_FINITE}")
     for alignment in alignments:
         terminal.note(alignment.to_text())
     if output is not None:

@@ -96,7 +96,7 @@ class HeliprDrive(FileDrive):
         if not is_chosen and len(there) > 1:
             chosen = (
                 f"{path}: the scans of {lidar} are read (--lidar reads those of"
-                f" another: {', '.join(one for one in there if one != lidar)})",
+                f" another: {', '.join(n for n in there if n != lidar)})",
             )
         files, stamps_ns = list_stamped(drive / _SCANS / lidar, ".bin")
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()

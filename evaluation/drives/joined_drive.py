@@ -47,9 +47,12 @@ class JoinedDrive(Drive):
             poses.append(drive.X_WS)
         self.starts = np.cumsum([0, *map(len, stamps)])
         # Drives of different years have the same times; a frame has one stamp.
-        ends = np.cumsum([0, *(int(one[-1]) + 1 for one in stamps)])
+        ends = np.cumsum([0, *(int(of_drive[-1]) + 1 for of_drive in stamps)])
         self._stamps_ns = np.concatenate(
-            [one + end for one, end in zip(stamps, ends[:-1], strict=True)]
+            [
+                of_drive + end
+                for of_drive, end in zip(stamps, ends[:-1], strict=True)
+            ]
         )
         self._X_WS = np.concatenate(poses)
 

@@ -150,7 +150,9 @@ class KittiDrive(BinDrive):
     def files(self) -> tuple[Path, ...]:
         if self._labels is None:
             return super().files
-        labels = (_label_path(self._labels, one) for one in self._files)
+        labels = (
+            _label_path(self._labels, scan_file) for scan_file in self._files
+        )
         return (*super().files, *labels)
 
     @property

@@ -64,7 +64,7 @@ class FileDrive(Drive):
         self._stamps_ns = stamps_ns
         self._X_WS = X_WS
         self._read = read
-        self._tables = tuple(one for one in tables if one.is_file())
+        self._tables = tuple(table for table in tables if table.is_file())
         self._notes = notes
         self._datum = datum
         self._scenario = scenario
@@ -177,11 +177,11 @@ def first_existing(candidates: Iterable[Path], notes: list[str]) -> Path | None:
     If other files or folders exist as well and differ from the first, a note is
     added to `notes`.
     """
-    there = [one for one in candidates if one.exists()]
+    there = [candidate for candidate in candidates if candidate.exists()]
     if not there:
         return None
     first, *others = there
-    others = [one for one in others if not _is_same(first, one)]
+    others = [other for other in others if not _is_same(first, other)]
     if others:
         named = ", ".join(map(str, others))
         notes.append(f"{first}: read; not read: {named}")

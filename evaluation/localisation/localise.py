@@ -230,8 +230,8 @@ def _localise_from_all_starts(
     """
     found = []
     for localiser in _localisers:
-        for some in starts:
-            initial = InitialPose.moved(X_WS, *some.draw(frame))
+        for drawn in starts:
+            initial = InitialPose.moved(X_WS, *drawn.draw(frame))
             row, _ = localiser.query(frame, stamp_ns, scan, X_WS, R_WT, initial)
             found.append(row)
     return found
@@ -286,20 +286,22 @@ def localise(
         context = multiprocessing.get_context("fork")
         with ProcessPoolExecutor(jobs, context) as pool:
             for first in range(0, len(frames), _WAITING * jobs):
-                some = frames[first : first + _WAITING * jobs]
+                batch = frames[first : first + _WAITING * jobs]
                 waiting = [
                     pool.submit(_localise_from_all_starts, *arguments(f))
-                    for f in some
+                    for f in batch
                 ]
-                for one in waiting:
-                    yield one.result()
+                for future in waiting:
+                    yield future.result()
 
     _localisers = localisers
     with errors_at(query.name):
         done = list(
             track(rows(), f"localising {query.name}", len(frames), "scans")
         )
-    return [np.array(list(some), QUERY) for some in zip(*done, strict=True)]
+    return [
+        np.array(list(records), QUERY) for records in zip(*done, strict=True)
+    ]
 
 
 def query_frames(

@@ -55,9 +55,9 @@ class Settings:
             *(() if method in _VOXELS else ("resolution",)),
         }
         known: dict[str, Callable] = {
-            one.name: int if isinstance(one.default, int) else float
-            for one in fields(self)
-            if one.name not in unused
+            field.name: int if isinstance(field.default, int) else float
+            for field in fields(self)
+            if field.name not in unused
         }
         found = {}
         for name, text in values:

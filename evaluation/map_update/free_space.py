@@ -156,8 +156,8 @@ def _count_views(points: np.ndarray, other: Session) -> _Views:
     """
     counts = np.zeros((3, len(points)), np.int32)
     chosen = sample_frames(other.X_WS[:, :3, 3], _SPACING).tolist()
-    some = chosen[:: max(len(chosen) // _FIELD_SCANS, 1)]
-    scans = [other.scan(number) for number in some]
+    sampled = chosen[:: max(len(chosen) // _FIELD_SCANS, 1)]
+    scans = [other.scan(number) for number in sampled]
     returns = np.concatenate([np.zeros((0, 3)), *scans])
     if len(returns) == 0:
         return _Views(*counts)

@@ -89,7 +89,7 @@ def score(
     result["by_structure"] = _scores_by_structure(both)
     result.update(_predicted_shares(still))
     result["updated_map"] = _scores_of_updated_map(both)
-    classes = np.unique(np.concatenate([one.classes for one in pair]))
+    classes = np.unique(np.concatenate([session.classes for session in pair]))
     result["by_class"] = {
         names.get(number, str(number)): _scores_by_points(
             both.only([session.classes == number for session in pair])
@@ -209,10 +209,10 @@ def _scores_by_structure(both: _Labelled) -> dict[str, float]:
     for k, (name, (side, label)) in enumerate(_CHANGES.items()):
         true, guessed = (
             verdicts(
-                pair[k].instances[counted[k]], one[k][counted[k]], side
+                pair[k].instances[counted[k]], labels[k][counted[k]], side
             ).labels
             == label
-            for one in (truth, predicted)
+            for labels in (truth, predicted)
         )
         right = (true & guessed).sum()
         found[f"precision_{name}"] = _ratio(right, guessed.sum())
@@ -238,7 +238,9 @@ def _predicted_shares(both: _Labelled) -> dict[str, float]:
         structures.append(is_found == changed)
         right.append((is_true == is_found)[is_true != unobserved])
     return {
-        name: _ratio(sum(int(one.sum()) for one in parts), sum(map(len, parts)))
+        name: _ratio(
+            sum(int(part.sum()) for part in parts), sum(map(len, parts))
+        )
         for name, parts in (
             ("called_points", points),
             ("called_structures", structures),

@@ -184,7 +184,9 @@ def read_labels(path: Path, session: Session, *, truth: bool) -> np.ndarray:
     wrong = ~np.isin(labels, allowed)
     if wrong.any():
         place = int(wrong.argmax())
-        names = ", ".join(f"{int(one)} {one.name.lower()}" for one in allowed)
+        names = ", ".join(
+            f"{int(label)} {label.name.lower()}" for label in allowed
+        )
         raise InputError(
             f"{path}: point {place} has the label {labels[place]}; those of "
             f"{session.side} are {names}"
@@ -343,7 +345,7 @@ def read_truth(pair: SessionPair) -> PairLabels:
     """
     return PairLabels(
         *(
-            read_labels(one.folder / "truth.npy", one, truth=True)
-            for one in pair
+            read_labels(session.folder / "truth.npy", session, truth=True)
+            for session in pair
         )
     )

@@ -186,7 +186,7 @@ def _gone_cubes(
 
 def _in_cells_of(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Returns which points (N, 3) share a cell with points of a map, (N,)."""
-    cells = [np.floor(one / CELL) for one in (points, others)]
+    cells = [np.floor(cloud / CELL) for cloud in (points, others)]
     corner = np.concatenate(cells).min(axis=0, initial=0.0)
-    (keys, _), (taken, _) = (cell_keys(one - corner) for one in cells)
+    (keys, _), (taken, _) = (cell_keys(corners - corner) for corners in cells)
     return np.isin(keys, taken)

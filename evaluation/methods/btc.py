@@ -292,8 +292,10 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         P is the LiDAR of the place. X_PQ is the pose on which most of the
         matching triangles agree; None if too few triangles match or agree.
         """
-        some = self.build_database([database.places[place] for place in places])
-        found = dict(self._motions(query, some, None))
+        database_of_places = self.build_database(
+            [database.places[place] for place in places]
+        )
+        found = dict(self._motions(query, database_of_places, None))
         return [found.get(index) for index in range(len(places))]
 
     def _motions(

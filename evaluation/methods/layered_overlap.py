@@ -232,8 +232,8 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             return poses
         # An exhaustive search refines every place at every heading.
         every = len(scans) * len(_FIRST_TURNS)
-        some = self.build_database(scans)
-        for start in _search(query, some, every, every):
+        database_of_places = self.build_database(scans)
+        for start in _search(query, database_of_places, every, every):
             scan = scans[start[0]]
             if len(scan.cells) > 0:
                 found = self._climb(query, scan, start[1:])
@@ -363,10 +363,10 @@ def _maps_of_places(
     The heading is the heading of the recorded scan.
     """
     maps = [_maps_of_scan(place, turns(1), halvings) for place in places]
-    bits = np.concatenate([one.bits for one in maps])
+    bits = np.concatenate([of_place.bits for of_place in maps])
     return CoarseMaps(
         np.pad(bits, ((0, 0), (margin, margin), (0, 0))),
-        np.concatenate([one.counts for one in maps]),
+        np.concatenate([of_place.counts for of_place in maps]),
     )
 
 
@@ -385,9 +385,9 @@ def _indices_of_greatest(values: np.ndarray, number: int) -> np.ndarray:
     Equal values are in order of their indices. A partial sort alone would leave
     their order to the processor.
     """
-    some = np.arange(len(values))
+    candidates = np.arange(len(values))
     if number < len(values):
         least = np.partition(values, -number)[-number]
-        some = np.flatnonzero(values >= least)
-    order = some[np.argsort(-values[some], kind="stable")]
+        candidates = np.flatnonzero(values >= least)
+    order = candidates[np.argsort(-values[candidates], kind="stable")]
     return order[:number]

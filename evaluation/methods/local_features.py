@@ -73,7 +73,7 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     least = mean + 2.0 * scale * np.cos(angle + 2.0 * math.pi / 3.0)
     # Values that rounding makes negative are set to 0.
     l2, l3 = np.maximum(3.0 * mean - l1 - least, 0.0), np.maximum(least, 0.0)
-    entropy = sum(scipy.special.entr(one) for one in (l1, l2, l3))
+    entropy = sum(scipy.special.entr(eigenvalue) for eigenvalue in (l1, l2, l3))
     return np.stack(
         [l3, np.cbrt(l1 * l2 * l3), entropy, roundness, height, variance],
         axis=1,

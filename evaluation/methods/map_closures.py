@@ -157,10 +157,11 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         database.query = query
         # The package has the motion from the earlier map to the later one.
         database.found = {
-            one.source_id: (
-                one.number_of_inliers,
-                np.linalg.inv(np.asarray(one.pose)),
+            closure.source_id: (
+                closure.number_of_inliers,
+                np.linalg.inv(np.asarray(closure.pose)),
             )
-            for one in closures
-            if one.source_id < database.num_places and one.number_of_inliers > 0
+            for closure in closures
+            if closure.source_id < database.num_places
+            and closure.number_of_inliers > 0
         }

@@ -128,8 +128,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             clouds: up to `batch_size` clouds.
             of_places: whether the clouds are of places, and not of queries.
         """
-        one = self.describe_place if of_places else self.describe
-        return [one(cloud) for cloud in clouds]
+        describe_one = self.describe_place if of_places else self.describe
+        return [describe_one(cloud) for cloud in clouds]
 
     def for_lidar(self, field: LidarField | None) -> "Method":
         """Returns the method adapted to a LiDAR; by default the method itself.
@@ -279,7 +279,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Override this function if your method estimates several poses faster
         than one by one.
         """
-        return [self.relative_pose(query, database, one) for one in places]
+        return [self.relative_pose(query, database, place) for place in places]
 
 
 def check_number(

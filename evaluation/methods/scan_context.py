@@ -242,11 +242,11 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         chosen = np.sort(chosen)
         scores = np.full(database.num_places, np.nan)
         for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
-            some = chosen[start : start + _CONTEXTS_AT_ONCE]
-            similarities, _ = self._best_similarities(query, database, some)
+            batch = chosen[start : start + _CONTEXTS_AT_ONCE]
+            similarities, _ = self._best_similarities(query, database, batch)
             # fmax takes the best context of a place, and NaN only if all are
             # NaN.
-            np.fmax.at(scores, database.places[some], similarities)
+            np.fmax.at(scores, database.places[batch], similarities)
         return scores
 
     def relative_pose(
@@ -329,11 +329,11 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         with np.errstate(invalid="ignore"):
             similarities = np.where(common > 0, sums / common, -np.inf)
         best = similarities.argmax(axis=1)
-        one = np.arange(len(chosen))
-        highest = similarities[one, best]
+        context = np.arange(len(chosen))
+        highest = similarities[context, best]
         return (
             np.where(np.isfinite(highest), highest, np.nan),
-            shifts[one, best],
+            shifts[context, best],
         )
 
 

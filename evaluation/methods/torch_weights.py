@@ -62,11 +62,14 @@ def read_weights(
         )
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            if sum(one.file_size for one in archive.infolist()) > MOST_BYTES:
+            if (
+                sum(entry.file_size for entry in archive.infolist())
+                > MOST_BYTES
+            ):
                 raise ValueError(f"unpacks to more than {MOST_BYTES} bytes")
             names = archive.namelist()
-            (name,) = (one for one in names if one.endswith("/data.pkl"))
-            if any("/code/" in one for one in names):
+            (name,) = (entry for entry in names if entry.endswith("/data.pkl"))
+            if any("/code/" in entry for entry in names):
                 raise ValueError("a program of TorchScript; save its state")
             state = _find_state(
                 path, unpickle_tensors(archive.read(name)), shapes
@@ -158,9 +161,9 @@ def _read_tensor(
             f"{path}: {name}: numbers of the type {tensor.storage.kind}"
         )
     (root,) = (
-        one.removesuffix("data.pkl")
-        for one in archive.namelist()
-        if one.endswith("/data.pkl")
+        entry.removesuffix("data.pkl")
+        for entry in archive.namelist()
+        if entry.endswith("/data.pkl")
     )
     order = "<"
     if f"{root}byteorder" in archive.namelist():

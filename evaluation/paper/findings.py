@@ -147,8 +147,8 @@ def _trends(
 def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
     real = paper().changes[KAIST]
     ours = _first_to_last(
-        (one.map_name, one.stages[0], one.report.change.symmetric)
-        for one in changes
+        (change.map_name, change.stages[0], change.report.change.symmetric)
+        for change in changes
     )
     theirs = _first_to_last(
         (name, first, value)
@@ -220,7 +220,7 @@ def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:
     )
     # The wording is the same for all methods; the paper itself makes an
     # exception for BTC.
-    falls = [one.falls for name, one in trends.items() if name != "btc"]
+    falls = [trend.falls for name, trend in trends.items() if name != "btc"]
     if not falls:
         return Finding(claim, UNDECIDED, too_few)
     known = {method for *_, method, _ in paper().recognitions}

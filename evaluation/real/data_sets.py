@@ -220,30 +220,38 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    known = {one.folder for one in DATA_SETS} | {*_OTHERS}
-    scans = [listed(folder / one.folder, one.scans) for one in DATA_SETS]
-    if not any(scans) and not any((folder / one).is_dir() for one in _OTHERS):
+    known = {data_set.folder for data_set in DATA_SETS} | {*_OTHERS}
+    scans = [
+        listed(folder / data_set.folder, data_set.scans)
+        for data_set in DATA_SETS
+    ]
+    if not any(scans) and not any(
+        (folder / other).is_dir() for other in _OTHERS
+    ):
         names = ", ".join(sorted(known))
         raise InputError(f"{folder}: no data set that is known ({names})")
     found = []
-    for one, files in zip(DATA_SETS, scans, strict=True):
+    for data_set, files in zip(DATA_SETS, scans, strict=True):
         if not files:
-            on_note(f"{one.folder}/{one.scans}: not there, skipped")
+            on_note(f"{data_set.folder}/{data_set.scans}: not there, skipped")
             continue
         digest = hashlib.sha256()
         for file in files:
             digest.update(read_bytes(file))
-        columns = one.columns
-        if digest.hexdigest() != one.digest:
+        columns = data_set.columns
+        if digest.hexdigest() != data_set.digest:
             columns = None
             on_note(
-                f"{folder / one.folder}: other scans than known, still used"
+                f"{folder / data_set.folder}: other scans than known, still"
+                " used"
             )
-        source = DataSetSource((folder / one.folder).absolute(), one, columns)
+        source = DataSetSource(
+            (folder / data_set.folder).absolute(), data_set, columns
+        )
         drive = source()
         for note in drive.notes:
             on_note(note)
-        found.append(RealScans(one, drive, source))
+        found.append(RealScans(data_set, drive, source))
     for path in listed(folder):
         if path.is_dir() and path.name not in known:
             on_note(f"{path}: not known, left out")
@@ -251,32 +259,32 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
 
 
 def _open_files(
-    folder: Path, one: DataSet, files: Sequence[Path], columns: int | None
+    folder: Path, data_set: DataSet, files: Sequence[Path], columns: int | None
 ) -> Drive:
-    if one.poses == "drive":
+    if data_set.poses == "drive":
         return open_drive(folder)
     number = len(files)
     table = folder / "poses.txt"
     X_WS = np.tile(np.eye(4), (number, 1, 1))
     X_WS[:, 0, 3] = _APART * np.arange(number)
-    if one.poses == "matrices":
+    if data_set.poses == "matrices":
         X_WS = read_poses(table)
         if len(X_WS) != number:
             raise InputError(f"{table}: {len(X_WS)} rows for {number} scans")
-    elif one.poses:
+    elif data_set.poses:
         X_WS = _named_poses(table, files)
     options: dict = {
-        "name": one.folder,
-        "world_frame": one.world,
+        "name": data_set.folder,
+        "world_frame": data_set.world,
         "files": list(files),
         "stamps_ns": np.arange(number),
         "X_WS": X_WS,
         "tables": [table],
-        "unit": one.unit,
+        "unit": data_set.unit,
     }
-    if one.read is None and files[0].suffix == ".bin":
+    if data_set.read is None and files[0].suffix == ".bin":
         return BinDrive(columns, **options)
-    read = one.read
+    read = data_set.read
     notes: list[str] = []
     if read is None:
         read = read_cloud
@@ -315,7 +323,7 @@ def simulated_drives(
         raise InputError(f"{folder}: no such folder")
     field = lidar_field(unit)
     alike = []
-    for path in (one for one in listed(folder) if one.is_dir()):
+    for path in (entry for entry in listed(folder) if entry.is_dir()):
         if path.name in _OTHERS:
             continue
         drive = open_drive(path)

@@ -138,8 +138,8 @@ def open_sequences(
     """
     return [
         found
-        for one in _folders(folder)
-        for found in _opened(one, on_note, queries)
+        for sequence_folder in _folders(folder)
+        for found in _opened(sequence_folder, on_note, queries)
     ]
 
 
@@ -156,11 +156,13 @@ def open_images(folder: Path) -> list[NamedDrive]:
         InputError: see `open_sequences`.
     """
     found = []
-    for one in _folders(folder):
-        shown = _parts(one)[0] or one
+    for sequence_folder in _folders(folder):
+        shown = _parts(sequence_folder)[0] or sequence_folder
         frames = tuple(range(len(_read(shown)[0])))
-        source = ImageSource(shown, one.name, frames)
-        found.append(NamedDrive(one.name, source, num_scans=len(frames)))
+        source = ImageSource(shown, sequence_folder.name, frames)
+        found.append(
+            NamedDrive(sequence_folder.name, source, num_scans=len(frames))
+        )
     return found
 
 
@@ -197,7 +199,7 @@ def _folders(folder: Path) -> list[Path]:
     """Returns the folders of the sequences in a folder that may not exist."""
     if not folder.exists():
         return []
-    inside = [one for one in listed(folder) if one.is_dir()]
+    inside = [entry for entry in listed(folder) if entry.is_dir()]
     if not inside:
         raise InputError(f"{folder}: no folder of a sequence in it")
     return inside
@@ -222,10 +224,10 @@ def _opened(
     """Yields the sequence in a folder, unless no query has a match."""
     # The sequences of KITTI odometry are numbers.
     name = f"kitti_{folder.name}" if folder.name.isdigit() else folder.name
-    folders = [one for one in _parts(folder) if one] or [folder]
-    found = [_read(one) for one in folders]
-    for one, (files, _) in zip(folders, found, strict=True):
-        for file in track(files, f"checking {one}", len(files), "images"):
+    folders = [part for part in _parts(folder) if part] or [folder]
+    found = [_read(images) for images in folders]
+    for images, (files, _) in zip(folders, found, strict=True):
+        for file in track(files, f"checking {images}", len(files), "images"):
             check_image(file)
     splits = [range(len(files)) for files, _ in found]
     if len(splits) == 1:
@@ -275,7 +277,7 @@ def _opened(
 
 def _split(folder: str, name: str, number: int, on_note: OnNote) -> list[range]:
     """Returns the frames of the places and of the queries in a sequence."""
-    splits = [range(*one) for one in _SPLITS.get(folder, ())]
+    splits = [range(*ends) for ends in _SPLITS.get(folder, ())]
     if splits and splits[-1].stop <= number:
         return splits
     half = number // 2

@@ -187,7 +187,7 @@ def common_names(sets: list[Features]) -> list[str]:
     patches have it.
     """
     names = list(dict.fromkeys(n for s in sets for row in s.rows for n in row))
-    shares = [np.isfinite(one.of(names)).mean(axis=0) for one in sets]
+    shares = [np.isfinite(features.of(names)).mean(axis=0) for features in sets]
     kept = np.min(shares, axis=0) >= 0.1
     return [name for name, is_kept in zip(names, kept, strict=True) if is_kept]
 
@@ -204,13 +204,13 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
         simulated: features and places of simulated patches.
         names: names of the features that the classifier uses.
     """
-    sets = [_in_folds(one) for one in (real, simulated)]
+    sets = [_in_folds(features) for features in (real, simulated)]
     folds = min(_MOST_FOLDS, *(fold.max() + 1 for fold in sets))
     if folds < 2:
         return np.nan
     x = np.concatenate([real.of(names), simulated.of(names)])
     y = np.repeat([1, 0], [len(real.rows), len(simulated.rows)])
-    fold = np.concatenate([one % folds for one in sets])
+    fold = np.concatenate([places % folds for places in sets])
     model = HistGradientBoostingClassifier(
         max_iter=_TREES,
         min_samples_leaf=10,
@@ -227,9 +227,9 @@ def tell_apart(real: Features, simulated: Features, names: list[str]) -> float:
     return float(np.mean(aucs))
 
 
-def _in_folds(one: Features) -> np.ndarray:
+def _in_folds(features: Features) -> np.ndarray:
     """Returns the number of each patch's place, counted by appearance."""
-    return np.unique(one.place, return_inverse=True)[1]
+    return np.unique(features.place, return_inverse=True)[1]
 
 
 def aucs_by_group(real: Features, simulated: Features) -> dict:
@@ -285,9 +285,9 @@ def judge_draws(
     ]
     means = {
         key: {
-            group: float(np.mean([one[key][group] for one in results]))
+            group: float(np.mean([result[key][group] for result in results]))
             for group in results[0][key]
-            if all(group in one[key] for one in results)
+            if all(group in result[key] for result in results)
         }
         for key in ("auc", "control")
     }

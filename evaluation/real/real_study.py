@@ -104,8 +104,8 @@ def measure_real(
             read.
     """
     chosen = list(names) or [*shipped_methods(), *SHIPPED]
-    aligning = [one for one in chosen if _is_estimator(one)]
-    recognising = [one for one in chosen if one not in aligning]
+    aligning = [name for name in chosen if _is_estimator(name)]
+    recognising = [name for name in chosen if name not in aligning]
     choices: tuple[MethodChoice, ...] = ()
     if recognising:
         choices = choose_methods(recognising, settings)
@@ -117,14 +117,14 @@ def measure_real(
     tasks.append(JudgeTask({}, _NAME))
     engine = Engine(
         _NAME,
-        {one.name: one for one in tasks},
+        {task.name: task for task in tasks},
         {},
         output.absolute(),
         on_note,
     )
     found = open_data_sets(folder, on_note)
     images = open_sequences(folder / FOLDER, on_note, queries)
-    units = dict.fromkeys(one.data_set.unit for one in found)
+    units = dict.fromkeys(scans.data_set.unit for scans in found)
     if images:
         units[UNIT] = None
     made_of = {
@@ -134,7 +134,7 @@ def measure_real(
     made_images = open_images(simulated / FOLDER) if simulated else []
     _add_images(engine, images, made_of.get(UNIT, []) + made_images, choices)
     for unit, made in made_of.items():
-        sets = [one for one in found if one.data_set.unit == unit]
+        sets = [scans for scans in found if scans.data_set.unit == unit]
         if made_images and not sets:
             continue
         _add_unit(engine, sets, made, choices)
@@ -177,28 +177,28 @@ def _add_images(
     if not sequences:
         return
     is_judged = bool(made) and _has_classifier(FOLDER, engine.on_note)
-    able = [one for one in choices if one.make().sees_images]
-    if unable := [one.name for one in choices if one not in able]:
+    able = [choice for choice in choices if choice.make().sees_images]
+    if unable := [choice.name for choice in choices if choice not in able]:
         names = ", ".join(dict.fromkeys(unable))
         engine.on_note(f"{FOLDER}: not for {names}: these need scans")
     # The ground is at height 0.
-    methods = tuple(one.at_height(0.0) for one in able)
+    methods = tuple(choice.at_height(0.0) for choice in able)
     for choice, given in zip(methods, able, strict=True):
         engine.methods[choice.key] = choice, given.columns
     jobs = _RealJobs.of(methods, (), frozenset())
     judged = _RealJobs.of((), made, frozenset(made))
-    for one in sequences:
+    for sequence in sequences:
         pair = Pair(
-            map_name=one.name,
-            names=(one.places.name, one.queries.name),
+            map_name=sequence.name,
+            names=(sequence.places.name, sequence.queries.name),
             factors={},
             seed=_IMAGES.seed,
             is_baseline=False,
             stated=_IMAGES,
-            key=one.name,
-            database=one.places,
-            query=one.queries,
-            way=one.places,
+            key=sequence.name,
+            database=sequence.places,
+            query=sequence.queries,
+            way=sequence.places,
             protocol=_IMAGES,
             settings={"sensor_height": 0.0},
         )
@@ -207,10 +207,10 @@ def _add_images(
         if is_judged:
             simulated = replace(
                 pair,
-                names=("simulated", one.places.name),
+                names=("simulated", sequence.places.name),
                 key=f"simulated {pair.key}",
                 database=NamedDrive("simulated", made[0].source),
-                query=one.places,
+                query=sequence.places,
             )
             engine.add([simulated], (), judged, [JudgeTask.name])
 
@@ -230,58 +230,60 @@ def _add_unit(
         choices: the methods.
     """
     drives = {
-        id(one): NamedDrive(one.name, one.source, num_scans=len(one.drive))
-        for one in sets
+        id(scans): NamedDrive(
+            scans.name, scans.source, num_scans=len(scans.drive)
+        )
+        for scans in sets
     }
-    asked = [one for one in sets if one.data_set.poses]
+    asked = [scans for scans in sets if scans.data_set.poses]
     methods: tuple[MethodChoice, ...] = ()
     if asked:
         height = asked[0].data_set.height
-        methods = tuple(one.at_height(height) for one in choices)
+        methods = tuple(choice.at_height(height) for choice in choices)
         for choice, given in zip(methods, choices, strict=True):
             # The height is in the protocol's digest.
             engine.methods[choice.key] = choice, given.columns
-    tasks = [one for one in engine.tasks if one != JudgeTask.name]
+    tasks = [name for name in engine.tasks if name != JudgeTask.name]
     if not methods:
-        tasks = [one for one in tasks if one == LocaliseTask.name]
-    for one in sets:
-        others = [other for other in sets if other is not one]
-        own = drives[id(one)]
+        tasks = [name for name in tasks if name == LocaliseTask.name]
+    for scans in sets:
+        others = [other for other in sets if other is not scans]
+        own = drives[id(scans)]
         here, elsewhere = (
             tuple(
                 drives[id(other)]
                 for other in others
-                if (other.data_set.world == one.data_set.world) == is_here
+                if (other.data_set.world == scans.data_set.world) == is_here
             )
             for is_here in (True, False)
         )
-        if one.data_set.poses:
+        if scans.data_set.poses:
             jobs = _RealJobs.of(methods, (*elsewhere, *made), frozenset(made))
-            engine.add([_data_set_pair(one, own, own, here)], (), jobs, tasks)
-        if made and _can_be_judged(one, engine.on_note):
+            engine.add([_data_set_pair(scans, own, own, here)], (), jobs, tasks)
+        if made and _can_be_judged(scans, engine.on_note):
             simulated = NamedDrive("simulated", made[0].source)
             judged = _RealJobs.of((), made, frozenset(made))
             engine.add(
-                [_data_set_pair(one, simulated, own)], (), judged, ["judge"]
+                [_data_set_pair(scans, simulated, own)], (), judged, ["judge"]
             )
 
 
 def _data_set_pair(
-    one: RealScans,
+    scans: RealScans,
     database: NamedDrive,
     query: NamedDrive,
     beside: tuple[NamedDrive, ...] = (),
 ) -> Pair:
-    height = one.data_set.height
+    height = scans.data_set.height
     is_usual = height == MethodConfig().sensor_height
     return Pair(
-        map_name=one.data_set.world,
+        map_name=scans.data_set.world,
         names=(database.name, query.name),
         factors={},
         seed=_REAL.seed,
         is_baseline=False,
         stated=_REAL,
-        key=f"{database.name} {query.name} {one.data_set.unit}",
+        key=f"{database.name} {query.name} {scans.data_set.unit}",
         database=database,
         query=query,
         way=database,
@@ -293,11 +295,11 @@ def _data_set_pair(
     )
 
 
-def _can_be_judged(one: RealScans, on_note: OnNote) -> bool:
-    if not one.data_set.whole:
-        on_note(f"{one.name}: thinned scans, not judged")
+def _can_be_judged(scans: RealScans, on_note: OnNote) -> bool:
+    if not scans.data_set.whole:
+        on_note(f"{scans.name}: thinned scans, not judged")
         return False
-    return _has_classifier(one.name, on_note)
+    return _has_classifier(scans.name, on_note)
 
 
 def _has_classifier(name: str, on_note: OnNote) -> bool:

@@ -106,15 +106,15 @@ def draw_sessions(rows: Sequence[Row], folder: Path) -> Path:
     with rc_context({"font.size": 10.0}):
         figure = Figure(figsize=_SIZE, layout="constrained")
         axes = figure.subplots()
-        names = dict.fromkeys(one.method for one in rows)
+        names = dict.fromkeys(row.method for row in rows)
         styles = itertools.cycle(METHOD_STYLES.values())
         for name, (colour, style, marker) in zip(names, styles, strict=False):
-            some = [one for one in rows if one.method == name]
-            below = [one.value - one.low for one in some]
-            above = [one.high - one.value for one in some]
+            of_method = [row for row in rows if row.method == name]
+            below = [row.value - row.low for row in of_method]
+            above = [row.high - row.value for row in of_method]
             axes.errorbar(
-                [float(str(one["days"])) for one in some],
-                [one.value for one in some],
+                [float(str(row["days"])) for row in of_method],
+                [row.value for row in of_method],
                 [below, above],
                 linestyle=style,
                 marker=marker,

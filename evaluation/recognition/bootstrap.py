@@ -119,14 +119,14 @@ def weights_by_drive(
         and the counts (B, Q), as `resampled_weights` returns them.
     """
     known: dict[int, np.ndarray] = {}
-    for drive, some in zip(drives, blocks, strict=True):
-        known[drive] = np.union1d(known.get(drive, some), some)
-    for drive, some in zip(drives, blocks, strict=True):
+    for drive, of_set in zip(drives, blocks, strict=True):
+        known[drive] = np.union1d(known.get(drive, of_set), of_set)
+    for drive, of_set in zip(drives, blocks, strict=True):
         number = len(known[drive])
         if number == 1:
-            yield 1, resampled_weights(len(some), drive)
+            yield 1, resampled_weights(len(of_set), drive)
         else:
-            of_query = np.searchsorted(known[drive], some)
+            of_query = np.searchsorted(known[drive], of_set)
             yield number, _block_counts(number, drive)[:, of_query]
 
 

@@ -73,7 +73,10 @@ def measure_search(
         places: described places.
         queries: drive with described queries.
     """
-    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    sizes = [
+        len(pickle.dumps(descriptor, protocol=5))
+        for descriptor in places.descriptors
+    ]
     search = _timed_search(method, places, queries)
     return QueryCost(
         places=len(places.frames),

@@ -65,12 +65,14 @@ def describe_drive(
         InputError: if the drive cannot be read, it lacks a field that a method
             needs, or no described cloud has a point within range.
     """
-    requests = [*((one, roles, protocol) for one in methods), *further]
+    requests = [*((method, roles, protocol) for method in methods), *further]
     describing = [_DriveDescriber(drive, *request) for request in requests]
     visited = set().union(
         *(_frames_of_role(drive, role, protocol).tolist() for role in roles)
     )
-    wanted = sorted(visited.union(*(one.frames for one in describing)))
+    wanted = sorted(
+        visited.union(*(describer.frames for describer in describing))
+    )
     num_points = 0
     for frame in track(
         wanted, f"describing {drive.name}", len(wanted), "scans"
@@ -81,15 +83,15 @@ def describe_drive(
             shown = seen.sensor(protocol) if of_query else None
             cloud = seen.cloud(shown, (1, 0, ()), protocol.max_range)
             visit(frame, cloud)
-        for one in describing:
-            one.add(seen)
+        for describer in describing:
+            describer.add(seen)
         num_points += seen.most_points
     if num_points == 0:
         raise InputError(
             f"{drive.name}: no finite point within {protocol.max_range:g} m"
             f" of the LiDAR in any of {len(wanted)} scans"
         )
-    return [one.finish() for one in describing]
+    return [describer.finish() for describer in describing]
 
 
 class _FrameClouds:

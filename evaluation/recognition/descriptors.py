@@ -46,8 +46,8 @@ class DescribedScans:
     def chosen(self, rows: np.ndarray) -> DescribedScans:
         """Returns some of the places or queries, by their indices (J,)."""
         blocks, drive_of = (
-            None if one is None else one[rows]
-            for one in (self.blocks, self.drive_of)
+            None if column is None else column[rows]
+            for column in (self.blocks, self.drive_of)
         )
         return DescribedScans(
             self.frames[rows],
@@ -76,21 +76,21 @@ def joined_scans(
     poses = []
     is_one = len(every) == 1 and every[0].drive_of is None
     drives: list[np.ndarray] = []
-    for one, world in zip(every, worlds, strict=True):
-        own = one.drive_of
+    for scans, world in zip(every, worlds, strict=True):
+        own = scans.drive_of
         if own is None:
-            own = np.zeros(len(one.frames), np.int64)
+            own = np.zeros(len(scans.frames), np.int64)
         before = max((int(d.max(initial=-1)) for d in drives), default=-1)
         drives.append(own + before + 1)
-        X_WS = one.X_WS.copy()
+        X_WS = scans.X_WS.copy()
         X_WS[:, 0, 3] += world * _APART
         poses.append(X_WS)
     return DescribedScans(
-        frames=np.concatenate([one.frames for one in every])[:most],
-        stamps_ns=np.concatenate([one.stamps_ns for one in every])[:most],
+        frames=np.concatenate([scans.frames for scans in every])[:most],
+        stamps_ns=np.concatenate([scans.stamps_ns for scans in every])[:most],
         X_WS=np.concatenate(poses)[:most],
-        descriptors=[d for one in every for d in one.descriptors][:most],
-        clouds=[cloud for one in every for cloud in one.clouds][:most],
+        descriptors=[d for scans in every for d in scans.descriptors][:most],
+        clouds=[cloud for scans in every for cloud in scans.clouds][:most],
         drive_of=None if is_one else np.concatenate(drives)[:most],
     )
 

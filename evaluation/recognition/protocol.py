@@ -369,9 +369,9 @@ def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
         InputError: the protocols differ.
     """
     first = None
-    for one in protocols:
+    for protocol in protocols:
         # Each method sets its scans per place.
-        shared = replace(one, scans_per_place=None, place="middle")
+        shared = replace(protocol, scans_per_place=None, place="middle")
         first = first or shared
         if shared.digest() != first.digest():
             raise InputError(
@@ -383,7 +383,7 @@ def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
 # Columns of a table of results: options of the protocol. Tables contain no
 # matches by overlap; a column `protocol` covers the other options.
 PROTOCOL_COLUMNS = tuple(
-    one.name
-    for one in fields(RetrievalProtocol)
-    if one.name not in ("overlap", "place", *_QUERY_CHANGES, "seed")
+    field.name
+    for field in fields(RetrievalProtocol)
+    if field.name not in ("overlap", "place", *_QUERY_CHANGES, "seed")
 )

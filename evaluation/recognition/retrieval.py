@@ -180,8 +180,11 @@ def compare_with_gates(
             length,
             places.drive_of,
         )
-    radii = [one for one in gate_radii if one is not None]
-    tested = [tested_places(one)[: None if radii else 1] for one in alone]
+    radii = [radius for radius in gate_radii if radius is not None]
+    tested = [
+        tested_places(scores_of_query)[: None if radii else 1]
+        for scores_of_query in alone
+    ]
     poses = search.poses(query, tested)
     scores = [np.empty(is_known.shape) for _ in gate_radii]
     for row, ungated in enumerate(alone):

@@ -137,11 +137,14 @@ class Search:
                 )
                 self.query_ms[k] += (process_time_ns() - start) * 1e-6
         entries = np.zeros((len(rows), len(self._groups)), np.int64)
-        for k, some in enumerate(shortlists):
-            of = np.repeat(np.arange(len(some)), [len(one) for one in some])
+        for k, of_groups in enumerate(shortlists):
+            of = np.repeat(
+                np.arange(len(of_groups)),
+                [len(of_group) for of_group in of_groups],
+            )
             # Of equal entries, the entry of the first group comes first.
-            best = np.argsort(-np.concatenate(some), kind="stable")[:most]
-            entries[k] = np.bincount(of[best], minlength=len(some))
+            best = np.argsort(-np.concatenate(of_groups), kind="stable")[:most]
+            entries[k] = np.bincount(of[best], minlength=len(of_groups))
         return entries
 
     def _scores_in_group(

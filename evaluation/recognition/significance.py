@@ -78,22 +78,34 @@ def compared_by_auc(
     """
     sets = list(zip(*answers.values(), strict=True))
     drives = range(len(sets)) if drives is None else drives
-    blocks = [one[0].own_blocks for one in sets]
+    blocks = [outcomes[0].own_blocks for outcomes in sets]
     of_drive: dict[int, int] = {}
     sums: dict[int, Any] = {}
     drawn = weights_by_drive(blocks, drives)
-    for drive, some, (number, weights) in zip(drives, sets, drawn, strict=True):
-        samples = [resampled_metrics(one, weights)[0] for one in some]
+    for drive, outcomes, (number, weights) in zip(
+        drives, sets, drawn, strict=True
+    ):
+        samples = [
+            resampled_metrics(outcome, weights)[0] for outcome in outcomes
+        ]
         sums[drive] = sums.get(drive, 0.0) + np.array(samples)
         of_drive[drive] = number
     numbers = np.array(list(of_drive.values()))
-    areas = [[pr_curve(one).auc for one in some] for some in sets]
+    areas = [
+        [pr_curve(outcome).auc for outcome in outcomes] for outcomes in sets
+    ]
 
     def difference(first: int, second: int) -> Difference:
-        value = float(np.mean([some[first] - some[second] for some in areas]))
+        value = float(
+            np.mean(
+                [by_method[first] - by_method[second] for by_method in areas]
+            )
+        )
         if (numbers < 2).any():
             return Difference(value, UNKNOWN, math.nan)
-        samples = [some[first] - some[second] for some in sums.values()]
+        samples = [
+            by_method[first] - by_method[second] for by_method in sums.values()
+        ]
         variances = np.var(samples, axis=1) * numbers / (numbers - 1)
         spread = math.sqrt(variances.sum()) / len(sets)
         freedom = (numbers - 1).sum()
@@ -106,6 +118,8 @@ def compared_by_auc(
 
     pairs = list(itertools.combinations(range(len(answers)), 2))
     found = [difference(*pair) for pair in pairs]
-    corrected = holm(np.array([one.p_value for one in found])).tolist()
+    corrected = holm(
+        np.array([difference_found.p_value for difference_found in found])
+    ).tolist()
     names = itertools.combinations(answers, 2)
     return dict(zip(names, zip(found, corrected, strict=True), strict=True))

@@ -51,7 +51,7 @@ class StoredDrives:
     def drive(self, number: int) -> DriveDescriptors:
         """Returns a drive; drives of other groups leave the memory."""
         group = self.group_of[number]
-        if any(self.group_of[one] != group for one in self._held):
+        if any(self.group_of[place] != group for place in self._held):
             self._held = {}
         if number not in self._held:
             self._held[number] = self._readers[number]()

@@ -44,8 +44,8 @@ class CameraImages:
         later = 1e-9 * (times_ns[nearest] - self.stamps_ns)
         return {
             "files": [
-                base64.b64encode(one).decode("ascii")
-                for one in self.files[::step]
+                base64.b64encode(content).decode("ascii")
+                for content in self.files[::step]
             ],
             "nearest": nearest.tolist(),
             "later": np.round(later, 2).tolist(),

@@ -74,10 +74,10 @@ class Report:
         """Results of each method with and without change, on each pair."""
         stages = {
             name: stage
-            for one, _ in self.pairs
+            for outcome, _ in self.pairs
             for name, stage in zip(
-                (one.database, one.query),
-                one.pair[1:],
+                (outcome.database, outcome.query),
+                outcome.pair[1:],
                 strict=True,
             )
         }

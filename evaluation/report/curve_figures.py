@@ -44,8 +44,8 @@ def draw_pr_curves(
     grid = figure.subplots(
         len(pairs), len(MODES), sharex=True, sharey=True, squeeze=False
     )
-    for row, (pair, some) in zip(grid, pairs.items(), strict=True):
-        of_method = {one.method: one for one in some}
+    for row, (pair, of_pair) in zip(grid, pairs.items(), strict=True):
+        of_method = {outcome.method: outcome for outcome in of_pair}
         for axes, mode in zip(row, MODES, strict=True):
             for method in in_table_order(of_method):
                 metrics = of_method[method].by_mode[mode]
@@ -107,11 +107,11 @@ def draw_track(rows: np.ndarray, stem: Path) -> None:
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     for stretch in np.unique(rows["stretch"]):
-        some = rows[rows["stretch"] == stretch]
-        error = np.maximum(some["track_error"], 1e-4)
-        top.plot(some["way"], error, "-", color=INK, linewidth=1.0)
+        section = rows[rows["stretch"] == stretch]
+        error = np.maximum(section["track_error"], 1e-4)
+        top.plot(section["way"], error, "-", color=INK, linewidth=1.0)
         bottom.fill_between(
-            some["way"], some["unmapped"], color=PALE, linewidth=0.0
+            section["way"], section["unmapped"], color=PALE, linewidth=0.0
         )
     levels = ((RIGHT_TRANSLATION, "--", "within"), (LOST, ":", "lost:"))
     for level, style, name in levels:

@@ -128,8 +128,8 @@ def _write_tables(
         "query_details": replace(queries, rows=queries.rows + again.rows),
         "query_details_unchanged": query_table(
             [
-                replace(control, pair=one.pair)
-                for one, control in report.pairs
+                replace(control, pair=changed.pair)
+                for changed, control in report.pairs
                 if control
             ],
             report.tracks,
@@ -166,8 +166,8 @@ def write_page(path: Path, report: Report) -> None:
         )
     tables = _shown_tables(report)
     illustrations = defaultdict(list)
-    for one in report.illustrations:
-        illustrations[one.section].append(one)
+    for illustration in report.illustrations:
+        illustrations[illustration.section].append(illustration)
     drives_of_maps = _drives_of_maps(report)
     forms = [f"All methods in mode {mode}" for mode in MODES]
     if report.compared:
@@ -231,9 +231,9 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
         "tcr": [changes.without_empty("paper")],
         "place_recognition": [
             recognition_table(
-                some, report.changes, mode, reference, report.evidence
+                shown, report.changes, mode, reference, report.evidence
             )
-            for some, mode, reference in counted
+            for shown, mode, reference in counted
         ],
         "differences": [difference_table(report.differences)],
         "why": [fault_table(results, report.evidence)],
@@ -289,11 +289,13 @@ def _drives_of_maps(report: Report) -> dict[str, list[str]]:
     return groups
 
 
-def _data_address(one: Illustration) -> str:
+def _data_address(illustration: Illustration) -> str:
     """Returns a data URL that contains the figure."""
-    path = one.stem.with_name(f"{one.stem.name}.{one.page_kind}")
+    path = illustration.stem.with_name(
+        f"{illustration.stem.name}.{illustration.page_kind}"
+    )
     data = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f"data:{_MEDIA_TYPES[one.page_kind]};base64,{data}"
+    return f"data:{_MEDIA_TYPES[illustration.page_kind]};base64,{data}"
 
 
 def _render(name: str, /, **values: object) -> str:

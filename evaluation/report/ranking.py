@@ -31,9 +31,9 @@ def ranked_methods(
     )
     num_pairs = sum(n == len(ranked) for n in measured.values())
     of_pair: dict[object, dict[tuple[str, str], float]] = {}
-    for one in differences:
-        key = one.result.method, one.other.method
-        of_pair.setdefault(one.result.pair, {})[key] = one.p_value
+    for difference in differences:
+        key = difference.result.method, difference.other.method
+        of_pair.setdefault(difference.result.pair, {})[key] = difference.p_value
     return ranked, _ranking_sentence(ranked, num_pairs, of_pair.values())
 
 
@@ -63,8 +63,8 @@ def further_columns(results: Results) -> dict[str, dict[str, Ranked]]:
         "pose success": rows.where(metric="pose_success").rows,
     }
     return {
-        name: {one.method: one for one in rank_methods(some)[0]}
-        for name, some in columns.items()
+        name: {mean.method: mean for mean in rank_methods(of_metric)[0]}
+        for name, of_metric in columns.items()
     }
 
 
@@ -76,7 +76,9 @@ def _ranking_sentence(
     if not ranked:
         return "No pair of drives has an AUC of every method to rank."
     over = f"{num_pairs} pairs of drives" if num_pairs > 1 else "one pair"
-    best, *others = [(title(one.method), f"{one.value:.3f}") for one in ranked]
+    best, *others = [
+        (title(mean.method), f"{mean.value:.3f}") for mean in ranked
+    ]
     if not others:
         return f"{best[0]} has a mean AUC of {best[1]} over {over}."
     ties = [name for name, value in others if value == best[1]]

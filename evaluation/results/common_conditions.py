@@ -31,8 +31,16 @@ def common_conditions(
     """
     common = own[0].conditions
     for table in own[1:]:
-        common = [one for one in common if one in set(table.conditions)]
-    with_shipped = [one for one in common if one in set(shipped.conditions)]
+        common = [
+            condition
+            for condition in common
+            if condition in set(table.conditions)
+        ]
+    with_shipped = [
+        condition
+        for condition in common
+        if condition in set(shipped.conditions)
+    ]
     if with_shipped:
         others = (*own, shipped)
         return with_shipped, _notes_on_left_out(own, others, with_shipped)
@@ -61,15 +69,16 @@ def _notes_on_left_out(
         left = {c: r for (_, c), r in table.rows.items() if c not in kept}
         for condition, row in left.items():
             other = next(
-                one
-                for one in tables
-                if one is not table and condition not in set(one.conditions)
+                lacking
+                for lacking in tables
+                if lacking is not table
+                and condition not in set(lacking.conditions)
             )
             wanted = row.without("method", "protocol")
             alike = [
-                one
-                for one in other.rows.values()
-                if one.without("method", "protocol") == wanted
+                candidate
+                for candidate in other.rows.values()
+                if candidate.without("method", "protocol") == wanted
             ]
             name = "the shipped tables" if other.name == SHIPPED else other.name
             lack = "lack" if other.name == SHIPPED else "lacks"
@@ -94,7 +103,9 @@ def without_controls(
 
     If no condition has a change, the result contains all conditions.
     """
-    changed = [one for one in conditions if (STAGE, LAST) not in one]
+    changed = [
+        condition for condition in conditions if (STAGE, LAST) not in condition
+    ]
     left = len(conditions) - len(changed)
     if not left or not changed:
         return conditions, []
@@ -104,19 +115,22 @@ def without_controls(
     ]
 
 
-def _why_nothing_is_common(one: MetricTable, other: MetricTable) -> str:
+def _why_nothing_is_common(table: MetricTable, other: MetricTable) -> str:
     """Returns as text why two tables have no condition in common."""
-    rows = [list(table.rows.values()) for table in (one, other)]
+    rows = [list(compared.rows.values()) for compared in (table, other)]
     factors = {
-        name: None for some in rows for row in some for name in row.factors
+        name: None
+        for of_table in rows
+        for row in of_table
+        for name in row.factors
     }
     for column in (*(name for name in KEYS if name != "version"), *factors):
         first, second = (
-            sorted({str(row[column]) for row in some}) for some in rows
+            sorted({str(row[column]) for row in of_table}) for of_table in rows
         )
         if column != "method" and not {*first} & {*second}:
             return (
-                f"{column}: {', '.join(first[:3])} in {one.name}, but"
+                f"{column}: {', '.join(first[:3])} in {table.name}, but"
                 f" {', '.join(second[:3])} in {other.name}"
             )
     return "each value is in both, but no row has the same ones in all columns"

@@ -13,17 +13,17 @@ from evaluation.recognition.significance import Difference, compared_by_auc
 from evaluation.results.table import Answers
 
 
-def check_same_queries(one: Answers, other: Answers) -> None:
+def check_same_queries(first: Answers, second: Answers) -> None:
     """Raises an error unless two methods answered the same queries.
 
     Raises:
         InputError: the two methods answered different queries.
     """
-    frames, others = (a.columns["query_frame"] for a in (one, other))
+    frames, others = (a.columns["query_frame"] for a in (first, second))
     if not np.array_equal(frames, others):
         raise InputError(
-            f"{one.experiment}: {one.database}, {one.query}: {one.label} and"
-            f" {other.label} answered different queries"
+            f"{first.experiment}: {first.database}, {first.query}:"
+            f" {first.label} and {second.label} answered different queries"
         )
 
 
@@ -48,13 +48,16 @@ def compared_answers(
     Raises:
         InputError: two methods answered different queries.
     """
-    for one, *others in zip(*answers.values(), strict=True):
+    for first, *others in zip(*answers.values(), strict=True):
         for other in others:
-            check_same_queries(one, other)
+            check_same_queries(first, other)
     return compared_by_auc(
         {
-            name: [one.outcomes for one in some]
-            for name, some in answers.items()
+            name: [in_condition.outcomes for in_condition in of_method]
+            for name, of_method in answers.items()
         },
-        [drive_number(one) for one in next(iter(answers.values()), ())],
+        [
+            drive_number(in_condition)
+            for in_condition in next(iter(answers.values()), ())
+        ],
     )

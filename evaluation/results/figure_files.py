@@ -50,7 +50,8 @@ def save_figure(
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     bottom = max(
-        (one.get_window_extent().y1 for one in figure.legends), default=0.0
+        (legend.get_window_extent().y1 for legend in figure.legends),
+        default=0.0,
     )
     width, height = figure.get_size_inches()
     above = Bbox.from_extents(0.0, bottom / figure.dpi, width, height)
@@ -98,24 +99,24 @@ def _drawn_values(axes: Axes) -> tuple[list[float], list[float]]:
     """Returns all x and all y that are drawn in coordinates of the data."""
     found: tuple[list[float], list[float]] = ([], [])
     # All that is drawn, without the frame.
-    for one in (*axes.lines, *axes.collections, *axes.patches):
-        transform = one.get_transform()
-        if isinstance(one, Line2D):
-            corners = [np.column_stack(one.get_data())]
-        elif isinstance(one, Patch):
-            path = one.get_path().transformed(one.get_patch_transform())
+    for artist in (*axes.lines, *axes.collections, *axes.patches):
+        transform = artist.get_transform()
+        if isinstance(artist, Line2D):
+            corners = [np.column_stack(artist.get_data())]
+        elif isinstance(artist, Patch):
+            path = artist.get_path().transformed(artist.get_patch_transform())
             corners = [np.asarray(path.vertices)]
-            transform = one.get_data_transform()
-        elif isinstance(one, PathCollection):
+            transform = artist.get_data_transform()
+        elif isinstance(artist, PathCollection):
             # The markers of a scatter plot, whose paths have no position.
-            corners = [np.ma.filled(one.get_offsets(), np.nan)]
-            transform = one.get_offset_transform()
-        elif isinstance(one, Collection):
-            corners = [np.asarray(path.vertices) for path in one.get_paths()]
+            corners = [np.ma.filled(artist.get_offsets(), np.nan)]
+            transform = artist.get_offset_transform()
+        elif isinstance(artist, Collection):
+            corners = [np.asarray(path.vertices) for path in artist.get_paths()]
         else:
             continue
         of_data = transform.contains_branch_seperately(axes.transData)
         for values, is_data, column in zip(found, of_data, (0, 1), strict=True):
-            for some in corners if is_data else ():
-                values.extend(np.asarray(some, dtype=float)[:, column])
+            for vertices in corners if is_data else ():
+                values.extend(np.asarray(vertices, dtype=float)[:, column])
     return found

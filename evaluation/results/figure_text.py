@@ -32,8 +32,8 @@ def name_lines(figure: Figure, axes: Axes, gap: float, size: float) -> None:
     lines = [line for line in axes.lines if str(line.get_label())[:1] != "_"]
     bottom, top = axes.get_ylim()
     values = [np.asarray(line.get_ydata(), dtype=float) for line in lines]
-    known = [some[np.isfinite(some)] for some in values]
-    ends = [some[-1] if len(some) else bottom for some in known]
+    known = [y[np.isfinite(y)] for y in values]
+    ends = [y[-1] if len(y) else bottom for y in known]
     heights = (np.array(ends) - bottom) / (top - bottom)
     order = np.argsort(heights, kind="stable")
     # In steps of the gap, names in order must not descend.

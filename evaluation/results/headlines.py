@@ -88,10 +88,10 @@ def survival_sentences(rows: Sequence[Row]) -> str:
     if decided:
         over += f", with a 95 % t interval over {number} cities"
     shares = ", ".join(
-        f"{title(one.method)} {_percent(one.value)}"
+        f"{title(mean.method)} {_percent(mean.value)}"
         + decided
-        * f" ({_percent(one.interval.low)} to {_percent(one.interval.high)})"
-        for one in ranked
+        * f" ({_percent(mean.interval.low)} to {_percent(mean.interval.high)})"
+        for mean in ranked
     )
     text = (
         "Retained AUC strict, relative to the AUC strict without change"
@@ -117,7 +117,7 @@ def survivors(ranked: Iterable[Ranked]) -> list[str]:
     Args:
         ranked: the methods, with their means of `kept_strict`.
     """
-    return [one.method for one in ranked if one.interval.low >= SURVIVES]
+    return [mean.method for mean in ranked if mean.interval.low >= SURVIVES]
 
 
 def _percent(value: float) -> str:
@@ -134,20 +134,26 @@ def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     Returns:
         A clause; empty if there is one method, or the answers are unknown.
     """
-    asked = {one.identity: one for one in queries.answers} if queries else {}
+    asked = (
+        {answers.identity: answers for answers in queries.answers}
+        if queries
+        else {}
+    )
     table: dict[tuple, dict[str, tuple[float, Answers]]] = {}
     for row in rows:
         if row.identity in asked:
-            some = table.setdefault(row.without("method"), {})
-            some[row.label] = row.value, asked[row.identity]
+            by_label = table.setdefault(row.without("method"), {})
+            by_label[row.label] = row.value, asked[row.identity]
     labels = {row.label: None for row in rows}
-    common = [some for some in table.values() if len(some) == len(labels)]
+    common = [
+        by_label for by_label in table.values() if len(by_label) == len(labels)
+    ]
     if len(labels) < 2 or not common:
         return ""
     compared = compared_answers(
-        {n: [some[n][1] for some in common] for n in labels}
+        {n: [by_label[n][1] for by_label in common] for n in labels}
     )
-    best = max(labels, key=lambda n: sum(some[n][0] for some in common))
+    best = max(labels, key=lambda n: sum(by_label[n][0] for by_label in common))
     p_values = {pair: p for pair, (_, p) in compared.items()}
     apart, rest = by_significance(best, p_values)
     text = f"the greatest AUC, of {title(best)}, "

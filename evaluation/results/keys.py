@@ -124,7 +124,7 @@ class Key:
         Returns:
             The values of the remaining columns, in a fixed order.
         """
-        if any(one.partition(".")[0] == "protocol" for one in names):
+        if any(name.partition(".")[0] == "protocol" for name in names):
             names = (*names, "protocol", "protocol_digest")
         known = [name for name in KEYS if name not in (*names, "version")]
         without_settings = "method" in names

@@ -67,11 +67,13 @@ def table_name(path: Path, paths: Iterable[Path]) -> str:
         paths: paths of all tables.
     """
     names = [
-        one.stem
-        if one.is_file() and one.name != RESULTS
+        table_path.stem
+        if table_path.is_file() and table_path.name != RESULTS
         # A folder, or the file that it holds.
-        else (one if one.is_dir() else one.parent).absolute().name
-        for one in (path, *paths)
+        else (table_path if table_path.is_dir() else table_path.parent)
+        .absolute()
+        .name
+        for table_path in (path, *paths)
     ]
     name = names.pop(0)
     return name if names.count(name) < 2 else str(path)
@@ -122,15 +124,15 @@ def _check_answers(
         (*row.identity, row.metric): row
         for row in results.where(task="place").rows
     }
-    for one in answers:
+    for answer in answers:
         # Areas take time, and other tasks have none.
-        if one.task != "place" or not any(
-            (*one.identity, name) in known for name in _FROM_ANSWERS
+        if answer.task != "place" or not any(
+            (*answer.identity, name) in known for name in _FROM_ANSWERS
         ):
             continue
-        for name, value in main_metrics(one.outcomes).items():
-            row = known.get((*one.identity, name))
-            number = len(one.outcomes)
+        for name, value in main_metrics(answer.outcomes).items():
+            row = known.get((*answer.identity, name))
+            number = len(answer.outcomes)
             if row is None or (
                 abs(row.value - value) <= _ROUNDED_BY_HAND
                 and row.n in (None, number)
@@ -138,8 +140,8 @@ def _check_answers(
                 continue
             count = "" if row.n is None else f" of {row.n} queries"
             raise InputError(
-                f"{queries}: contradicts {path}: {name} of {one.label},"
-                f" {one.database} -> {one.query}: {value:.4f} of {number}"
+                f"{queries}: contradicts {path}: {name} of {answer.label},"
+                f" {answer.database} -> {answer.query}: {value:.4f} of {number}"
                 f" queries, but {row.value:.4f}{count} in the results"
             )
 
@@ -185,12 +187,12 @@ def read_metric_table(
     answers = QueryRows.read(queries).answers if queries.is_file() else ()
     _check_answers(queries, answers, path, results)
     asked = [
-        one
-        for one in answers
-        if (one.task, one.gate) == (selection["task"], selection["gate"])
+        answer
+        for answer in answers
+        if (answer.task, answer.gate) == (selection["task"], selection["gate"])
     ]
     if selection["metric"] in RESAMPLED_METRICS and any(
-        one.outcomes.blocks is None for one in asked
+        answer.outcomes.blocks is None for answer in asked
     ):
         notes.append(
             f"{queries}: without blocks of the route (column block),"
@@ -211,7 +213,9 @@ def _no_row_text(results: Results, selection: Mapping[str, object]) -> str:
 
 def shipped_table(selection: Mapping[str, object]) -> MetricTable:
     """Returns the selected rows of all shipped tables, see `Results.where`."""
-    rows = [row for one in _baselines() for row in one.where(selection).rows]
+    rows = [
+        row for table in _baselines() for row in table.where(selection).rows
+    ]
     return MetricTable(SHIPPED, _by_method_and_condition(rows), {})
 
 

@@ -242,7 +242,7 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
     if by_condition:
         metrics = metrics[:1]
     shown = ("label", "gate", "metric", *(factors if by_condition else ()))
-    found = {one.key: one for one in means(rows, *shown) if one.number}
+    found = {mean.key: mean for mean in means(rows, *shown) if mean.number}
     # A single result has an interval of its own.
     intervals = {
         key: (row.low, row.high)
@@ -262,12 +262,12 @@ def _summary(results: Results, task: str) -> dict[str, Any]:
             + (", with geometric verification" if gate else ""),
             "cells": [
                 (found.get(key), intervals.get(key))
-                for key in ((name, gate, *one) for one in columns)
+                for key in ((name, gate, *column) for column in columns)
             ],
         }
         for gate in sorted({row.gate for row in rows})
         for name in in_table_order(row.label for row in rows)
-        if any((name, gate, *one) in found for one in columns)
+        if any((name, gate, *column) in found for column in columns)
     ]
     heads = [in_words(str(metric)) for metric, *_ in columns]
     title = _TASKS.get(task, task)

@@ -57,7 +57,10 @@ def rank_agreement(
         {
             method
             for method in table.methods
-            if all((method, one) in table.rows for one in table.conditions)
+            if all(
+                (method, condition) in table.rows
+                for condition in table.conditions
+            )
         }
         for table in (first, second)
     ]
@@ -90,36 +93,39 @@ def _means_and_samples(
     ranked, samples = rank_methods(
         row for (method, _), row in table.rows.items() if method in methods
     )
-    order = [[one.method for one in ranked].index(name) for name in methods]
-    means = np.array([one.value for one in ranked])[order]
+    order = [[mean.method for mean in ranked].index(name) for name in methods]
+    means = np.array([mean.value for mean in ranked])[order]
     measured = list(itertools.product(table.conditions, methods))
     if (
         len({row.map for row in table.rows.values()}) >= LEAST_UNITS
         or metric not in RESAMPLED_METRICS
-        or any((method, one) not in table.answers for one, method in measured)
+        or any(
+            (method, condition) not in table.answers
+            for condition, method in measured
+        )
     ):
         return means, samples[:, order]
     asked = [
-        [table.answers[method, one] for method in methods]
-        for one in table.conditions
+        [table.answers[method, condition] for method in methods]
+        for condition in table.conditions
     ]
-    for some in asked:
-        for answers in some:
-            check_same_queries(some[0], answers)
+    for of_condition in asked:
+        for answers in of_condition:
+            check_same_queries(of_condition[0], answers)
     drawn = weights_by_drive(
-        [some[0].outcomes.own_blocks for some in asked],
-        [drive_number(some[0]) for some in asked],
+        [of_condition[0].outcomes.own_blocks for of_condition in asked],
+        [drive_number(of_condition[0]) for of_condition in asked],
     )
-    of_condition = [
+    samples_of_asked = [
         [
             resampled_metrics(answers.outcomes, weights)[
                 RESAMPLED_METRICS[metric]
             ]
-            for answers in some
+            for answers in of_condition
         ]
-        for some, (_, weights) in zip(asked, drawn, strict=True)
+        for of_condition, (_, weights) in zip(asked, drawn, strict=True)
     ]
-    return means, np.mean(of_condition, axis=0).T
+    return means, np.mean(samples_of_asked, axis=0).T
 
 
 def _kendall_tau(first: np.ndarray, second: np.ndarray) -> float:

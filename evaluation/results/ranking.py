@@ -57,8 +57,10 @@ def rank_methods(
     if not common:
         return [], np.empty((0, 0))
     names = sorted(common[0])
-    values = np.array([[some[n].value for n in names] for some in common])
-    of_map = [some[names[0]].map for some in common]
+    values = np.array(
+        [[by_method[n].value for n in names] for by_method in common]
+    )
+    of_map = [by_method[names[0]].map for by_method in common]
     units = of_map if len(set(of_map)) > 1 else list(range(len(common)))
     _, unit_of_row = np.unique(units, return_inverse=True)
     seed = zlib.crc32(" ".join(sorted(set(of_map))).encode())
@@ -75,7 +77,10 @@ def rank_methods(
         limits = range_of(first[0].metric) or Range()
         intervals = _t_intervals(values, unit_of_row, limits)
     means = values.mean(axis=0).tolist()
-    found = [Ranked(*one) for one in zip(names, means, intervals, strict=True)]
+    found = [
+        Ranked(*columns)
+        for columns in zip(names, means, intervals, strict=True)
+    ]
     sign = 1.0 if least_first else -1.0
     order = sorted(
         range(len(names)), key=lambda k: (sign * found[k].value, names[k])
@@ -89,8 +94,12 @@ def _common_conditions(rows: Iterable[Row]) -> list[dict[str, Row]]:
     for row in rows:
         if not math.isnan(row.value):
             table.setdefault(row.without("method"), {})[row.label] = row
-    methods = {name for some in table.values() for name in some}
-    return [some for some in table.values() if len(some) == len(methods)]
+    methods = {name for by_method in table.values() for name in by_method}
+    return [
+        by_method
+        for by_method in table.values()
+        if len(by_method) == len(methods)
+    ]
 
 
 def _t_intervals(

@@ -82,12 +82,12 @@ def means(rows: Iterable[Row], *columns: str) -> list[Mean]:
     return [
         Mean(
             key,
-            float(np.mean(some or nothing)),
-            min(some or nothing),
-            max(some or nothing),
-            len(some),
+            float(np.mean(values or nothing)),
+            min(values or nothing),
+            max(values or nothing),
+            len(values),
         )
-        for key, some in groups.items()
+        for key, values in groups.items()
     ]
 
 
@@ -156,10 +156,10 @@ def excesses(queries: QueryRows) -> list[Summary]:
     """
     conditions: dict[tuple, list[Answers]] = {}
     levels: dict[object, Any] = {}
-    for one in queries.answers:
-        conditions.setdefault(one.without("seed"), []).append(one)
-        name = one.map, one[CAUSE]
-        levels[name] = max(one[LEVEL] or 0, levels.get(name, 0))
+    for answers in queries.answers:
+        conditions.setdefault(answers.without("seed"), []).append(answers)
+        name = answers.map, answers[CAUSE]
+        levels[name] = max(answers[LEVEL] or 0, levels.get(name, 0))
     found = []
     for both in conditions.values():
         key = both[0]
@@ -170,13 +170,15 @@ def excesses(queries: QueryRows) -> list[Summary]:
             for cause, level in alone
         )
         groups = [
-            conditions.get(replace(key, factors=one).without("seed"), [])
-            for one in moved
+            conditions.get(replace(key, factors=factors).without("seed"), [])
+            for factors in moved
         ]
         if len(names) != 2 or not all(groups):
             continue
         all_of_it, *kept = (
-            float(np.mean([pr_curve(one.outcomes).auc for one in group]))
+            float(
+                np.mean([pr_curve(answers.outcomes).auc for answers in group])
+            )
             for group in (*groups, both)
         )
         first, second, together = (
@@ -186,12 +188,15 @@ def excesses(queries: QueryRows) -> list[Summary]:
         if len({len(g[0].outcomes) for g in (*groups, both)}) == 1:
             base, *samples = (
                 np.mean(
-                    [paired_samples(a.outcomes, key.outcomes)[0] for a in some],
+                    [
+                        paired_samples(a.outcomes, key.outcomes)[0]
+                        for a in group
+                    ],
                     axis=0,
                 )
-                for some in (*groups, both)
+                for group in (*groups, both)
             )
-            a, b, ab = (kept_share(one, base) for one in samples)
+            a, b, ab = (kept_share(sample, base) for sample in samples)
             interval = percentile_interval(a * b - ab)
         found.append(
             Summary.of(
@@ -268,9 +273,9 @@ def lifetimes(
         if row[factor] is not None:
             groups.setdefault(row.without("seed", factor), []).append(row)
     found = []
-    for some in groups.values():
+    for rows in groups.values():
         curves: dict[float, dict[int, float]] = {}
-        for row in some:
+        for row in rows:
             at = float(row[factor])  # type: ignore[arg-type]  # A number.
             curves.setdefault(at, {})[row.seed] = row.value
         times = sorted(curves)
@@ -284,7 +289,7 @@ def lifetimes(
                 Summary.of(
                     f"{factor} until {100.0 * share:g} % is left (of"
                     f" {times[-1]:g})",
-                    some[0],
+                    rows[0],
                     lifetime(times, mean, share),
                     min(single),
                     max(single),
@@ -301,9 +306,9 @@ def _curve_of(
     A time that was measured with a single seed counts for every seed.
     """
     points = [
-        (at, some.get(seed, next(iter(some.values()))))
-        for at, some in sorted(curves.items())
-        if seed in some or len(some) == 1
+        (at, shares.get(seed, next(iter(shares.values()))))
+        for at, shares in sorted(curves.items())
+        if seed in shares or len(shares) == 1
     ]
     return [at for at, _ in points], [share for _, share in points]
 
@@ -359,9 +364,9 @@ def growths(results: Results, over: str, metric: str) -> list[Summary]:
         key = row.experiment, row.map, row.label, row.gate
         groups.setdefault(key, []).append((at, row))
     found = []
-    for some in groups.values():
-        some.sort(key=itemgetter(0))
-        for (less, before), (at, row) in itertools.pairwise(some):
+    for curve in groups.values():
+        curve.sort(key=itemgetter(0))
+        for (less, before), (at, row) in itertools.pairwise(curve):
             if 0.0 < less < at:
                 grown = math.log(row.value / before.value)
                 what = f"exponent of {metric} over {over}, at {at:g}"
@@ -463,15 +468,15 @@ def worths(results: Results, metric: str) -> list[Summary]:
             name = maintain, row.map, row.task, row.label, row.gate
             ways.setdefault(name, []).append((row, *way))
     found = []
-    for (maintain, *_), some in ways.items():
-        row = some[0][0]
-        whole = sum(end for _, _, end in some)
+    for (maintain, *_), measured in ways.items():
+        row = measured[0][0]
+        whole = sum(end for _, _, end in measured)
         if whole == 0.0:
             continue
-        share = sum(way for _, way, _ in some) / whole
+        share = sum(way for _, way, _ in measured) / whole
         what = f"worth of {maintain}, of the way to {_EXACTLY}: {metric}"
-        one = Summary.of(what, row, share)
-        found.append(one._replace(n=len(some)))
+        summary = Summary.of(what, row, share)
+        found.append(summary._replace(n=len(measured)))
     return found
 
 

@@ -169,11 +169,11 @@ class Results:
         table = TableLines.read(path, RESULTS, MEASURED)
         rows: list[Row] = []
         lines: dict[tuple[object, ...], int] = {}
-        for one, key, identity in table.keyed():
-            row = Row(**key, **_measured_values(one))
-            first = lines.setdefault((*identity, row.metric), one.number)
-            if first != one.number:
-                raise one.fault("metric", f"the same is in line {first}")
+        for line, key, identity in table.keyed():
+            row = Row(**key, **_measured_values(line))
+            first = lines.setdefault((*identity, row.metric), line.number)
+            if first != line.number:
+                raise line.fault("metric", f"the same is in line {first}")
             rows.append(row)
         return cls(table.factors, tuple(rows))
 
@@ -210,7 +210,7 @@ class Results:
             tuple(
                 row
                 for row in self.rows
-                if all(row[name] in some for name, some in wanted.items())
+                if all(row[name] in values for name, values in wanted.items())
             ),
         )
 
@@ -272,8 +272,8 @@ class QueryRows:
         )
         names = [name for name in _ANSWERS if name in table.columns]
         found: dict[tuple[object, ...], tuple[dict, list[TableLine]]] = {}
-        for one, key, identity in table.keyed():
-            found.setdefault(identity, (key, []))[1].append(one)
+        for line, key, identity in table.keyed():
+            found.setdefault(identity, (key, []))[1].append(line)
         return cls(
             table.factors,
             tuple(
@@ -294,12 +294,12 @@ class QueryRows:
         write_text(path, csv_text(header, self._lines()))
 
     def _lines(self) -> Iterator[list[str]]:
-        for one in self.answers:
-            key = _key_cells(one, self.factors)
-            number = len(one.columns["correct"])
+        for answers in self.answers:
+            key = _key_cells(answers, self.factors)
+            number = len(answers.columns["correct"])
             columns = [
-                [_answer_cell(v, kind) for v in one.columns[name].tolist()]
-                if name in one.columns
+                [_answer_cell(v, kind) for v in answers.columns[name].tolist()]
+                if name in answers.columns
                 else [""] * number
                 for name, kind in _ANSWERS.items()
             ]
@@ -320,8 +320,8 @@ def _key_cells(key: Key, factors: Sequence[str]) -> list[str]:
 
 def _measured_cells(row: Row) -> list[str]:
     values = [
-        checked(row.metric, float(one))
-        for one in (row.value, row.low, row.high)
+        checked(row.metric, float(number))
+        for number in (row.value, row.low, row.high)
     ]
     return [row.metric, *map(_cell, (*values, row.n))]
 
@@ -348,7 +348,7 @@ def _answer_columns(
     columns: dict[str, np.ndarray] = {}
     for name in names:
         kind = _ANSWERS[name]
-        values = [one.value(name, kind) for one in lines]
+        values = [line.value(name, kind) for line in lines]
         columns[name] = np.array(values, dtype=object if kind is str else kind)
     frames = columns["query_frame"]
     again = np.ones(len(frames), dtype=bool)
@@ -376,30 +376,30 @@ def _answer_columns(
     return columns
 
 
-def _measured_values(one: TableLine) -> dict[str, Any]:
+def _measured_values(line: TableLine) -> dict[str, Any]:
     """Returns a row's values in the columns that follow its key."""
-    metric = one.text("metric")
+    metric = line.text("metric")
     value, low, high = (
-        one.value(name, float) for name in ("value", "low", "high")
+        line.value(name, float) for name in ("value", "low", "high")
     )
     if math.isnan(value) and metric in _ALWAYS_KNOWN:
-        raise one.fault("value", f"{metric} needs a number")
+        raise line.fault("value", f"{metric} needs a number")
     least, greatest, _ = range_of(metric) or Range()
     if value < least or value > greatest:
         limits = f"from {least:g} to {greatest:g}"
         if math.isinf(greatest):
             limits = f"{least:g} or more"
-        raise one.fault("value", f"{value:g}, but {metric} is {limits}")
+        raise line.fault("value", f"{value:g}, but {metric} is {limits}")
     if math.isnan(low) != math.isnan(high):
-        raise one.fault("low", "an interval has a low and a high end")
+        raise line.fault("low", "an interval has a low and a high end")
     if low > high:
-        raise one.fault("low", f"{low:g} is more than high ({high:g})")
+        raise line.fault("low", f"{low:g} is more than high ({high:g})")
     if metric in _RESAMPLED and not math.isnan(low):
         if not (low >= -_ROUNDING and high <= 1.0 + _ROUNDING):
-            raise one.fault("low", "an interval from 0 to 1 at most")
+            raise line.fault("low", "an interval from 0 to 1 at most")
         if not low - _MOST_MISSED <= value <= high + _MOST_MISSED:
-            raise one.fault("value", f"{value:g} lies far off its interval")
-    n = one.value("n", int)
+            raise line.fault("value", f"{value:g} lies far off its interval")
+    n = line.value("n", int)
     return {
         "metric": metric,
         "value": value,

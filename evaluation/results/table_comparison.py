@@ -94,31 +94,31 @@ class Comparison:
             "conditions": self.conditions,
             "methods": [
                 {
-                    "method": one.method,
-                    "value": one.value,
-                    "interval_95": one.interval.to_json(),
+                    "method": mean.method,
+                    "value": mean.value,
+                    "interval_95": mean.interval.to_json(),
                 }
-                for one in self.ranked
+                for mean in self.ranked
             ],
             "differences": [
                 {
-                    "first": one.first,
-                    "second": one.second,
-                    "difference": one.difference.value,
-                    "interval_95": one.difference.interval.to_json(),
-                    "p": json_values(one.p_value),
+                    "first": compared.first,
+                    "second": compared.second,
+                    "difference": compared.difference.value,
+                    "interval_95": compared.difference.interval.to_json(),
+                    "p": json_values(compared.p_value),
                 }
-                for one in self.differences
+                for compared in self.differences
             ],
             "agreements": [
                 {
-                    "first": one.first,
-                    "second": one.second,
-                    "methods": list(one.methods),
-                    "kendall_tau": json_values(one.tau),
-                    "interval_95": one.interval.to_json(),
+                    "first": agreement.first,
+                    "second": agreement.second,
+                    "methods": list(agreement.methods),
+                    "kendall_tau": json_values(agreement.tau),
+                    "interval_95": agreement.interval.to_json(),
                 }
-                for one in self.agreements
+                for agreement in self.agreements
             ],
             "notes": list(self.notes),
         }
@@ -158,7 +158,11 @@ def compare_tables(
         names = ", ".join(PROTOCOL_NAMES)
         raise InputError(f"--protocol: {protocol!r} is none of {names}")
     read = [Results.read(path) for path in paths]
-    tasks = {row.task for one in read for row in one.where(metric=metric).rows}
+    tasks = {
+        row.task
+        for results in read
+        for row in results.where(metric=metric).rows
+    }
     task = "place" if "place" in tasks else min(tasks, default="")
     selection: dict[str, object] = {
         "metric": metric,
@@ -196,15 +200,15 @@ def _compared_rankings(own: Sequence[MetricTable], metric: str) -> Comparison:
     for table in own:
         changed, left_out = without_controls(table.conditions)
         tables.append(reduced_to(table, changed))
-        notes += [f"{table.name}: {one}" for one in left_out]
+        notes += [f"{table.name}: {note}" for note in left_out]
     agreements = [
         rank_agreement(*pair, metric)
         for pair in itertools.combinations(tables, 2)
     ]
     ranked = [
-        one._replace(method=f"{one.method} ({table.name})")
+        mean._replace(method=f"{mean.method} ({table.name})")
         for table in tables
-        for one in _ranked(table.rows.values(), metric)
+        for mean in _ranked(table.rows.values(), metric)
     ]
     return Comparison(metric, "", 0, ranked, (), agreements, notes)
 
@@ -222,9 +226,9 @@ def _compared_values(
     entries, incomplete = _ranked_entries(tables, common)
     notes += [*left_out, *incomplete, *_mismatch_notes(entries, common)]
     rows = [
-        replace(table.rows[method, one], method=name)
+        replace(table.rows[method, condition], method=name)
         for name, (table, method) in entries.items()
-        for one in common
+        for condition in common
     ]
     agreements = [
         rank_agreement(*pair, metric)
@@ -264,9 +268,9 @@ def _ranked_entries(
     # The user's tables come first: they may hold answers to queries.
     for table in (*tables[1:], tables[0]):
         for method in table.methods:
-            has = sum((method, one) in table.rows for one in common)
+            has = sum((method, condition) in table.rows for condition in common)
             if has < len(common):
-                is_once = sum(method in one.methods for one in tables) == 1
+                is_once = sum(method in other.methods for other in tables) == 1
                 name = method if is_once else f"{method} ({table.name})"
                 notes.append(
                     f"{name}: left out, with {has} of {len(common)} conditions"
@@ -278,11 +282,11 @@ def _ranked_entries(
                 if name == method
                 and all(
                     abs(
-                        other.rows[method, one].value
-                        - table.rows[method, one].value
+                        other.rows[method, condition].value
+                        - table.rows[method, condition].value
                     )
                     <= _ALIKE
-                    for one in common
+                    for condition in common
                 )
             ]
             if same:
@@ -294,7 +298,7 @@ def _ranked_entries(
                 kept.append((table, method))
     counts = Counter(method for _, method in kept)
     # In the order of the tables, as ties are shown.
-    kept.sort(key=lambda one: tables.index(one[0]))
+    kept.sort(key=lambda entry: tables.index(entry[0]))
     return {
         f"{method} ({table.name})"
         if table is not tables[0] and counts[method] > 1
@@ -309,27 +313,32 @@ def _mismatch_notes(
 ) -> Iterator[str]:
     """Yields notes on results of different queries or program versions."""
     rows = {
-        name: [table.rows[method, one] for one in common]
+        name: [table.rows[method, condition] for condition in common]
         for name, (table, method) in entries.items()
     }
     unknown = [
-        name for name, some in rows.items() if any(r.n is None for r in some)
+        name
+        for name, of_method in rows.items()
+        if any(r.n is None for r in of_method)
     ]
     if unknown and len(unknown) < len(rows):
         yield f"{', '.join(unknown)}: of how many queries is not known"
-    for some in zip(*rows.values(), strict=True):
+    for of_condition in zip(*rows.values(), strict=True):
         numbers: dict[int, str] = {}
-        for name, row in zip(rows, some, strict=True):
+        for name, row in zip(rows, of_condition, strict=True):
             if row.n is not None:
                 numbers.setdefault(row.n, name)
         if len(numbers) > 1:
             each = ", ".join(f"{n} ({name})" for n, name in numbers.items())
             yield (
-                f"{some[0].database} -> {some[0].query}: not the same queries:"
-                f" {each}; their values are of different difficulty"
+                f"{of_condition[0].database} -> {of_condition[0].query}: not"
+                f" the same queries: {each}; their values are of different"
+                " difficulty"
             )
             break
-    versions = {row.version for some in rows.values() for row in some} - {""}
+    versions = {
+        row.version for of_method in rows.values() for row in of_method
+    } - {""}
     if len(versions) > 1:
         yield f"measured by versions {', '.join(sorted(versions))}"
 
@@ -341,7 +350,7 @@ def _differences(
     """Compares any two methods that have answers in all conditions."""
     asked: dict[str, list[Answers]] = {}
     for name, (table, method) in entries.items():
-        keys = [(method, one) for one in common]
+        keys = [(method, condition) for condition in common]
         if all(key in table.answers for key in keys):
             asked[name] = [table.answers[key] for key in keys]
     compared = compared_answers(asked)

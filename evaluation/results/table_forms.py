@@ -373,8 +373,8 @@ def by_pair(items: Iterable[Any]) -> dict[Any, list[Any]]:
     Each item has an attribute `pair`.
     """
     groups: dict[Any, list[Any]] = {}
-    for one in items:
-        groups.setdefault(one.pair, []).append(one)
+    for item in items:
+        groups.setdefault(item.pair, []).append(item)
     return groups
 
 
@@ -384,11 +384,11 @@ def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
     Pairs keep their order; methods are in the order of tables. Each item has
     the attributes `pair` and `method`.
     """
-    pairs = list(dict.fromkeys(one.pair for one in items))
-    methods = in_table_order(one.method for one in items)
+    pairs = list(dict.fromkeys(item.pair for item in items))
+    methods = in_table_order(item.method for item in items)
     return sorted(
         items,
-        key=lambda one: (pairs.index(one.pair), methods.index(one.method)),
+        key=lambda item: (pairs.index(item.pair), methods.index(item.method)),
     )
 
 

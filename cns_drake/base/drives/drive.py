@@ -206,7 +206,7 @@ class Drive(abc.ABC):
         if not isinstance(lidars, dict) or not lidars:
             return {}
         name = next(
-            (one for one in lidars if self.name.endswith(f"_{one}")),
+            (name for name in lidars if self.name.endswith(f"_{name}")),
             next(iter(lidars)),
         )
         return lidars[name] if isinstance(lidars[name], dict) else {}

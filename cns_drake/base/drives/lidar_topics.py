@@ -45,7 +45,7 @@ def choose_lidar_topic(
     if lidar is not None:
         wanted = f"/{lidar}/points"
         named = (lidar, wanted, f"/{lidar}")
-        wanted = next((one for one in named if one in topics), wanted)
+        wanted = next((topic for topic in named if topic in topics), wanted)
     elif LIDAR_TOPIC not in topics and len(clouds) == 1:
         wanted = clouds[0]
     if wanted not in topics and clouds:

@@ -100,8 +100,10 @@ class Contents:
             elif opcode == Opcode.STATISTICS:
                 contents.statistics = Statistics.read(RecordContent(body))
             elif opcode == Opcode.ATTACHMENT_INDEX:
-                one = AttachmentIndex.read(RecordContent(body))
-                contents.attachments.append((one.name, one.offset))
+                attachment = AttachmentIndex.read(RecordContent(body))
+                contents.attachments.append(
+                    (attachment.name, attachment.offset)
+                )
             elif opcode == Opcode.METADATA_INDEX:
                 other = MetadataIndex.read(RecordContent(body))
                 contents.metadata.append((other.name, other.offset))

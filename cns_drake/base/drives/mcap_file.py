@@ -210,8 +210,8 @@ class McapFile:
             InputError: a record cannot be read.
         """
         found = []
-        for one, offset in self._contents.metadata:
-            if one == name:
+        for record_name, offset in self._contents.metadata:
+            if record_name == name:
                 with self._reading() as stream:
                     stream.seek(offset)
                     limit = _ATTACHMENT_LIMIT_BYTES
@@ -230,7 +230,9 @@ class McapFile:
         if self._contents.found is None:
             locations = self._indexed(numbers)
             counts = self._contents.statistics.channel_message_counts  # type: ignore[union-attr]  # It is whole.
-            if len(locations) != sum(counts.get(one, 0) for one in numbers):
+            if len(locations) != sum(
+                counts.get(number, 0) for number in numbers
+            ):
                 # Message indexes are optional, too.
                 with self._reading() as stream:
                     self._contents = self._contents.read_through(stream)

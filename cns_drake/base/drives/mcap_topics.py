@@ -108,7 +108,7 @@ class McapTopics:
         """
         places = self.file.locate(topic)
         records = self.file.metadata(mcap_messages.STAMPED_RECORD)
-        if [one.get(topic) for one in records] != [str(len(places))]:
+        if [record.get(topic) for record in records] != [str(len(places))]:
             return None
         for place in places[[0, -1]]:
             with self.faults(topic):

@@ -33,7 +33,7 @@ def _make_dtype(
     return np.dtype(
         {
             "names": names.split(),
-            "formats": [f"<{one}" for one in formats.split()],
+            "formats": [f"<{form}" for form in formats.split()],
             "offsets": offsets,
             "itemsize": size,
         }

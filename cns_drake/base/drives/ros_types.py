@@ -68,7 +68,7 @@ def _field_value(kind: tuple, given: Any) -> Any:
         return python_type() if given is None else python_type(given)
     element, length = inner
     if element[0] is Nodetype.NAME:
-        return [_field_value(element, one) for one in given or ()]
+        return [_field_value(element, entry) for entry in given or ()]
     scalar = element[1][0]
     return (
         np.zeros(length, scalar) if given is None else np.asarray(given, scalar)

@@ -176,18 +176,18 @@ def _source_files(
         path = _source(module)
         if module in done or path is None:
             continue
-        if f"{module.name}.".startswith(tuple(f"{one}." for one in without)):
+        if f"{module.name}.".startswith(tuple(f"{name}." for name in without)):
             continue
         done.add(module)
         if module.root == _ROOT:
             for file in _data_files(path):
                 found[file.relative_to(_ROOT).as_posix()] = file
         # Its parent packages run, too; their data do not count.
-        for one in (module, *module.parents()):
-            source = _source(one)
+        for package in (module, *module.parents()):
+            source = _source(package)
             if source is not None:
-                found[f"{one.name}.py"] = source
-                waiting += _imported_modules(one)
+                found[f"{package.name}.py"] = source
+                waiting += _imported_modules(package)
     return found
 
 

@@ -57,7 +57,11 @@ def _end_times(jobs: Mapping[str, Job]) -> dict[str, float]:
 
     def end(name: str) -> float:
         if name not in ends:
-            needed = [end(one) for one in jobs[name].needs if one in jobs]
+            needed = [
+                end(needed_name)
+                for needed_name in jobs[name].needs
+                if needed_name in jobs
+            ]
             ends[name] = jobs[name].cost + max(needed, default=0.0)
         return ends[name]
 

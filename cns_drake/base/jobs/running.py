@@ -154,7 +154,7 @@ class _Run:
             ]
             if not ready:
                 return
-            name = max(ready, key=lambda one: self._urgency[one])
+            name = max(ready, key=lambda name: self._urgency[name])
             job = self._waiting.pop(name)
             # The jobs it needs may have left it nothing to do.
             if job.needs and processes.nothing_left(job.step):

@@ -188,17 +188,17 @@ def _group_geometries(
 
     For the arguments, see `CameraScene`.
     """
-    table = structures.completed(one.structure for one in geometries)
+    table = structures.completed(shape.structure for shape in geometries)
     parts: dict[_MeshKey, list[_Member]] = {}
-    for one in geometries:
-        frame, X_FG = one.frame_id, one.X_FG
+    for shape in geometries:
+        frame, X_FG = shape.frame_id, shape.X_FG
         is_anchored = frame in anchored
         if is_anchored:
             X_FG = calc_X_WF(frame) @ X_FG
-        entry = table[one.structure]
-        rgb = one.rgb or GREY
-        surface = tessellate(one.surface, _SIDES)
-        look = entry.material(one.part).look
+        entry = table[shape.structure]
+        rgb = shape.rgb or GREY
+        surface = tessellate(shape.surface, _SIDES)
+        look = entry.material(shape.part).look
         for kind, group in (("colours", look), ("classes", entry.label)):
             key = kind, None if is_anchored else frame, group
             parts.setdefault(key, []).append((X_FG, rgb, surface))

@@ -60,7 +60,7 @@ class CameraSection(Section):
                 raise ValueError(f"{old}: give only {new}")
             angle = found.pop(old)
             if isinstance(angle, list | tuple):
-                found[new] = [_degrees(one) for one in angle]
+                found[new] = [_degrees(value) for value in angle]
             else:
                 found[new] = _degrees(angle)
         return found

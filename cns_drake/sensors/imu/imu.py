@@ -55,7 +55,7 @@ class Imu:
                 name: self.noisy.GetOutputPort(name) for name in MEASUREMENTS
             }
         ideal = self.accelerometer, self.gyroscope
-        ports = (one.get_measurement_output_port() for one in ideal)
+        ports = (sensor.get_measurement_output_port() for sensor in ideal)
         return dict(zip(MEASUREMENTS, ports, strict=True))
 
 

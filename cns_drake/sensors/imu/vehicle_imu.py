@@ -169,7 +169,7 @@ class VehicleImu(LeafSystem):
         for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):
             start = number * _BLOCK
             rows = slice(max(first - start, 0), end - start)
-            parts.append([one[rows] for one in self._block(number)[1:]])
+            parts.append([column[rows] for column in self._block(number)[1:]])
         return ImuSamples(first, *map(np.concatenate, zip(*parts, strict=True)))
 
     def _calc_block(self, number: int) -> ImuSamples:

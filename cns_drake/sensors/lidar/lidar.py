@@ -362,10 +362,10 @@ class Lidar(LeafSystem):
         self._check_context(context)
         seen = _eval_seen(self._seen_in_reach, context)
         found: dict[int, tuple[GeometryId, ...]] = {}
-        for instance, one in zip(
+        for instance, shape in zip(
             seen.instance.tolist(), seen.built, strict=True
         ):
-            found[instance] = (*found.get(instance, ()), one.geometry_id)
+            found[instance] = (*found.get(instance, ()), shape.geometry_id)
         return found
 
     def CastRays(

@@ -138,5 +138,6 @@ def make_beam_pattern(
         "max_range": max_range,
     }
     return replace(
-        base, **{name: one for name, one in changes.items() if one is not None}
+        base,
+        **{name: value for name, value in changes.items() if value is not None},
     )

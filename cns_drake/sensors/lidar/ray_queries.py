@@ -99,6 +99,6 @@ def geometry_ids(
     geometries: Sequence[PerceptionGeometry], indices: np.ndarray
 ) -> list[GeometryId | None]:
     """Returns the ids of geometries by indices (N,); None if negative."""
-    ids: list[GeometryId | None] = [one.geometry_id for one in geometries]
+    ids: list[GeometryId | None] = [shape.geometry_id for shape in geometries]
     ids.append(None)
     return [ids[k] for k in np.maximum(indices, -1).tolist()]

@@ -186,9 +186,10 @@ class SeenGeometry:
             unseen = frozenset([self._view.parent_frame_id]) - {world}
         doing("reading meshes")
         self._geometries = self._reader.read(
-            one
-            for one in records
-            if one.frame_id not in unseen and one.geometry_id not in unseen
+            record
+            for record in records
+            if record.frame_id not in unseen
+            and record.geometry_id not in unseen
         )
 
     def _is_up_to_date(

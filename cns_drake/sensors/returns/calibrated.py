@@ -252,8 +252,8 @@ def _cast_axes(
         # An array with one entry per column is used whole, because a block
         # contains whole cycles of the columns.
         p, R, when = (
-            one[rows] if len(one) == len(unit.beam) else one
-            for one in (p_WSset, R_WSset, times)
+            array[rows] if len(array) == len(unit.beam) else array
+            for array in (p_WSset, R_WSset, times)
         )
         # A single origin for all rays is faster.
         hits = scene.cast_rays(

@@ -173,11 +173,11 @@ def _merge_light(
     mean, total = np.empty(count), np.empty(count)
     energy, geometry = np.empty(count), np.empty(count, np.int32)
     echo = -1
-    for one in range(num_beams):
+    for this_beam in range(num_beams):
         begin = 0.0
         index = -1
         most = 0.0
-        for k in row[first[one] : first[one + 1]]:
+        for k in row[first[this_beam] : first[this_beam + 1]]:
             distance = light.distance[k]
             snr = target_snr(budget, extinction, light.energy[k], distance)
             if index < 0 or distance - begin > resolution:
@@ -187,7 +187,7 @@ def _merge_light(
                 if index == _MOST_ECHOES:
                     break
                 echo += 1
-                beam[echo], number[echo] = one, index
+                beam[echo], number[echo] = this_beam, index
                 # A single part of the light needs no mean.
                 mean[echo], total[echo] = distance, snr
                 energy[echo] = light.energy[k]

@@ -103,7 +103,9 @@ def make_unit_beams(
     """
     laser = np.arange(int(beams.ring.max()) + 1)
     by_laser = _draw_laser_errors(laser, sheet, key)
-    errors = _LaserErrors(*(one[beams.ring] for one in by_laser))
+    errors = _LaserErrors(
+        *(errors_of_laser[beams.ring] for errors_of_laser in by_laser)
+    )
     x, y, z = beams.d_Sset.T
     to_tick = 0.0
     offset = 0.0

@@ -42,12 +42,12 @@ def method_differences(
     All queries count (mode `all`).
     """
     found: list[MethodDifference] = []
-    for some in by_pair(by_pair_and_method(results)).values():
+    for outcomes in by_pair(by_pair_and_method(results)).values():
         compared = compared_by_auc(
-            {k: [one.outcomes] for k, one in enumerate(some)}
+            {k: [outcome.outcomes] for k, outcome in enumerate(outcomes)}
         )
         found += [
-            MethodDifference(some[a], some[b], difference, p)
+            MethodDifference(outcomes[a], outcomes[b], difference, p)
             for (a, b), (difference, p) in compared.items()
         ]
     return found

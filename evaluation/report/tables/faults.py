@@ -58,11 +58,11 @@ def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
         _fault_counts(results, evidence),
         {
             **of_result(PRINTED_KEYS),
-            "wrong": lambda one: one.wrong,
+            "wrong": lambda count: count.wrong,
             **keyed({fault_words(k): k for k in FAULT_KINDS[1:]}, share),
-            "changed by": lambda one: (
+            "changed by": lambda count: (
                 ", ".join(
-                    f"{n} {name}" for name, n in one.changed.most_common()
+                    f"{n} {name}" for name, n in count.changed.most_common()
                 )
                 or None
             ),
@@ -81,15 +81,17 @@ def fault_numbers(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
         _fault_counts(results, evidence),
         {
             **of_result(KEYS),
-            "queries": lambda one: len(one.result.outcomes),
-            "wrong": lambda one: one.wrong,
+            "queries": lambda count: len(count.result.outcomes),
+            "wrong": lambda count: count.wrong,
             **keyed(
                 {kind: kind for kind in FAULT_KINDS},
-                lambda one, kind: one.kinds[kind],
+                lambda count, kind: count.kinds[kind],
             ),
-            ELSEWHERE: lambda one: one.elsewhere,
-            "changed_by": lambda one: (
-                " ".join(f"{name}:{n}" for name, n in one.changed.most_common())
+            ELSEWHERE: lambda count: count.elsewhere,
+            "changed_by": lambda count: (
+                " ".join(
+                    f"{name}:{n}" for name, n in count.changed.most_common()
+                )
                 or None
             ),
             **protocol_columns("result."),

@@ -123,12 +123,12 @@ def query_table(
             a pair without evidence.
     """
 
-    def queries(one: PlaceOutcome) -> _QueryRows:
+    def queries(outcome: PlaceOutcome) -> _QueryRows:
         return _QueryRows(
-            one,
-            tracks[one.query].moments(one.columns["query_frame"]),
-            tracks[one.database].moments(one.columns["match_frame"]),
-            evidence.get((one.database, one.query)),
+            outcome,
+            tracks[outcome.query].moments(outcome.columns["query_frame"]),
+            tracks[outcome.database].moments(outcome.columns["match_frame"]),
+            evidence.get((outcome.database, outcome.query)),
         )
 
     return Table.of(map(queries, results), _QUERY_COLUMNS)

@@ -173,12 +173,14 @@ def _place_pose_text(results: Sequence[PlaceOutcome]) -> str:
     The sentence is empty if no method merges scans.
     """
     methods: dict[str, list[str]] = {}
-    for one in in_table_order(result.method for result in results):
+    for method in in_table_order(result.method for result in results):
         (place,) = {
-            result.protocol.place for result in results if result.method == one
+            result.protocol.place
+            for result in results
+            if result.method == method
         }
         if place is not None:
-            methods.setdefault(place, []).append(title(one))
+            methods.setdefault(place, []).append(title(method))
     if not methods:
         return ""
     chosen = " and ".join(

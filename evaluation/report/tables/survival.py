@@ -163,8 +163,8 @@ def _metric_columns(
 ) -> Columns[Survival]:
     """Returns columns: a metric without and with change, and the ratio."""
 
-    def share(one: Survival) -> str | None:
-        row = one.after.get(str(kept))
+    def share(survival: Survival) -> str | None:
+        row = survival.after.get(str(kept))
         if row is None:
             return None
         return f"{percent(row.value)} {interval_text(row)}".rstrip()
@@ -181,10 +181,10 @@ def _metric_columns(
 def survival_summary(survivals: Sequence[Survival]) -> str:
     """Returns sentences on how much methods retain, and on which survive."""
     groups = by_pair(survivals)
-    known = [one for one in survivals if one.before]
+    known = [survival for survival in survivals if survival.before]
     without = len(groups) - len(by_pair(known))
     text = survival_sentences(
-        [one.after[KEPT] for one in known if KEPT in one.after]
+        [survival.after[KEPT] for survival in known if KEPT in survival.after]
     )
     parts = [text] if text else []
     if without:

@@ -134,13 +134,13 @@ def _renamed(
 ) -> list[_Measured]:
     return [
         replace(
-            one,
+            item,
             factors={
                 name: names_of.get((name, value), value)
-                for name, value in one.factors.items()
+                for name, value in item.factors.items()
             },
         )
-        for one in items
+        for item in items
     ]
 
 

@@ -35,11 +35,11 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
     at = sorted({_checked_number(row, over) for row in chart.rows})
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):
         for label, (colour, style, marker) in chart.styles.items():
-            some = [row for row in rows if title(row.label) == label]
-            points = sorted(means(some, over), key=lambda one: one.key)
-            x = [one.key[0] for one in points]
+            of_label = [row for row in rows if title(row.label) == label]
+            points = sorted(means(of_label, over), key=lambda mean: mean.key)
+            x = [mean.key[0] for mean in points]
             y, low, high = (
-                [getattr(one, end) for one in points]
+                [getattr(mean, end) for mean in points]
                 for end in ("value", "least", "greatest")
             )
             axes.fill_between(x, low, high, color=colour, alpha=0.15, lw=0)
@@ -55,7 +55,7 @@ def draw_lines(chart: Chart) -> tuple[str, Figure]:
         # A label of the whole figure would lie below its legend.
         axes.set_xlabel(escape_dollars(in_words(over)))
     figure.supylabel(escape_dollars(in_words(chart.metric)), fontsize=FONT)
-    found = {name: float(np.mean(some)) for name, some in last.items()}
+    found = {name: float(np.mean(values)) for name, values in last.items()}
     message = (
         f"{in_words(chart.metric)} at {at[-1]:g} {in_words(over)}:"
         f" {from_least_to_greatest(found)}"
@@ -72,8 +72,8 @@ def _checked_number(row: Row, column: str) -> float:
 
 def _spread_axis(axes: Axes, at: Sequence[float]) -> None:
     """Makes the x axis logarithmic if its values span a wide range."""
-    above = [one for one in at if one > 0.0]
+    above = [value for value in at if value > 0.0]
     if min(at) >= 0.0 and above and max(above) / min(above) > _WIDE_RANGE:
         axes.set_xscale("symlog", linthresh=min(above))
-        axes.set_xticks(list(at), [f"{one:g}" for one in at])
+        axes.set_xticks(list(at), [f"{value:g}" for value in at])
         axes.minorticks_off()

@@ -106,9 +106,9 @@ def _cells(
             (strip, checked(metric, mean.value), is_loss)
         )
     found = {}
-    for key, some in strips.items():
+    for key, cell_strips in strips.items():
         _, shares, are_losses = zip(
-            *sorted(some, key=_strip_order), strict=True
+            *sorted(cell_strips, key=_strip_order), strict=True
         )
         found[key] = _Cell(shares, are_losses[-1])
     return found

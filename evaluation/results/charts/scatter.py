@@ -44,11 +44,11 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
         few = len(x) < LEAST_POINTS
         size, alpha = (8.0, 0.9) if few else (5.0, 0.55)
         axes.plot(x, y, marker, color=colour, mew=0, ms=size, alpha=alpha)
-        for one in curves(x, y):
+        for curve in curves(x, y):
             axes.fill_between(
-                one.x, one.low, one.high, color=colour, alpha=0.18, lw=0
+                curve.x, curve.low, curve.high, color=colour, alpha=0.18, lw=0
             )
-            axes.plot(one.x, one.y, style, color=colour)
+            axes.plot(curve.x, curve.y, style, color=colour)
     axes.set(
         xlabel=escape_dollars(in_words(x_name)),
         ylabel=escape_dollars(in_words(y_name)),
@@ -74,9 +74,13 @@ def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:
     )
     # `correlations` are of 1 - metric: the signs change.
     found = [
-        one._replace(value=-one.value, low=-one.high, high=-one.low)
-        for one in correlations(selected, x_name, y_name)
-        if not math.isnan(one.value)
+        correlation._replace(
+            value=-correlation.value,
+            low=-correlation.high,
+            high=-correlation.low,
+        )
+        for correlation in correlations(selected, x_name, y_name)
+        if not math.isnan(correlation.value)
     ]
     if not found:
         message = f"{in_words(y_name)} over {in_words(x_name)}"
@@ -84,11 +88,17 @@ def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:
         if number < LEAST_POINTS:
             message += ", too few points for a trend"
         return message
-    coefficients = {title(one.method): one.value for one in found}
+    coefficients = {
+        title(correlation.method): correlation.value for correlation in found
+    }
     text = from_least_to_greatest(coefficients, "{:+.2f}")
     names = f"{in_words(y_name)} with {in_words(x_name)}"
     message = f"Rank correlation of {names}: {text}"
-    doubtful = [title(one.method) for one in found if one.low <= 0 <= one.high]
+    doubtful = [
+        title(correlation.method)
+        for correlation in found
+        if correlation.low <= 0 <= correlation.high
+    ]
     if doubtful:
         message += (
             f"; not significantly different from 0 with {listed(doubtful)}"
