@@ -13,6 +13,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.number_text import to_number
 
+# Limits that no road network or trace reaches, against hostile files: size of
+# the file [bytes], number and nesting of elements, length of a value.
 _MOST_BYTES = 256 * 2**20
 _MOST_ELEMENTS = 1_000_000
 _DEEPEST = 100

@@ -22,6 +22,7 @@ _STEP = 0.005
 _STRIDE = 0.1
 # Time for the body to come to rest at the end of the drive [s].
 _AFTERWARDS = 3.0
+# Acceleration of gravity [m/s^2].
 _GRAVITY = 9.81
 # Number of terms of the Taylor series of a matrix exponential, after the first.
 _TERMS = 15

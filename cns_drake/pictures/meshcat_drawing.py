@@ -26,13 +26,16 @@ _ROUTE_WIDTH = 2.0
 # route passes twice, its later part is on top.
 _ROUTE_HEIGHTS = (0.2, 0.7)
 
+# The cone that marks a place [m].
 _MARKER_HEIGHT = 7.0
 _MARKER_RADIUS = 2.5
 _MARKER_RGBA = Rgba(1.0, 0.75, 0.0)
 
+# Size of a point [pixels].
 _POINT_PIXELS = 2.0
 # Heights above the map's zero with the first and the last colour of points [m].
 POINT_HEIGHTS = (0.0, 25.0)
+# Number of colours between them.
 _NUM_COLORS = 64
 
 # Direction towards the sun, in the south-west, so that the visible sides are

@@ -34,10 +34,13 @@ UINT3 = 0x5003
 FLOAT3 = 0x9003
 FLOAT4 = 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134
+# Flag of a scene (`RTC_SCENE_FLAG_ROBUST`).
 ROBUST_SCENE = 1 << 2
 # Error of a device (`RTC_ERROR_OUT_OF_MEMORY`).
 OUT_OF_MEMORY = 4
+# Flag of a query (`RTC_RAY_QUERY_FLAG_COHERENT`).
 COHERENT_RAYS = 1 << 16
+# Id of a geometry or instance if there is no hit (`RTC_INVALID_GEOMETRY_ID`).
 INVALID_ID = 0xFFFFFFFF
 # Setting of a device: room for more user threads than a machine has.
 # `rtcJoinCommitScene` then builds a scene in the calling thread only, without

@@ -25,6 +25,7 @@ MOTION_DTYPE = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "yaw_rate")]
     + [("instance", "<u2"), ("moving", "<u2")]
 )
+# `SceneEntityDeletion.ALL` of Foxglove.
 _DELETE_ALL = 1
 _RGB = {"person": (0.95, 0.35, 0.2), "bicyclist": (0.95, 0.75, 0.1)}
 _OTHER_RGB = (0.2, 0.6, 0.95)

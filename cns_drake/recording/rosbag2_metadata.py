@@ -12,6 +12,7 @@ import yaml
 
 from cns_drake.base.drives import ros_types
 
+# Version of the format of `metadata.yaml`.
 _VERSION = 8
 
 

@@ -29,6 +29,7 @@ _SPAN_NS = 800_000_000
 # Several LiDARs or cameras make more than that in a span. Their messages must
 # not fill the memory.
 _MOST_HELD_BYTES = 1 << 24
+# Size of a chunk, before compression, at which it ends [bytes].
 _CHUNK_BYTES = 1 << 20
 
 

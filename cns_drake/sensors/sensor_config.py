@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from cns_drake.recording.rosbag2_metadata import Topic
 
+# Greatest rate of a sensor [1/s].
 HIGHEST_RATE = 1000
 _NS_PER_S = 1_000_000_000
 

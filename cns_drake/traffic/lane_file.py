@@ -19,6 +19,8 @@ from cns_drake.traffic.polylines import resampled
 
 # Distance between the points of a lane in a file [m].
 _FILE_SPACING = 1.0
+# Limits of a file: greatest coordinate [m]; greatest number of lanes, and of
+# phases of a signal.
 _FARTHEST = 1e6
 _MOST = 20_000
 _MOST_PHASES = 8

@@ -30,10 +30,13 @@ _NEAR = 8.0
 _TURN = np.radians(12.0)
 # Two pairs determine a turn if they are this far apart [m].
 _BASELINE = 20.0
+# Greatest number of pairs of pairs by which poses are tried.
 _MOST_TRIALS = 3000
+# Greatest number of guesses.
 _NUM_GUESSES = 5
 # Extent of the points of a scan along each axis [m].
 _MAX_RANGE = 100.0
+# Seed by which pairs of pairs are chosen if there are more.
 _SEED = 11
 # Number of times that a guess is fitted again to the pairs that agree with it.
 _REFINEMENTS = 3

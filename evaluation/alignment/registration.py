@@ -27,12 +27,15 @@ _STAGES = ((10.0, 1500), (5.0, 1500), (2.0, 4000), (1.0, 4000), (0.5, 4000))
 _JUDGED_DISTANCE = 1.0
 # Number of the points by which a fit is judged.
 _NUM_SAMPLES = 4000
+# Greatest number of steps of a stage.
 _MAX_ITERATIONS = 15
 # A stage ends when a step is shorter than this [m, rad].
 _STILL = (0.005, 2e-4)
 # Least cosine between the normals of a pair.
 _PARALLEL = 0.7
+# A stage with fewer pairs leaves the pose as it was.
 _FEWEST_PAIRS = 20
+# Seed of the choice of points.
 _SEED = 7
 # Standard deviation of a point's distance from its plane [m].
 _SIGMA = 0.1

@@ -22,7 +22,9 @@ _MOST_KEYFRAMES = 400
 _HALF_LENGTH = 10.0
 _SCAN_SPACING = 2.5
 _RANGE = 60.0
+# A submap has a point for each voxel of this side [m].
 _VOXEL_SIZE = 0.7
+# A submap with fewer points is not registered.
 _FEWEST_POINTS = 500
 # The ground is searched within this distance of a keyframe [m], at this number
 # of keyframes, among points whose normals are this close to the vertical.

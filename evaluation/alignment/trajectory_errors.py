@@ -36,9 +36,11 @@ from evaluation.drives.trajectories import StampedPoses
 Frame = Literal["lidar", "base_link"]
 # Length of the parts over which an odometry drifts [m].
 SPAN = 100.0
+# Number of poses from the beginning of one part to that of the next.
 _STEP = 10
 # With fewer poses, an alignment would leave hardly any error.
 _LEAST_POSES = 3
+# Ground truth is not interpolated over longer gaps [ns].
 _LONGEST_GAP_NS = 1_000_000_000
 
 

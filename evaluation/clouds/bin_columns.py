@@ -21,12 +21,15 @@ from cns_drake.base.poses import FARTHEST
 
 # KITTI's number of columns, used if the values do not show another.
 _USUAL = 4
+# Numbers of columns that a scan may have.
 FEWEST_COLUMNS = 3
 _CANDIDATES = range(FEWEST_COLUMNS, 13)
 # A multiple of all candidates, so that each window of this many values begins
 # at the beginning of a point.
 _WINDOW = 27720
+# Greatest number of windows that are read, spread over the file.
 _WINDOWS = 4
+# Greatest number of bins of a histogram.
 _MOST_BINS = 16
 # Average number of values per bin; also the least number of points.
 _FILLED = 16

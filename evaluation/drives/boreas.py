@@ -39,6 +39,7 @@ _POINT = np.dtype(
         ("t", "<i4"),
     ]
 )
+# Poses are not interpolated over longer gaps [ns].
 _LONGEST_GAP_NS = 1_000_000_000
 # Origin of W on the UTM grid, in Toronto [m]; chosen like the origin in
 # `evaluation.drives.utm_poses.to_world`.

@@ -29,6 +29,7 @@ _FOLDERS = ("sensor_data/Ouster", "Ouster")
 # Fields that follow from the index of a point in a complete scan.
 _FOUND = [("ring", "<u2"), ("t", "<u4")]
 
+# A complete scan: rings, columns, and its duration [ns].
 _NUM_RINGS = 64
 _NUM_COLUMNS = 1024
 _SWEEP_NS = 100_000_000

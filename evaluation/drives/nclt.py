@@ -44,6 +44,7 @@ _UNIT = 0.005
 # Coordinate that is stored as 0 [m].
 _LEAST_COORDINATE = -100.0
 _NUM_LASERS = 32
+# Poses are not interpolated over longer gaps [ns].
 _LONGEST_GAP_NS = 1_000_000_000
 # W has its axes east, north and up.
 _X_WN = poses.make_pose(

@@ -18,7 +18,9 @@ from cns_drake.base.points import from_xyz
 from cns_drake.base.progress import track
 from evaluation.maps.voxel_table import SLOT, add_points, copy_voxels
 
+# Side of a voxel [m].
 VOXEL_SIZE = 5.0
+# Height of the lower faces of a layer of voxels [m], half a side below zero.
 Z_ORIGIN = -2.5
 _ORIGIN = (0.0, 0.0, Z_ORIGIN)
 # Side of the cells that are merged into larger voxels, on any grid [m].

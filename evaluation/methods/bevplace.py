@@ -33,6 +33,7 @@ from evaluation.methods.network_layers import Weights
 from evaluation.methods.published_networks import Network
 from evaluation.methods.registry import register
 
+# Number of scales of the image.
 _SCALES = 5
 # Turns of the image [deg].
 _TURNS = (-90.0, -45.0, 0.0, 45.0, 90.0)
@@ -46,8 +47,11 @@ _DEVIATION = (0.229, 0.224, 0.225)
 # OpenCV's fixed-point numbers: positions in 1/1024, rounded to 1/32 pixel.
 _FINE = 1024
 _COARSE = 32
+# Added to the variance, as in the published program.
 _NORM_EPSILON = 1e-5
+# Least length by which a vector is divided.
 _TINY = 1e-6
+# Sizes of NetVLAD in the published weights.
 _CLUSTERS = 64
 _CHANNELS = 128
 _CONVOLUTION = "encoder.extractor.extractor.conv"

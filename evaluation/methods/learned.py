@@ -35,6 +35,7 @@ from evaluation.methods.polar_images import (
 )
 from evaluation.methods.registry import register
 
+# Version of the layout of files of weights.
 WEIGHTS_VERSION = 1
 # For each 3 x 3 convolution: channels in, channels out, stride over rings,
 # stride over sectors.
@@ -55,6 +56,7 @@ SEEN_SHARES = "seen"
 # cities; and trained with exact overlaps, on streets of no map.
 SHIPPED = Path(__file__).with_name("learned_weights.npz")
 GRADED = SHIPPED.with_name("learned_graded_weights.npz")
+# Greatest size of a file of weights [bytes].
 _MOST_BYTES = 5_000_000
 
 

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from scipy.special import erf
 
 Weights = Mapping[str, np.ndarray]
+# Least value before a power, as in the published programs.
 _TINY = 1e-6
 
 

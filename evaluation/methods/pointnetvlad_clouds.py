@@ -18,6 +18,7 @@ import numpy as np
 from evaluation.maps.voxel_maps import downsample
 from evaluation.methods.sparse_convolution import coarser
 
+# Number of points of a cloud for PointNetVLAD.
 NUM_POINTS = 4096
 # Side of a cell of the networks, in clouds from -1 to 1.
 CELL = 0.01

@@ -55,6 +55,7 @@ _SPLITS = {
     "05": ((0, 1000), (1200, 2751)),
     "06": ((0, 600), (800, 1101)),
 }
+# Time between two images [ns].
 _PERIOD_NS = 100_000_000
 # Seed by which one place is drawn for each of a few queries.
 _SEED = 90

@@ -22,7 +22,9 @@ from evaluation.recognition.query_outcomes import QueryOutcomes
 
 # Length of a block of the route [m].
 BLOCK_LENGTH = 100.0
+# Number of bootstrap samples.
 _SAMPLES = 1000
+# Probability with which an interval contains the value.
 _CONFIDENCE = 0.95
 
 

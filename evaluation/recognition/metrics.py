@@ -41,6 +41,7 @@ from evaluation.recognition.query_outcomes import QueryOutcomes
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 
+# Greatest N of R@N.
 MAX_RANK = 25
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from evaluation.methods.method import Method, PlaceScan
 
 
+# Fields that must be positive if they are given.
 _POSITIVE = (
     "radius",
     "query_spacing",

@@ -53,8 +53,11 @@ _HIGHEST = (72, 88, 112)
 ROUTE_COLOURS = "turbo_r"
 # Margin of a view from above around the route [m].
 _MARGIN = 60.0
+# Length of the scale bar [m].
 _SCALE_BAR = 50.0
+# Greatest number of points of a drawn route.
 _ROUTE_POINTS = 400
+# Width of a panel [inches].
 _PANEL_INCHES = 4.2
 
 _OBLIQUE = OrthographicView(

@@ -25,6 +25,7 @@ _POINTS_OF_A_PAGE = 5_000_000
 _IMAGES_OF_A_PAGE = 6_000_000
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
+# Quality of compressed pictures, from 0 to 100.
 _WEBP_QUALITY = 75
 
 

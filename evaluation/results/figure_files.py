@@ -20,8 +20,11 @@ from evaluation.results.ranges import check_all
 # PDF, and on the page in SVG.
 LINES = ("pdf", "png", "svg")
 PIXELS = ("png", "webp")
+# Resolution of pictures for print [dots per inch].
 _DPI = 200
+# Resolution of pictures for the page [dots per inch].
 _PAGE_DPI = 130
+# Quality of compressed pictures, from 0 to 100.
 _WEBP_QUALITY = 82
 
 

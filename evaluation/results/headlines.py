@@ -12,6 +12,7 @@ from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
 from evaluation.results.table import Answers, QueryRows, Row
 from evaluation.results.table_forms import title
 
+# Methods differ significantly if the p-value is below this value.
 SIGNIFICANT = 0.05
 # The metric by which a method survives a change: the share of its AUC strict
 # that it retains.

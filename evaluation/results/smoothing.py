@@ -12,6 +12,7 @@ _BANDWIDTH = 0.15
 # Widest gap that a curve crosses: two widths, so that no part of it is farther
 # than one width from a point.
 _WIDEST_GAP = 2.0
+# Number of bootstrap samples of a curve.
 _RESAMPLES = 1000
 # Number of points of a curve over the whole range of x.
 _GRID = 60

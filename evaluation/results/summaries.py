@@ -37,6 +37,7 @@ _NOT_MAINTAINED = "none"
 _EXACTLY = "truth"
 # Joins the names of causes that come together.
 _AND = "+"
+# Number of bootstrap samples.
 _SAMPLES = 1000
 # Least number of points that show a trend.
 LEAST_POINTS = 5

@@ -17,6 +17,7 @@ _LONGEST = {
     ros_types.IMU: 1 << 12,
     ros_types.TF: 1 << 20,
 }
+# Limits of a point cloud: number of fields, and length of a name [bytes].
 _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
 # The header of CDR that gives the order of bytes.

@@ -50,7 +50,10 @@ _CHUNK_START = re.compile(
     rb"(?P<content_length>.{8}))",
     re.DOTALL,
 )
+# Length of that beginning, with the longest name of a compression [bytes].
 _LONGEST_CHUNK_START = 9 + 28 + 8 + 8
+# Blocks in which a file is searched grow from the first to the last size
+# [bytes].
 _FIRST_SEARCH_BLOCK = 4096
 _LAST_SEARCH_BLOCK = 4 * 1024 * 1024
 # Limit of the bytes read in search of chunks, in multiples of the file's size:

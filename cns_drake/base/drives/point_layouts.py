@@ -17,6 +17,7 @@ LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
 LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
+# Limit of times that are stored as uint32 [ns].
 _LONGEST_NS = 2.0**32
 # The latest time in a scan, if it is in nanoseconds: in seconds it would be
 # later than any scan ends, and before 2001.

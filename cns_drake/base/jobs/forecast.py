@@ -19,6 +19,7 @@ from cns_drake.base.progress import doing
 _POINTS = 100_000
 # Time of the benchmark on the machine to which the costs of jobs refer [s].
 _REFERENCE = 0.29
+# Number of runs of the benchmark, which are averaged.
 _REPEATS = 3
 # Most memory of a job [bytes].
 _JOB_MEMORY = 1.2e9

@@ -17,6 +17,7 @@ DRAWS_PER_BEAM = 256
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
+# Distance between two random numbers from 0 to 1.
 _UNIT = 2.0**-53
 
 

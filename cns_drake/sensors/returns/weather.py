@@ -39,6 +39,7 @@ def _geometric_sequence(first: float, last: float, count: int) -> np.ndarray:
 
 # Diameters of drops; smaller ones are not detectable [mm].
 _DIAMETERS_MM = _geometric_sequence(0.05, 12.0, 120)
+# Refractive index of water near 900 nm.
 _WATER_INDEX = 1.328
 # The extinction of a flake is twice its area. The back-scatter of a Lambertian
 # target is rho / pi times its area: rho = 2 pi / 25 sr.
