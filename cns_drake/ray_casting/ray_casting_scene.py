@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -42,6 +43,21 @@ class SceneHits:
     geometry: np.ndarray
     normals_W: np.ndarray
     is_outside: np.ndarray
+
+
+class SurfaceFrames(NamedTuple):
+    """The R frames L with which the surfaces of G geometries move.
+
+    Attributes:
+        row: (G,) row of each geometry's frame L in the other arrays.
+        normal_matrices: (R, 3, 3) inverse transpose of the linear part of each
+            X_WL.
+        p_WLset: (R, 3) origin of each L in the world [m].
+    """
+
+    row: np.ndarray
+    normal_matrices: np.ndarray
+    p_WLset: np.ndarray
 
 
 class RayCastingScene:
@@ -134,22 +150,19 @@ class RayCastingScene:
             self._scene.place(placed)
             self._normal_matrices = None
 
-    def surface_frames(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def surface_frames(self) -> SurfaceFrames:
         """Returns the frame L with which the surface of each geometry moves.
 
         For merged geometry L is the world, otherwise the geometry's own frame.
-
-        Returns:
-            (G,) for each geometry the row of its frame L in the next two
-            arrays; (R, 3, 3) the inverse transpose of the linear part of each
-            X_WL; (R, 3) each p_WL [m].
         """
         p_WLset = [
             np.zeros(3) if g.is_merged_world else g.X_OL[:, 3] + self._p_WO
             for g in self._groups
         ]
         matrices = self._calc_normal_matrices()
-        return self._group_of, matrices, np.reshape(p_WLset, (-1, 3))
+        return SurfaceFrames(
+            self._group_of, matrices, np.reshape(p_WLset, (-1, 3))
+        )
 
     def cast_rays(
         self,

@@ -216,7 +216,7 @@ class CalibratedReturns:
             np.asarray(p_WSset, float),
             met.d_Wset,
             materials,
-            *scene.surface_frames(),
+            scene.surface_frames(),
         )
         return report_echoes(light, receiver, key, unit.range_error, unit.gain)
 

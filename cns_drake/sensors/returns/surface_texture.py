@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.ray_casting.ray_casting_scene import SurfaceFrames
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.random_numbers import cell_number
@@ -47,9 +48,7 @@ def with_texture(
     p_WSset: np.ndarray,
     d_Wset: np.ndarray,
     materials: Materials,
-    group_of: np.ndarray,
-    normal_matrices: np.ndarray,
-    p_WLset: np.ndarray,
+    frames: SurfaceFrames,
 ) -> Light:
     """Returns light whose energies and distances vary with surface texture.
 
@@ -67,8 +66,7 @@ def with_texture(
             row i of `d_Wset` starts at position i mod K.
         d_Wset: (B, 3) unit directions of the beams in the world.
         materials: materials of the geometries.
-        group_of, normal_matrices, p_WLset: the three arrays that
-            `RayCastingScene.surface_frames` returns.
+        frames: frames with which the surfaces move.
     """
     energy, distance = light.energy.copy(), light.distance.copy()
     # As names of their own, fields are fast.
@@ -76,20 +74,22 @@ def with_texture(
     contrast, relief = materials.contrast, materials.relief
     tufts, swell = materials.tufts, materials.swell
     fittings, stains = materials.fittings, materials.stains
+    normal_matrices, p_WLset = frames.normal_matrices, frames.p_WLset
+    frame_of = frames.row
     for k in range(len(energy)):
         part = contrast[geometry[k]]
         if part == 0.0:
             continue
         ray = row[beam[k]]
-        group = group_of[geometry[k]]
+        frame = frame_of[geometry[k]]
         place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
         x = y = z = 0.0
         for i in range(3):
-            away = p_WSset[place, i] - p_WLset[group, i]
+            away = p_WSset[place, i] - p_WLset[frame, i]
             away += distance[k] * d_Wset[ray, i]
-            x += normal_matrices[group, i, 0] * away
-            y += normal_matrices[group, i, 1] * away
-            z += normal_matrices[group, i, 2] * away
+            x += normal_matrices[frame, i, 0] * away
+            y += normal_matrices[frame, i, 1] * away
+            z += normal_matrices[frame, i, 2] * away
         a = 0.7071 * x + 0.5417 * y + 0.4545 * z
         b = -0.6124 * x + 0.7899 * y + 0.0113 * z
         c = -0.3529 * x - 0.2863 * y + 0.8908 * z

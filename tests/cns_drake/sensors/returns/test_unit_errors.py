@@ -8,7 +8,7 @@ from pydrake.geometry import HalfSpace
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.ray_casting.ray_casting_scene import SceneHits
+from cns_drake.ray_casting.ray_casting_scene import SceneHits, SurfaceFrames
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.sensors.lidar.config import (
     describe_unit,
@@ -24,6 +24,8 @@ from cns_drake.sensors.returns.unit_sheets import Response
 
 # Elevations of the first and the last laser of each block of an HDL-64E [deg].
 LIMITS = 2.0, -8.33, -8.83, -24.33
+# The frame of surfaces that do not move.
+STILL = SurfaceFrames(np.zeros(1, int), np.eye(3)[None], np.zeros((1, 3)))
 ROAD = StructureTable([StructureEntry(1, "asphalt", "road")])
 
 
@@ -180,7 +182,7 @@ class Wall:
         )
 
     def surface_frames(self):
-        return np.zeros(1, int), np.eye(3)[None], np.zeros((1, 3))
+        return STILL
 
 
 def test_lasers_have_their_places_however_poses_are_given():
@@ -231,9 +233,7 @@ def textured(p_WGset, contrast=0.5, **fields):
         p_WGset + np.array([0.0, 0.0, 2.0]),
         np.tile([0.0, 0.0, -1.0], (count, 1)),
         materials,
-        np.zeros(1, int),
-        np.eye(3)[None],
-        np.zeros((1, 3)),
+        STILL,
     )
 
 
