@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from cns_drake.city.generation.rendering import structure_table
+from cns_drake.city.generation.rendering import structures_csv
 from cns_drake.city.generation.stage_sizes import stage_size, triangles_in
 from cns_drake.city.generation.world_sdf import world_sdf
 from cns_drake.city.geometry.structures import Structure
@@ -84,7 +84,7 @@ def _structure_table(
     years of construction has a column for these. The arguments are as for
     `write_world`.
     """
-    table = structure_table(
+    table = structures_csv(
         [*guessed_ground, *(kept.structure for kept in city.kept)],
         (
             member.structure

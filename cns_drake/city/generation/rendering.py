@@ -24,7 +24,7 @@ from cns_drake.scene.map_folder import (
 )
 
 
-def structure_table(
+def structures_csv(
     structures: Iterable[Structure], versions: Iterable[Structure] = ()
 ) -> str:
     """Returns the text of `structures.csv`, with a row for each structure.
@@ -159,7 +159,7 @@ def render_stages(
             f"stage {stage} lacks {len(stages.absent(stage))} structures, "
             f"{len(stages.heights(stage))} are lower"
         )
-    files[STRUCTURES_NAME] = structure_table(growing.structures, used)
+    files[STRUCTURES_NAME] = structures_csv(growing.structures, used)
     texts = _mesh_texts(used)
     files |= {f"{MESH_FOLDER}/{name}.obj": text for name, text in texts.items()}
     triangles = {name: triangles_in(text) for name, text in texts.items()}

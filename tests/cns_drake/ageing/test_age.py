@@ -634,3 +634,20 @@ def test_tables_of_structures_that_are_none(town, tmp_path):
     table.write_text("".join(lines[:-1]))
     with pytest.raises(InputError, match=f"no row for {name}"):
         OldWorld(MapFolder(folder)).structure(name)
+
+
+def test_visuals_of_further_models_are_refused(town, tmp_path):
+    """An aged stage would lack them: it has the visuals of one model."""
+    folder = copied(town, tmp_path / "town")
+    stage = folder / "stage_02.sdf"
+    hut = (
+        '<model name="inner"><static>true</static><link name="hut">'
+        '<visual name="hut/wall">'
+        "<geometry><box><size>1 1 1</size></box></geometry></visual></link>"
+        "</model></model>"
+    )
+    text = stage.read_text()
+    assert text.count("</model>") == 1
+    stage.write_text(text.replace("</model>", hut))
+    with pytest.raises(InputError, match=r"stage_02\.sdf: not one model"):
+        OldWorld(MapFolder(folder))
