@@ -40,8 +40,6 @@ SPAN = 100.0
 _STEP = 10
 # With fewer poses, an alignment would leave hardly any error.
 _LEAST_POSES = 3
-# Ground truth is not interpolated over longer gaps [ns].
-_LONGEST_GAP_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -161,9 +159,7 @@ def trajectory_errors(
             f" drive, of {_LEAST_POSES} at least: the estimate spans"
             f" {_seconds_text(stamps_ns)}, {drive.name} {_seconds_text(own)}"
         )
-    X_WB, _ = truth.interpolate(
-        stamps_ns[inside], _LONGEST_GAP_NS, "the estimated pose"
-    )
+    X_WB, _ = truth.interpolate(stamps_ns[inside], "the estimated pose")
     Y_WB = estimate.X_WB[inside]
     _, _, E = segment_errors(X_WB, Y_WB)
     return TrajectoryErrors(

@@ -39,8 +39,6 @@ _POINT = np.dtype(
         ("t", "<i4"),
     ]
 )
-# Poses are not interpolated over longer gaps [ns].
-_LONGEST_GAP_NS = 1_000_000_000
 # Origin of W on the UTM grid, in Toronto [m]; chosen like the origin in
 # `evaluation.drives.utm_poses.to_world`.
 _ORIGIN = (620_000.0, 4_845_000.0, 0.0)
@@ -64,7 +62,7 @@ class BoreasDrive(FileDrive):
         local = is_local(X_WS)
         if not local:
             X_WS[:, :3, 3] -= _ORIGIN
-        X_WS, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        X_WS, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
             name=path.resolve().name,

@@ -64,8 +64,6 @@ _RECORDS = {
 _AEVA_CHANGE_NS = 1691936557946849179
 _UNITS = {"Ouster": "os2-128", "Velodyne": "vlp-16", "Avia": "avia"}
 _NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
-# Each scan has a pose, at 10 Hz.
-_LONGEST_GAP_NS = 1_000_000_000
 
 
 class HeliprDrive(FileDrive):
@@ -102,7 +100,7 @@ class HeliprDrive(FileDrive):
         in_utm = (drive / _POSES / f"global_{lidar}_gt.txt").is_file()
         poses_name = f"global_{lidar}_gt.txt" if in_utm else f"{lidar}_gt.txt"
         trajectory = read_quaternions(drive / _POSES / poses_name, None)
-        X_US, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        X_US, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         X_WS = to_world(X_US, trajectory.path) if in_utm else X_US
         drive = drive.resolve()

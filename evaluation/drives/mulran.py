@@ -33,8 +33,6 @@ _FOUND = [("ring", "<u2"), ("t", "<u4")]
 _NUM_RINGS = 64
 _NUM_COLUMNS = 1024
 _SWEEP_NS = 100_000_000
-# Poses have a rate of 100 Hz.
-_LONGEST_GAP_NS = 1_000_000_000
 
 
 class MulranDrive(BinDrive):
@@ -68,7 +66,7 @@ class MulranDrive(BinDrive):
             )
         files, stamps_ns = list_stamped(folder, ".bin")
         trajectory = read_matrices(path / _POSES, ",")
-        X_UB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        X_UB, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         notes = (*chosen, *notes)
         name = path.resolve().name

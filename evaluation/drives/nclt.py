@@ -44,8 +44,6 @@ _UNIT = 0.005
 # Coordinate that is stored as 0 [m].
 _LEAST_COORDINATE = -100.0
 _NUM_LASERS = 32
-# Poses are not interpolated over longer gaps [ns].
-_LONGEST_GAP_NS = 1_000_000_000
 # W has its axes east, north and up.
 _X_WN = poses.make_pose(
     np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]), np.zeros(3)
@@ -83,7 +81,7 @@ class NcltDrive(FileDrive):
         name = path.resolve().name
         chosen: list[str] = []
         trajectory, unknown = read_angles(_poses_path(path, chosen))
-        X_NB, spanned = trajectory.interpolate(stamps_ns, _LONGEST_GAP_NS)
+        X_NB, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         super().__init__(
             name=name,

@@ -20,6 +20,8 @@ from evaluation.drives.text_tables import (
 # Greatest error of a rotation matrix or quaternion, as in numbers that are
 # written with four digits.
 _ROTATION_TOLERANCE = 1e-3
+# Greatest time between two poses that are interpolated [ns].
+_LONGEST_GAP_NS = 1_000_000_000
 # Columns of a table of poses.
 _COLUMNS = ("time", "x", "y", "z", "qx", "qy", "qz", "qw")
 
@@ -41,15 +43,12 @@ class StampedPoses:
     def interpolate(
         self,
         stamps_ns: np.ndarray,
-        longest_gap_ns: int,
         wanted_for: str = "the scan",
     ) -> tuple[np.ndarray, np.ndarray]:
         """Returns interpolated poses at given times (SLERP and linear).
 
         Args:
             stamps_ns: (M,) int64 times of the wanted poses [ns].
-            longest_gap_ns: greatest time between two poses that are
-                interpolated [ns].
             wanted_for: what the poses are for, such as `the scan`; named in
                 error messages.
 
@@ -60,7 +59,7 @@ class StampedPoses:
 
         Raises:
             InputError: the table spans none of the times, or a time lies in a
-                gap longer than `longest_gap_ns`.
+                gap of more than a second.
         """
         own = self.stamps_ns
         spanned = (stamps_ns >= own[0]) & (stamps_ns <= own[-1])
@@ -75,13 +74,13 @@ class StampedPoses:
         exact = own[after] == wanted
         before = np.where(exact, after, after - 1)
         gaps = own[after] - own[before]
-        if (gaps > longest_gap_ns).any():
+        if (gaps > _LONGEST_GAP_NS).any():
             worst = int(gaps.argmax())
             raise InputError(
                 f"{self.path}: time: no pose for {wanted_for} at"
                 f" {wanted[worst]} ns: the poses there are"
                 f" {gaps[worst] * 1e-9:.2f} s apart, more than"
-                f" {longest_gap_ns * 1e-9:g} s"
+                f" {_LONGEST_GAP_NS * 1e-9:g} s"
             )
         # Differences of int64 are exact, and small enough for a double.
         fraction = (wanted - own[before]) / np.where(exact, 1, gaps)
