@@ -3,12 +3,14 @@
 A wheel contains them as one archive.
 """
 
+from collections.abc import Mapping
 import functools
 import hashlib
 from pathlib import Path
 import shutil
 import tarfile
 import tempfile
+from types import MappingProxyType
 
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.file_names import cache_folder
@@ -40,13 +42,15 @@ def suspension_file() -> Path:
     return worlds_folder() / "suspension.yaml"
 
 
-def shipped_maps() -> dict[str, Path]:
+@functools.cache
+def shipped_maps() -> Mapping[str, Path]:
     """Returns name -> folder of each shipped map."""
-    return {
+    folders = {
         path.name: path
         for path in sorted(worlds_folder().iterdir())
         if MapFolder(path).roads.exists()
     }
+    return MappingProxyType(folders)
 
 
 def recordable_maps() -> list[str]:
