@@ -10,6 +10,7 @@ place has changed.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import small_gicp
@@ -29,8 +30,10 @@ _JUDGED_DISTANCE = 1.0
 _NUM_SAMPLES = 4000
 # Greatest number of steps of a stage.
 _MAX_ITERATIONS = 15
-# A stage ends when a step is shorter than this [m, rad].
-_STILL = (0.005, 2e-4)
+# A stage ends when a step moves less than this [m] ...
+_LEAST_MOVE = 0.005
+# ... and turns less than this [rad].
+_LEAST_TURN = 2e-4
 # Least cosine between the normals of a pair.
 _PARALLEL = 0.7
 # A stage with fewer pairs leaves the pose as it was.
@@ -145,23 +148,39 @@ def register(
             "PLANE_ICP",
             max_correspondence_distance=limit,
             max_iterations=_MAX_ITERATIONS,
-            translation_epsilon=_STILL[0],
-            rotation_epsilon=_STILL[1],
+            translation_epsilon=_LEAST_MOVE,
+            rotation_epsilon=_LEAST_TURN,
         )
         if found.num_inliers >= _FEWEST_PAIRS:
             X = found.T_target_source
     return _registration_at(source, target, X)
 
 
+class _Pairs(NamedTuple):
+    """A sample of M points of a cloud S, paired with the points of a cloud T.
+
+    Attributes:
+        sample: (M,) indices of the sampled points.
+        is_paired: (M,) bool, which of these points have a partner.
+        p_T: (M, 3) positions of the sampled points in T [m].
+        nearest: (M,) index of the point of T that is nearest to each.
+    """
+
+    sample: np.ndarray
+    is_paired: np.ndarray
+    p_T: np.ndarray
+    nearest: np.ndarray
+
+
 def _nearest_pairs(
     source: Surface, target: Surface, X_TS: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> _Pairs:
     """Pairs a sample of the points with the nearest points of the target.
 
-    Returns:
-        (M,) indices of the sampled points; (M,) bool, which of these points
-        have a partner; (M, 3) positions of the sampled points in T; (M,) index
-        of the target point that is nearest to each sampled point.
+    Args:
+        source: the cloud S.
+        target: the cloud T.
+        X_TS: (4, 4) pose of S in T.
     """
     sample = source.sample()
     p_T = poses.transform(X_TS, source.points[sample])
@@ -175,33 +194,49 @@ def _nearest_pairs(
     is_paired = (np.asarray(squares) < _JUDGED_DISTANCE**2) & (
         np.abs(cosines) > _PARALLEL
     )
-    return sample, is_paired, p_T, nearest
+    return _Pairs(sample, is_paired, p_T, nearest)
 
 
 def _registration_at(
     source: Surface, target: Surface, X_TS: np.ndarray
 ) -> Registration:
-    sample, is_paired, p_T, nearest = _nearest_pairs(source, target, X_TS)
-    n_T = target.normals[nearest[is_paired]]
-    J = np.concatenate([np.cross(p_T[is_paired], n_T), n_T], axis=1)
-    counting = len(source.points) / len(sample) / _CORRELATED
-    H = J.T @ J * (counting / _SIGMA**2)
-    reverse, is_found, _, _ = _nearest_pairs(
-        target, source, poses.inverse(X_TS)
-    )
+    """Returns the quality of the fit of two clouds at a pose (4, 4)."""
+    forth = _nearest_pairs(source, target, X_TS)
+    back = _nearest_pairs(target, source, poses.inverse(X_TS))
     return Registration(
         X_TS=X_TS,
-        fitness=float(max(is_paired.mean(), is_found.mean())),
+        fitness=float(max(forth.is_paired.mean(), back.is_paired.mean())),
         structure=max(
-            _share_of(is_paired, source.is_upright[sample]),
-            _share_of(is_found, target.is_upright[reverse]),
+            _share_of(forth.is_paired, source.is_upright[forth.sample]),
+            _share_of(back.is_paired, target.is_upright[back.sample]),
         ),
-        # Directions without constraints get uncertainties of a metre and a few
-        # degrees.
-        covariance=np.linalg.inv(H + np.eye(6)),
+        covariance=_covariance(source, target, forth),
     )
+
+
+def _covariance(source: Surface, target: Surface, pairs: _Pairs) -> np.ndarray:
+    """Returns the covariance (6, 6) of a registration; see `Registration`.
+
+    Args:
+        source: the cloud S.
+        target: the cloud T.
+        pairs: points of S, paired with those of T.
+    """
+    n_T = target.normals[pairs.nearest[pairs.is_paired]]
+    arms = pairs.p_T[pairs.is_paired]
+    J = np.concatenate([np.cross(arms, n_T), n_T], axis=1)
+    counting = len(source.points) / len(pairs.sample) / _CORRELATED
+    H = J.T @ J * (counting / _SIGMA**2)
+    # Directions without constraints get uncertainties of a metre and a radian.
+    return np.linalg.inv(H + np.eye(6))
 
 
 def _share_of(is_counted: np.ndarray, of: np.ndarray) -> float:
+    """Returns the share of the points in a mask that count; 0 without any.
+
+    Args:
+        is_counted: (N,) bool, which points count.
+        of: (N,) bool, the mask.
+    """
     total = np.count_nonzero(of)
     return np.count_nonzero(is_counted & of) / total if total else 0.0

@@ -18,19 +18,24 @@ _FEWEST_KEYFRAMES = 20
 # Very long drives have a larger distance, so that they get no more than this.
 _MOST_KEYFRAMES = 400
 # A submap contains the scans within this distance along the path on either side
-# of its keyframe, at this spacing, with points out to this range [m].
+# of its keyframe [m].
 _HALF_LENGTH = 10.0
+# Distance along the path between two of these scans [m].
 _SCAN_SPACING = 2.5
+# Greatest horizontal range of the points in a submap [m].
 _RANGE = 60.0
 # A submap has a point for each voxel of this side [m].
 _VOXEL_SIZE = 0.7
 # A submap with fewer points is not registered.
 _FEWEST_POINTS = 500
-# The ground is searched within this distance of a keyframe [m], at this number
-# of keyframes, among points whose normals are this close to the vertical.
-_GROUND_RANGE = 8.0
+# Number of keyframes at which the ground is searched.
 _GROUND_KEYFRAMES = 20
+# The ground is searched within this horizontal distance of a keyframe [m].
+_GROUND_RANGE = 8.0
+# Least z of the normals of the ground.
 _LEVEL = 0.95
+# Least distance of two keyframes that divides their interpolation [m].
+_TINY = 1e-9
 # Number of surfaces kept in memory; neighbouring surfaces are used in sequence.
 _NUM_KEPT = 48
 
@@ -99,7 +104,7 @@ class Submaps:
         frames = np.arange(len(self.X_WS))
         before = np.searchsorted(self.frames, frames, side="right") - 1
         after = np.minimum(before + 1, len(self) - 1)
-        gap = np.maximum(self.path[after] - self.path[before], 1e-9)
+        gap = np.maximum(self.path[after] - self.path[before], _TINY)
         fraction = np.clip((self.travelled - self.path[before]) / gap, 0.0, 1.0)
         return poses.interpolate(
             moves[before] @ self.X_WS, moves[after] @ self.X_WS, fraction
@@ -110,23 +115,34 @@ class Submaps:
         heights = []
         number = min(_GROUND_KEYFRAMES, len(self))
         for index in np.linspace(0, len(self) - 1, number).astype(np.int64):
-            surface = self.surface(int(index))
-            if surface is None:
-                continue
-            near = np.hypot(*surface.points[:, :2].T) < _GROUND_RANGE
-            below = surface.points[:, 2] < 0.0
-            level = np.abs(surface.normals[:, 2]) > _LEVEL
-            points = surface.points[near & below & level]
+            points = self._ground_points(int(index))
             if len(points):
                 heights.append(
                     np.median(poses.transform(self.X_WK[index], points)[:, 2])
                 )
         return float(np.median(heights)) if heights else 0.0
 
+    def _ground_points(self, index: int) -> np.ndarray:
+        """Returns the points (M, 3) of the ground around a keyframe, in K [m].
+
+        Args:
+            index: index of the keyframe K.
+        """
+        surface = self.surface(index)
+        if surface is None:
+            return np.zeros((0, 3))
+        near = np.hypot(*surface.points[:, :2].T) < _GROUND_RANGE
+        below = surface.points[:, 2] < 0.0
+        level = np.abs(surface.normals[:, 2]) > _LEVEL
+        return surface.points[near & below & level]
+
     def _make_surface(self, index: int) -> Surface | None:
         """Returns the submap around a keyframe, in the frame of its LiDAR.
 
-        Returns None if the submap has too few points.
+        The result is None if the submap has too few points.
+
+        Args:
+            index: index of the keyframe.
         """
         frame = self.frames[index]
         apart = np.abs(self.travelled[self._scans] - self.travelled[frame])
