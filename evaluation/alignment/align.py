@@ -48,18 +48,26 @@ from evaluation.drives.drive_views import MovedDrive
 
 When = Literal["auto", "always", "never"]
 
-# Number of keyframes that test a guess; a guess holds if half of them fit.
+# Number of keyframes that test a guess.
 _NUM_PROBES = 8
+# A guess holds if this share of these keyframes fit.
+_HOLDING_SHARE = 0.5
+# A guess needs this many keyframes that fit.
+_FEWEST_FITS = 2
 # Least number of loops that must agree.
 _FEWEST_LOOPS = 4
+# Least share of the loops that must agree.
+_AGREEING_SHARE = 0.5
 # Least share of the tried keyframes whose loops must agree. In a city of equal
 # blocks, 15 % of the keyframes fitted a wrong guess.
 _LEAST_YIELD = 0.25
 # Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
-# A drive has drifted if a quarter of its loops have an error greater than this
-# [m]. These are loops of the drive with itself or, under the best rigid pose,
-# with the target.
+# A drive has drifted if this quantile of its loops' errors is greater than
+# `_DRIFT`. These are loops of the drive with itself or, under the best rigid
+# pose, with the target.
+_DRIFT_QUANTILE = 0.75
+# See `_DRIFT_QUANTILE` [m].
 _DRIFT = 0.3
 # Heights are not changed if the ground is within this distance of zero [m].
 _GROUND_TOLERANCE = 0.25
@@ -220,10 +228,7 @@ def align(
     search, guess, num_candidates = _search_from_a_guess(source, target)
     search.grow()
     X_TK, model = _fit_with_retries(search)
-    loops = list(search.loops.values())
-    is_inlier = agreeing(loops, target.X_WK, X_TK)
-    _check_agreement(search, int(is_inlier.sum()))
-    distances, angles = loop_errors(loops, target.X_WK, X_TK)
+    numbers_of_loops = _numbers_of_loops(search, X_TK)
     ground = 0.0 if hold_first else target.ground_height()
     if abs(ground) < _GROUND_TOLERANCE:
         ground = 0.0
@@ -244,15 +249,10 @@ def align(
             frames=(target.drive.world_frame, source.drive.world_frame),
             guess=guess,
             candidates=num_candidates,
-            attempts=search.num_attempts,
-            loops=len(loops),
-            inliers=int(is_inlier.sum()),
-            distance_median=float(np.median(distances[is_inlier])),
-            distance_95=float(np.quantile(distances[is_inlier], 0.95)),
-            angle_median_deg=float(np.degrees(np.median(angles[is_inlier]))),
             model=model,
             straightened=(target_drift, source_drift),
             ground=ground,
+            **numbers_of_loops,
             **_motion_fields((first if swapped else second).X_WS, X_TS),
         ),
     )
@@ -270,12 +270,7 @@ def _search_from_a_guess(
     Raises:
         InputError: no guess fits.
     """
-    a, b = source.drive, target.drive
-    known = None
-    if a.world_frame == b.world_frame:
-        known = "the common frame"
-    elif a.datum is not None and a.datum == b.datum:
-        known = f"the common datum {a.datum}"
+    known = _common_coordinates(source.drive, target.drive)
     if known is not None:
         search, holds = _probe(
             source, target, _same_coordinates(source, target)
@@ -291,12 +286,21 @@ def _search_from_a_guess(
             best = search
         if holds:
             break
-    if len(best.loops) < 2:
+    if len(best.loops) < _FEWEST_FITS:
         raise InputError(
             f"{source.name}: cannot be aligned to {target.name}: no place of "
             "either drive was found in the other"
         )
     return best, "places that look alike", len(candidates.turn)
+
+
+def _common_coordinates(source: Drive, target: Drive) -> str | None:
+    """Returns what two drives name as common, in words; None if nothing."""
+    if source.world_frame == target.world_frame:
+        return "the common frame"
+    if source.datum is not None and source.datum == target.datum:
+        return f"the common datum {source.datum}"
+    return None
 
 
 def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
@@ -324,7 +328,14 @@ def _probe(
 ) -> tuple[LoopSearch, bool]:
     """Registers some keyframes from a guess, to test the guess.
 
-    Returns the search with the loops, and whether the guess holds.
+    Args:
+        source, target: the two drives.
+        X_TS: (4, 4) the guess.
+        keyframes: (M,) keyframes of the source from which the tested ones are
+            chosen; by default all that are near the target.
+
+    Returns:
+        The search with the loops, and whether the guess holds.
     """
     search = LoopSearch(source, target)
     X_TK = X_TS @ source.X_WK
@@ -333,7 +344,8 @@ def _probe(
     chosen = keyframes[even_indices(len(keyframes), _NUM_PROBES)]
     for k in chosen:
         search.attempt(int(k), X_TK[k])
-    return search, len(search.loops) >= max(2, 0.5 * len(chosen))
+    needed = max(_FEWEST_FITS, _HOLDING_SHARE * len(chosen))
+    return search, len(search.loops) >= needed
 
 
 def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
@@ -343,7 +355,7 @@ def _fit_poses(search: LoopSearch) -> tuple[np.ndarray, str]:
     X_TS = fit_anchor(loops, X_TL, source.X_WK)
     X_TK = X_TS @ source.X_WK
     distances, _ = loop_errors(loops, X_TL, X_TK)
-    if np.quantile(distances, 0.75) < _DRIFT:
+    if np.quantile(distances, _DRIFT_QUANTILE) < _DRIFT:
         return X_TK, "anchor"
     return fit_bent(loops, X_TL, source, X_TS), "pose graph"
 
@@ -358,14 +370,48 @@ def _fit_with_retries(search: LoopSearch) -> tuple[np.ndarray, str]:
     return X_TK, model
 
 
+def _numbers_of_loops(search: LoopSearch, X_TK: np.ndarray) -> dict:
+    """Returns the fields of the report on loops, from `attempts` on.
+
+    Args:
+        search: the loops.
+        X_TK: (K, 4, 4) poses of the source's keyframes that were fitted to
+            them.
+
+    Raises:
+        InputError: too few loops agree with these poses.
+    """
+    loops = list(search.loops.values())
+    is_inlier = agreeing(loops, search.target.X_WK, X_TK)
+    _check_agreement(search, int(is_inlier.sum()))
+    distances, angles = (
+        errors[is_inlier]
+        for errors in loop_errors(loops, search.target.X_WK, X_TK)
+    )
+    return {
+        "attempts": search.num_attempts,
+        "loops": len(loops),
+        "inliers": len(distances),
+        "distance_median": float(np.median(distances)),
+        "distance_95": float(np.quantile(distances, 0.95)),
+        "angle_median_deg": float(np.degrees(np.median(angles))),
+    }
+
+
 def _check_agreement(search: LoopSearch, num_agreeing: int) -> None:
     """Checks that enough of the loops agree.
+
+    Args:
+        search: the loops.
+        num_agreeing: number of loops that agree with the fitted poses.
 
     Raises:
         InputError: too few loops agree.
     """
     num_loops, num_tried = len(search.loops), len(search.tried)
-    needed = max(_FEWEST_LOOPS, 0.5 * num_loops, _LEAST_YIELD * num_tried)
+    needed = max(
+        _FEWEST_LOOPS, _AGREEING_SHARE * num_loops, _LEAST_YIELD * num_tried
+    )
     if num_agreeing < needed:
         raise InputError(
             f"{search.source.name}: cannot be aligned to {search.target.name}:"
@@ -393,14 +439,26 @@ def _lowered(
     world_frame: str,
     datum: str | None,
 ) -> Drive:
-    """Returns a drive at given poses, lowered by the height of its ground."""
+    """Returns a drive at given poses, lowered by the height of its ground.
+
+    Args:
+        drive: the drive.
+        X_WS: (N, 4, 4) its poses.
+        ground: height of the ground [m].
+        world_frame, datum: names of the frame and the datum of these poses.
+    """
     X = X_WS.copy()
     X[:, 2, 3] -= ground
     return MovedDrive(drive, X, world_frame, datum)
 
 
 def _motion_fields(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
-    """Returns the report's fields `move`, `turn_deg` and `bend`."""
+    """Returns the report's fields `move`, `turn_deg` and `bend`.
+
+    Args:
+        X_WS: (N, 4, 4) poses of the moved drive before the alignment.
+        X_TS: (N, 4, 4) its poses afterwards.
+    """
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]
     rigid = middle @ X_WS
@@ -437,7 +495,7 @@ def _without_drift(drive: Drive) -> tuple[Submaps, float]:
         if len(loops) < _FEWEST_SELF_LOOPS:
             break
         distances, _ = loop_errors(loops, submaps.X_WK, submaps.X_WK)
-        disagreement = float(np.quantile(distances, 0.75))
+        disagreement = float(np.quantile(distances, _DRIFT_QUANTILE))
         if disagreement < _DRIFT:
             break
         worst = max(worst, disagreement)

@@ -177,6 +177,7 @@ class LoopSearch:
         is_open = np.ones(len(path), dtype=bool)
 
         def add_registered(k: int) -> None:
+            """Makes a keyframe with a loop the nearest one of others."""
             distance = np.abs(path - path[k])
             closer = distance < away
             away[closer], nearest[closer] = distance[closer], k
@@ -213,7 +214,16 @@ class LoopSearch:
         return made
 
     def _moved_with(self, registered: int, k: int) -> np.ndarray:
-        """Returns X_TK (4, 4) of k, moved with a registered keyframe."""
+        """Returns the pose of a keyframe, moved with a registered keyframe.
+
+        Args:
+            registered: number of a keyframe with a loop.
+            k: number of the keyframe.
+
+        Returns:
+            (4, 4) X_TK of keyframe k, if the drive's own motion between the two
+            is right.
+        """
         loop = self.loops[registered]
         X_TJ = self.target.X_WK[loop.target] @ loop.X_LK
         X_WK = self.source.X_WK
@@ -230,19 +240,14 @@ class LoopSearch:
 def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
     """Returns the loops between keyframes of the same drive.
 
-    A loop connects a keyframe with an earlier keyframe at most 10 m away (seen
-    from above), if at least 50 m of path lie between the two keyframes. If
-    there are several such earlier keyframes, the closest one is used. At most
-    `most` pairs of keyframes, evenly spread over the drive, are registered. A
-    pair that cannot be registered makes no loop.
+    A pair of keyframes that cannot be registered makes no loop.
+
+    Args:
+        drive: the drive.
+        most: greatest number of pairs to register, evenly spread over the
+            drive.
     """
-    pairs = []
-    for k in range(len(drive)):
-        offsets = drive.X_WK[:, :2, 3] - drive.X_WK[k, :2, 3]
-        away = np.linalg.norm(offsets, axis=1)
-        away[drive.path > drive.path[k] - _DETOUR] = np.inf
-        if away.min() <= SAME_PLACE:
-            pairs.append((k, int(away.argmin())))
+    pairs = _repeated_places(drive)
     chosen = [pairs[index] for index in even_indices(len(pairs), most)]
     loops = []
     for k, place in track(
@@ -253,6 +258,26 @@ def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
         if loop is not None:
             loops.append(loop)
     return loops
+
+
+def _repeated_places(drive: Submaps) -> list[tuple[int, int]]:
+    """Returns keyframes at places that a drive has passed before.
+
+    Each keyframe is paired with an earlier keyframe at most 10 m away (seen
+    from above), if at least 50 m of path lie between the two. If there are
+    several such earlier keyframes, the closest one is used.
+
+    Returns:
+        Pairs of a keyframe and the earlier keyframe, in order of the first.
+    """
+    pairs = []
+    for k in range(len(drive)):
+        offsets = drive.X_WK[:, :2, 3] - drive.X_WK[k, :2, 3]
+        away = np.linalg.norm(offsets, axis=1)
+        away[drive.path > drive.path[k] - _DETOUR] = np.inf
+        if away.min() <= SAME_PLACE:
+            pairs.append((k, int(away.argmin())))
+    return pairs
 
 
 def even_indices(number: int, most: int) -> np.ndarray:

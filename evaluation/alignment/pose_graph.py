@@ -103,7 +103,15 @@ def _gauss_newton_steps(
     information: list[np.ndarray],
     width: float,
 ) -> np.ndarray:
-    """Returns the steps (F, 6) of the free poses for one iteration."""
+    """Returns the steps (F, 6) of the free poses for one iteration.
+
+    Args:
+        V: (N, 4, 4) the present poses.
+        free: indices of the F free poses, which come first.
+        all_ties: the measured relative poses.
+        information: the inverse covariances (M, 6, 6) of each of these.
+        width: factor of the kernel's width.
+    """
     size = 6 * free.stop
     H, b = sparse.csc_matrix((size, size)), np.zeros(size)
     for ties, omega in zip(all_ties, information, strict=True):
@@ -129,7 +137,13 @@ def _gauss_newton_steps(
 def _block_matrix(
     blocks: np.ndarray, columns: np.ndarray, number: int
 ) -> sparse.bsr_matrix:
-    """Returns a sparse matrix with one block (6, 6) in each row of blocks."""
+    """Returns a sparse matrix with one block in each row of blocks.
+
+    Args:
+        blocks: (M, 6, 6) the blocks, from the first row of blocks on.
+        columns: (M,) column of blocks in which each block is.
+        number: number of columns of blocks.
+    """
     starts = np.arange(len(blocks) + 1)
     shape = 6 * len(blocks), 6 * number
     return sparse.bsr_matrix((blocks, columns, starts), shape)
@@ -165,10 +179,11 @@ def fit_anchor(
         for anchor in anchors
     ]
     best = int(np.argmax(agreement))
-    # The unknown is the pose of a keyframe near the loops, because the origins
-    # of the worlds may be kilometres away.
+    # The unknown is the pose of a keyframe M near the loops, because the
+    # origins of the worlds may be kilometres away.
+    X_SM = X_SK[k[best]]
+    X_MK = poses.inverse(X_SM) @ X_SK[k]
     ties = _loop_ties(loops)
-    X_MK = poses.inverse(X_SK[k[best]]) @ X_SK[k]
     ties = replace(
         ties,
         i=1 + ties.i,
@@ -176,8 +191,8 @@ def fit_anchor(
         Z=ties.Z @ poses.inverse(X_MK),
     )
     V = np.concatenate([implied[best][None], X_TL])
-    V = optimise(V, [ties], num_held=len(X_TL))
-    return V[0] @ poses.inverse(X_SK[k[best]])
+    X_TM = optimise(V, [ties], num_held=len(X_TL))[0]
+    return X_TM @ poses.inverse(X_SM)
 
 
 def fit_bent(
@@ -232,6 +247,7 @@ def agreeing(
 
 
 def _loop_ties(loops: list[Loop]) -> Ties:
+    """Returns loops as ties from keyframes of the target to the source's."""
     return Ties(
         i=np.array([loop.target for loop in loops]),
         j=np.array([loop.source for loop in loops]),
