@@ -8,6 +8,7 @@ translation.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _BASELINE = 20.0
 _MOST_TRIALS = 3000
 # Greatest number of guesses.
 _NUM_GUESSES = 5
+# Least number of votes of a guess: two pairs determine one.
+_FEWEST_VOTES = 2
 # Extent of the points of a scan along each axis [m].
 _MAX_RANGE = 100.0
 # Seed by which pairs of pairs are chosen if there are more.
@@ -62,6 +65,18 @@ class Candidates:
     turn: np.ndarray
 
 
+class _Trial(NamedTuple):
+    """A pose of S in T, as a turn about the vertical, and a move.
+
+    Attributes:
+        turn: angle of the turn [rad].
+        move: (3,) translation [m].
+    """
+
+    turn: float
+    move: np.ndarray
+
+
 @dataclass(frozen=True)
 class Guess:
     """A guess of the pose of the source's world S in the target's world T.
@@ -77,7 +92,11 @@ class Guess:
 
 
 def find_candidates(source: Submaps, target: Submaps) -> Candidates:
-    """Returns pairs of keyframes of two drives that look alike."""
+    """Returns pairs of keyframes of two drives that look alike.
+
+    Raises:
+        InputError: a scan cannot be read.
+    """
     method = ScanContext()
     places = [
         method.describe_place(cloud_at(target.drive, frame, 1, _MAX_RANGE))
@@ -127,9 +146,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     is_left = np.ones(len(candidates.turn), dtype=bool)
     guesses: list[Guess] = []
     while len(guesses) < _NUM_GUESSES and len(trials):
-        agreement = np.stack(
-            [_agree(candidates, turn, move) for turn, move in trials]
-        )
+        agreement = np.stack([_agree(candidates, one) for one in trials])
         # A query for which several pairs agree has only one vote.
         votes = np.array(
             [
@@ -138,27 +155,47 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
             ]
         )
         best = int(votes.argmax())
-        if votes[best] < 2:
+        if votes[best] < _FEWEST_VOTES:
             break
-        pairs = agreement[best] & is_left
-        for _ in range(_REFINEMENTS):
-            turn, move = _fit_turn_and_move(candidates, pairs)
-            agreeing = _agree(candidates, turn, move)
-            if not agreeing.any():
-                break
-            pairs = agreeing
-        guesses.append(Guess(yaw_pose(turn, *move), np.flatnonzero(pairs)))
+        fitted, pairs = _refine(candidates, agreement[best] & is_left)
+        X_TS = yaw_pose(fitted.turn, *fitted.move)
+        guesses.append(Guess(X_TS, np.flatnonzero(pairs)))
         is_left &= ~pairs & ~agreement[best]
         trials = [
             trial
             for trial, row in zip(trials, agreement, strict=True)
-            if (row & is_left).sum() >= 2
+            if (row & is_left).sum() >= _FEWEST_VOTES
         ]
     return guesses
 
 
-def _guesses_of_two(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
-    """Returns the turns and moves on which each two candidates agree."""
+def _refine(
+    candidates: Candidates, pairs: np.ndarray
+) -> tuple[_Trial, np.ndarray]:
+    """Fits a pose to pairs, and then to all pairs that agree with it.
+
+    Args:
+        candidates: the M pairs.
+        pairs: (M,) bool, the pairs to which the pose is fitted first.
+
+    Returns:
+        The pose; and (M,) bool, which pairs agree with it or, if none does,
+        those to which it was fitted.
+    """
+    for _ in range(_REFINEMENTS):
+        fitted = _fit_turn_and_move(candidates, pairs)
+        agreeing = _agree(candidates, fitted)
+        if not agreeing.any():
+            break
+        pairs = agreeing
+    return fitted, pairs
+
+
+def _guesses_of_two(candidates: Candidates) -> list[_Trial]:
+    """Returns the poses on which any two candidates agree.
+
+    If there are too many, a random sample of them is returned.
+    """
     p_S, p_T = candidates.p_S[:, :2], candidates.p_T[:, :2]
     one, two = np.triu_indices(len(p_S), k=1)
     from_S, from_T = p_S[two] - p_S[one], p_T[two] - p_T[one]
@@ -180,35 +217,47 @@ def _guesses_of_two(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
     for pair in chosen:
         ends = [one[pair], two[pair]]
         trials.append(
-            (turns[pair], _mean_move(candidates, np.array(ends), turns[pair]))
+            _Trial(
+                turns[pair], _mean_move(candidates, np.array(ends), turns[pair])
+            )
         )
     return trials
 
 
-def _agree(candidates: Candidates, turn: float, move: np.ndarray) -> np.ndarray:
+def _agree(candidates: Candidates, trial: _Trial) -> np.ndarray:
     """Returns which pairs agree with a guess, (M,) bool."""
-    p_T = _turned(candidates.p_S, turn) + move
+    p_T = _turned(candidates.p_S, trial.turn) + trial.move
     distances = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
     return (distances < _NEAR) & (
-        np.abs(wrapped(candidates.turn - turn)) < _TURN
+        np.abs(wrapped(candidates.turn - trial.turn)) < _TURN
     )
 
 
-def _fit_turn_and_move(
-    candidates: Candidates, pairs: np.ndarray
-) -> tuple[float, np.ndarray]:
-    """Returns turn and move by least squares (Umeyama 1991, in 2-D)."""
+def _fit_turn_and_move(candidates: Candidates, pairs: np.ndarray) -> _Trial:
+    """Returns turn and move by least squares (Umeyama 1991, in 2-D).
+
+    Args:
+        candidates: the M pairs.
+        pairs: (M,) bool, the pairs to which they are fitted.
+    """
     p_S, p_T = candidates.p_S[pairs, :2], candidates.p_T[pairs, :2]
     a, b = p_S - p_S.mean(axis=0), p_T - p_T.mean(axis=0)
     turn = float(
         np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
     )
-    return turn, _mean_move(candidates, pairs, turn)
+    return _Trial(turn, _mean_move(candidates, pairs, turn))
 
 
 def _mean_move(
     candidates: Candidates, pairs: np.ndarray, turn: float
 ) -> np.ndarray:
+    """Returns the translation (3,) that fits pairs after a turn [m].
+
+    Args:
+        candidates: the M pairs.
+        pairs: the pairs that count, as indices or as a mask (M,).
+        turn: angle of the turn [rad].
+    """
     offsets = candidates.p_T[pairs] - _turned(candidates.p_S[pairs], turn)
     move = offsets.mean(axis=0)
     # Wrong pairs may be at any height.
@@ -217,8 +266,10 @@ def _mean_move(
 
 
 def _turned(p: np.ndarray, turn: float) -> np.ndarray:
+    """Returns points (N, 3) after a turn about the vertical [rad]."""
     return p @ yaw_pose(turn)[:3, :3].T
 
 
 def _heading(X: np.ndarray) -> float:
+    """Returns the heading of a pose (4, 4) [rad]."""
     return float(np.arctan2(X[1, 0], X[0, 0]))
