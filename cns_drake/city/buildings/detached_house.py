@@ -21,6 +21,7 @@ from cns_drake.city.facades import (
     WallFrame,
     Wing,
     add_chimney,
+    around,
     balconies,
     bay_windows,
     bays,
@@ -32,6 +33,26 @@ from cns_drake.city.facades import (
 )
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
+# Greatest depth of the main wing [m].
+_MOST_DEPTH_M = 10.0
+# Pitch of a gambrel roof, from which its number of storeys follows [deg].
+_GAMBREL_PITCH_DEG = 48.0
+# Least width of a garage [m].
+_LEAST_GARAGE_M = 2.9
+# Least width of a wing [m].
+_LEAST_WING_M = 3.2
+# Greatest distance by which a wing stands out at the back [m].
+_BACK_WING_M = 3.0
+# Overlap of the walls of the garage and the house [m].
+_GARAGE_JOINT_M = 0.06
+# Height of a porch above the floor [m].
+_PORCH_M = 2.3
+# Least length of the free front for a porch along all of it [m].
+_FULL_PORCH_M = 3.5
+# Width of a chimney in front of a wall at its foot [m].
+_BREAST_M = 1.6
+# How far such a chimney reaches out of the wall [m].
+_BREAST_REACH_M = 0.42
 # Plan of a detached house -> where it has wings besides the main wing.
 _WING_ENDS = {
     "box": (),
@@ -98,78 +119,87 @@ class DetachedHouse(FamilyHouse):
         ahead = self.porch_reach + 0.3 + 1.8 * self.floor
         self.ahead = min(ahead, 0.3 * (back - y0))
         front = y0 + self.ahead
-        main_back = front + min(back - front, 10.0)
-        deep = main_back - front
+        main_back = front + min(back - front, _MOST_DEPTH_M)
         garage_width = min(self.garage_width, 0.36 * (right - left))
-        has_garage = self.garage != "none" and garage_width > 2.9
-        split = right - garage_width * has_garage
-        pitch_deg = 48.0 if self.roof == "gambrel" else self.pitch_deg
-        n = storeys_for(self.height, self.floor, deep, pitch_deg)
-        wall_top = wall_top_for(self.height, self.floor, deep, n)
-        slope = 2 * (self.height - wall_top - ROOF_M) / deep
-        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
-        area = (left, front, split, main_back)
-        boxes = [Wing.at(area, wall_top=wall_top, top=self.height, roof=roof)]
-        wide = max(3.2, self.wing_share * (split - left))
-        drop = STOREY_M * (n > 1 and self.low_wing)
-        top = min(wall_top + ROOF_M + slope * wide / 2, self.height - 0.25)
-        kind = "hip" if self.roof == "hip" else "gable"
-        shape = Roof(
-            kind, along_y=True, eaves=0.35, verge=0.3, thickness=ROOF_M
-        )
+        has_garage = self.garage != "none" and garage_width > _LEAST_GARAGE_M
+        split = right - garage_width if has_garage else right
+        main = self._main_wing((left, front, split, main_back))
+        wing_width = max(_LEAST_WING_M, self.wing_share * (split - left))
+        slope = 2 * (self.height - self._wall_top - ROOF_M) / self._deep
+        rise = slope * wing_width / 2
         middle = (front + main_back) / 2
-        for end in _WING_ENDS[self.plan]:
-            if end == "front":
-                span = (left - 0.02, front - max(0.6, self.ahead - 0.6))
-                area = (*span, left + wide, middle)
-            else:
-                a = left + 0.4 * (split - left - wide)
-                area = (a, middle, a + wide, min(back, main_back + 3.0))
-            if end == "front" or back - main_back > 1.0:
-                boxes.append(
-                    Wing.at(
-                        area,
-                        wall_top=wall_top - drop,
-                        top=top - drop,
-                        roof=shape,
-                    )
-                )
+        ends = _WING_ENDS[self.plan]
+        boxes = [main]
+        if "front" in ends:
+            wing_front = front - max(0.6, self.ahead - 0.6)
+            area = (left - 0.02, wing_front, left + wing_width, middle)
+            boxes.append(self._cross_wing(area, rise))
+        if "back" in ends and back - main_back > 1.0:
+            x = left + 0.4 * (split - left - wing_width)
+            wing_back = min(back, main_back + _BACK_WING_M)
+            area = (x, middle, x + wing_width, wing_back)
+            boxes.append(self._cross_wing(area, rise))
         if has_garage:
-            boxes.append(
-                garage_wing(
-                    self.garage,
-                    split - 0.06,
-                    right,
-                    front + 0.6,
-                    main_back - 0.4,
-                    self.height,
-                )
+            garage = garage_wing(
+                self.garage,
+                x0=split - _GARAGE_JOINT_M,
+                x1=right,
+                y0=front + 0.6,
+                y1=main_back - 0.4,
+                most=self.height,
             )
-        taken = left + wide if "front" in _WING_ENDS[self.plan] else left
-        self.free = (taken, split)
-        self.storeys = n
+            boxes.append(garage)
+        free_start = left + wing_width if "front" in ends else left
+        self.free = (free_start, split)
         if self.mirrored:
             boxes = [box.mirrored(x0 + x1) for box in boxes]
-            self.free = (x0 + x1 - split, x0 + x1 - taken)
+            self.free = (x0 + x1 - split, x0 + x1 - free_start)
         self.boxes = tuple(boxes)
         self.main = boxes[0]
         self.garage_box = boxes[-1] if has_garage else None
         self.wings = boxes[1 : -1 if has_garage else None]
 
+    def _main_wing(self, area: outlines.Area) -> Wing:
+        """Returns the main wing on its ground [m]; chooses its storeys."""
+        _, front, _, back = area
+        deep = back - front
+        is_gambrel = self.roof == "gambrel"
+        pitch_deg = _GAMBREL_PITCH_DEG if is_gambrel else self.pitch_deg
+        self.storeys = storeys_for(self.height, self.floor, deep, pitch_deg)
+        wall_top = wall_top_for(self.height, self.floor, deep, self.storeys)
+        self._deep, self._wall_top = deep, wall_top
+        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        return Wing.at(area, wall_top=wall_top, top=self.height, roof=roof)
+
+    def _cross_wing(self, area: outlines.Area, rise: float) -> Wing:
+        """Returns a wing in front of the main wing, or behind it.
+
+        `area` is the ground of the wing, and `rise` the height of its roof [m].
+        """
+        is_lower = self.storeys > 1 and self.low_wing
+        drop = STOREY_M if is_lower else 0.0
+        top = min(self._wall_top + ROOF_M + rise, self.height - 0.25)
+        kind = "hip" if self.roof == "hip" else "gable"
+        roof = Roof(kind, along_y=True, eaves=0.35, verge=0.3, thickness=ROOF_M)
+        return Wing.at(
+            area, wall_top=self._wall_top - drop, top=top - drop, roof=roof
+        )
+
 
 def _add_main(house: DetachedHouse) -> None:
+    """Adds the main wing with its door, the porch and dormers."""
     openings = window_rows(house, house.main, house.storeys)
-    a, b = (x - house.main.x0 for x in house.free)
-    door = a + 0.5 * (b - a)
+    start, end = (x - house.main.x0 for x in house.free)
+    door = start + 0.5 * (end - start)
     wing_openings.add_door(openings, 0, x=door, floor=house.floor, lights=0.3)
-    _add_porch(house, (a, b))
+    _add_porch(house, (start, end))
     add_walls_and_roof(house, house.main, openings)
     if house.roof in ("gable", "gambrel"):
         wing_roofs.add_dormers(
             house,
             house.main,
-            start=a,
-            end=b,
+            start=start,
+            end=end,
             count=house.dormers,
             roof=house.dormer,
             pitch=3.0,
@@ -177,81 +207,92 @@ def _add_main(house: DetachedHouse) -> None:
 
 
 def _add_porch(house: DetachedHouse, free: bays.Span) -> None:
-    """Adds a roof over the door; a `full` porch runs along the free front."""
+    """Adds a roof over the door; a `full` porch runs along the free front.
+
+    `free` is the start and the end of the free front along the wall [m].
+    """
     wall = house.main.wall(0)
-    a, b = free
-    door = (a + b) / 2
+    start, end = free
+    door = (start + end) / 2
+    floor = house.floor
     reach = min(house.porch_reach, house.ahead - 0.3)
-    eaves = house.floor + 2.3
+    eaves = floor + _PORCH_M
     top = eaves + (0.9 if house.porch == "gable" else 0.45)
     if house.storeys == 1:
         top = min(top, house.main.wall_top + 0.1)
-    full = house.porch == "full" and b - a > 3.5
-    x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
+    is_full = house.porch == "full" and end - start > _FULL_PORCH_M
+    x0, x1 = (start + 0.3, end - 0.3) if is_full else around(door, 1.2)
     porches.add_porch(
         house,
         wall,
         x0=x0,
         x1=x1,
         reach=reach,
-        deck=house.floor,
+        deck=floor,
         eaves=eaves,
         top=top,
         roof="shed" if house.porch == "full" else house.porch,
-        posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
+        posts=max(3, round((x1 - x0) / 2.2)) if is_full else 2,
     )
-    room = house.ahead - reach - 0.02
     porches.add_steps(
         house,
         wall,
         x0=door - 0.7,
         x1=door + 0.7,
         start=reach,
-        rise=house.floor,
-        room=room,
+        rise=floor,
+        room=house.ahead - reach - 0.02,
     )
-    if full and house.floor > 0.3:
+    if is_full and floor > 0.3:
         y = reach - 0.15
-        trim = house.colours["trim"]
         runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
-        for k, (a, b) in enumerate(runs):
-            part = f"railing_{k}"
+        for k, (run_start, run_end) in enumerate(runs):
             balconies.add_railing(
                 house,
-                part,
+                f"railing_{k}",
                 wall,
-                start=(a, y),
-                end=(b, y),
-                z=house.floor,
-                finish=trim,
+                start=(run_start, y),
+                end=(run_end, y),
+                z=floor,
+                finish=house.colours["trim"],
             )
 
 
 def _add_wing(house: DetachedHouse, wing: Wing) -> None:
+    """Adds a wing, with a bay window if it stands in front."""
     count = max(1, round((wing.wall_top - house.floor) / STOREY_M))
     openings = window_rows(house, wing, count)
     add_walls_and_roof(house, wing, openings)
     is_front = wing.y0 < house.main.y0
     if house.bay_window and is_front and wing.width > 3.0:
-        size = (wing.width / 2, 2.2, 0.4, 0.0, house.floor + 2.3)
-        bay_windows.add_bay_window(house, wing.wall(0), *size)
+        bay_windows.add_bay_window(
+            house,
+            wing.wall(0),
+            x=wing.width / 2,
+            width=2.2,
+            reach=0.4,
+            z0=0.0,
+            z1=house.floor + 2.3,
+        )
 
 
 def _add_chimney(house: DetachedHouse) -> None:
+    """Adds a chimney in front of a side wall or on the ridge, or none."""
     main = house.main
     if house.chimney == "breast":
         wall = main.wall(1 if house.mirrored else 3)
         x = wall.length / 2
-        breast = _chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
-        house.add_to("base", breast)
-        spot = (*wall.point(x, 0.18), main.top - 0.9)
-        add_chimney(
-            house, "chimney", spot, house.colours["base"], yaw=np.pi / 2
+        brick = house.colours["base"]
+        breast = _chimney_breast(
+            wall, x, _BREAST_M, _BREAST_REACH_M, top=main.top - 0.1
         )
+        house.add_to("base", breast)
+        foot = (*wall.point(x, 0.18), main.top - 0.9)
+        add_chimney(house, "chimney", foot, brick, yaw=np.pi / 2)
     elif house.chimney == "ridge":
         x = main.x0 + house.chimney_at * main.width
-        spot = (x, main.center[1], main.top - 1.2)
-        add_chimney(house, "chimney", spot, house.kind.choices["bricks"][0])
+        foot = (x, main.center[1], main.top - 1.2)
+        add_chimney(house, "chimney", foot, house.kind.choices["bricks"][0])
 
 
 def _chimney_breast(
@@ -266,10 +307,9 @@ def _chimney_breast(
         reach: how far it reaches out of the wall [m].
         top: height of its top [m].
     """
-    a, b = x - width / 2, x + width / 2
     neck = 0.62 * width / 2
     shoulder = 0.5 * top
-    low = outlines.rectangle(a, -0.05, b, reach)
+    low = outlines.rectangle(x - width / 2, -0.05, x + width / 2, reach)
     high = outlines.rectangle(x - neck, -0.05, x + neck, reach)
     breast = merge_meshes(
         solids.skirt(low, low, z0=-solids.FOUNDATION_M, z1=shoulder),

@@ -18,6 +18,15 @@ from cns_drake.city.facades import (
 _SIDE_PITCH_M = 3.8
 # Width of the free strip around the walls, for eaves and chimneys [m].
 MARGIN_M = 0.5
+# Height of the walls of a garage [m].
+_GARAGE_WALL_M = 2.65
+# Greatest depth of a garage [m].
+_GARAGE_DEPTH_M = 6.5
+# Greatest width of the door of a garage [m].
+_GARAGE_DOOR_M = 4.9
+# Edges of a wing in front and behind, and at its sides.
+_FRONT_AND_BACK = (0, 2)
+_SIDES = (1, 3)
 
 
 class FamilyHouse(Building):
@@ -47,16 +56,19 @@ def window_rows(house: FamilyHouse, wing: Wing, storeys: int) -> Openings:
         storeys: number of storeys.
     """
     openings = Openings(house, wing, house.boxes)
-    width = house.window_width
-    for edges, step in (((0, 2), house.window_pitch), ((1, 3), _SIDE_PITCH_M)):
+    pitches = (
+        (_FRONT_AND_BACK, house.window_pitch),
+        (_SIDES, _SIDE_PITCH_M),
+    )
+    for edges, pitch in pitches:
         wing_openings.add_window_storeys(
             openings,
             edges,
             floor=house.floor,
             storey=STOREY_M,
             count=storeys,
-            pitch=step,
-            width=width,
+            pitch=pitch,
+            width=house.window_width,
         )
     return openings
 
@@ -69,18 +81,19 @@ def add_walls_and_roof(
     The windows of the front get casings, and each gable gets a window.
     """
     wing_openings.add_casings(openings, (0,), house.casing)
-    bands = (
-        (foot_band(height=house.floor, reach=0.04),) if house.floor > 0 else ()
-    )
-    low = wing.wall_top + 0.4
+    bands = []
+    if house.floor > 0:
+        bands.append(foot_band(height=house.floor, reach=0.04))
+    glass = wing_openings.GLASS_M
+    sill = wing.wall_top + 0.4
     attic = wing_roofs.attic_window(
-        width=0.9, z0=low, z1=low + 1.0, depth=wing_openings.GLASS_M
+        width=0.9, z0=sill, z1=sill + 1.0, depth=glass
     )
-    openings.enclose((wing_openings.GLASS_M,), bands=bands, attic=attic)
+    openings.enclose((glass,), bands=bands, attic=attic)
 
 
 def garage_wing(
-    kind: str, x0: float, x1: float, y0: float, y1: float, most: float
+    kind: str, *, x0: float, x1: float, y0: float, y1: float, most: float
 ) -> Wing:
     """Returns a garage that is at most 6.5 m deep.
 
@@ -92,7 +105,7 @@ def garage_wing(
         y1: back, unless the garage would be too deep [m].
         most: greatest height of the roof [m].
     """
-    wall_top = 2.65
+    wall_top = _GARAGE_WALL_M
     span = x1 - x0
     rise = {
         "flat": 0.5,
@@ -100,11 +113,10 @@ def garage_wing(
         "shed": 0.2 * span,
         "hip": 0.25 * span,
     }[kind]
-    shape = Roof(kind, along_y=True, eaves=0.3, verge=0.25, thickness=ROOF_M)
+    roof = Roof(kind, along_y=True, eaves=0.3, verge=0.25, thickness=ROOF_M)
     top = min(wall_top + ROOF_M + rise, most)
-    return Wing.at(
-        (x0, y0, x1, min(y1, y0 + 6.5)), wall_top=wall_top, top=top, roof=shape
-    )
+    area = (x0, y0, x1, min(y1, y0 + _GARAGE_DEPTH_M))
+    return Wing.at(area, wall_top=wall_top, top=top, roof=roof)
 
 
 def add_garage(house: FamilyHouse, garage: Wing) -> None:
@@ -112,12 +124,8 @@ def add_garage(house: FamilyHouse, garage: Wing) -> None:
     openings = Openings(house, garage, house.boxes)
     length = garage.x1 - garage.x0
     wing_openings.add_garage_door(
-        openings, 0, x=length / 2, width=min(length - 0.7, 4.9)
+        openings, 0, x=length / 2, width=min(length - 0.7, _GARAGE_DOOR_M)
     )
-    openings.add_bays(
-        (1, 3),
-        z=1.0,
-        pitch=3.4,
-        choices=[wing_openings.sash(width=0.9, z=0.0, sill=1.1, head=2.0)],
-    )
+    window = wing_openings.sash(width=0.9, z=0.0, sill=1.1, head=2.0)
+    openings.add_bays(_SIDES, z=1.0, pitch=3.4, choices=[window])
     openings.enclose((wing_openings.GLASS_M,))

@@ -19,7 +19,30 @@ from cns_drake.city.facades import (
     tiers,
     top_band,
 )
-from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+# Greatest number of flats beside one another.
+_MOST_FLATS = 12
+# Strip between the side without a gallery and the edge of the site [m].
+_MARGIN_M = 0.1
+# How far the stair tower rises above the topmost storey [m].
+_STAIR_RISE_M = 2.2
+# Greatest number of parts of which the storeys consist.
+_MOST_GROUPS = 6
+# Overlap of the stair tower with the slab [m].
+_STAIR_JOINT_M = 0.05
+# How far the stair tower stands back from the slab's front and back [m].
+_STAIR_SETBACK_M = 0.8
+# Depth of the windows of the hall [m].
+_HALL_RECESS_M = 0.3
+# How much deeper the doors of the flats and loggias are than windows [m].
+_DOOR_RECESS_M = 0.15
+# Distance of the flats from the ends of the slab [m].
+_END_M = 0.4
+# Width of a screen on a gallery [m].
+_SCREEN_M = 1.5
+# Numbers of the edges of the slab in front and at the back.
+_FRONT, _BACK = 0, 2
 
 
 class GalleryFlats(Building):
@@ -36,7 +59,7 @@ class GalleryFlats(Building):
         self.depth = round(min(room, self.uniform(10.0, 13.0)), 2)
         self.storey = self.uniform(2.8, 3.0)
         # Width of a flat.
-        self.pitch = max(self.uniform(4.8, 6.4), site.width / 12)
+        self.pitch = max(self.uniform(4.8, 6.4), site.width / _MOST_FLATS)
         self.loggia = self.uniform(1.1, 1.5, digits=2)
         self.rail = self.uniform(0.95, 1.1, digits=2)
         self.recess = self.uniform(0.12, 0.2, digits=2)
@@ -54,27 +77,22 @@ class GalleryFlats(Building):
 
         The building's site must be a rectangle.
         """
-        x0, y0, x1, y1 = self.site.bounds
-        front = y0 + (self.gallery if self.gallery_front else 0.1)
-        back = min(
-            front + self.depth,
-            y1 - (0.1 if self.gallery_front else self.gallery),
-        )
-        a = x0 + self.stair_width * self.stair_left
-        b = x1 - self.stair_width * (not self.stair_left)
-        slab = outlines.rectangle(a, round(front, 2), b, round(back, 2))
-        open_edge = 0 if self.gallery_front else 2
-        goal = self.height - 2.2 - self.ground
-        groups, per_group, storey = tiers.storey_groups(
-            goal, storey=self.storey, most=6
+        slab = _slab_outline(self)
+        gallery_edge = _FRONT if self.gallery_front else _BACK
+        room = self.height - _STAIR_RISE_M - self.ground
+        storeys = tiers.storey_groups(
+            room, storey=self.storey, most=_MOST_GROUPS
         )
         top = _add_ground(self, slab)
-        walls = _storey_walls(self, storey, open_edge)
         top = tiers.add_storeys(
-            self, slab, walls, z0=top, groups=groups, per_group=per_group
+            self,
+            slab,
+            _storey_walls(self, storeys.storey, gallery_edge),
+            z0=top,
+            groups=storeys.groups,
+            per_group=storeys.per_group,
         )
-        stack = tiers.StoreyGroups(groups, per_group, storey)
-        _add_galleries(self, slab, open_edge, stack)
+        _add_galleries(self, slab, gallery_edge, storeys)
         crown = Facade(0.6, bands=(Band(z0=0.4, z1=0.6, depth=-0.1),))
         tiers.add_crown(
             self,
@@ -85,34 +103,69 @@ class GalleryFlats(Building):
             thickness=0.25,
             items=self.roof_items,
         )
-        left = x0 if self.stair_left else b - 0.05
-        right = left + self.stair_width + 0.05
-        low, high = slab[0, 1] + 0.8, slab[2, 1] - 0.8
-        shaft = outlines.rectangle(left, low, right, high)
-        _add_stair(self, shaft)
+        _add_stair(self, _stair_outline(self, slab))
+
+
+def _slab_outline(flats: GalleryFlats) -> np.ndarray:
+    """Returns the outline (4, 2) of the flats, beside the stair tower [m].
+
+    The gallery has room in front of the slab, or behind it.
+    """
+    x0, y0, x1, y1 = flats.site.bounds
+    room_front, room_back = _MARGIN_M, flats.gallery
+    if flats.gallery_front:
+        room_front, room_back = room_back, room_front
+    front = y0 + room_front
+    back = min(front + flats.depth, y1 - room_back)
+    if flats.stair_left:
+        x0 += flats.stair_width
+    else:
+        x1 -= flats.stair_width
+    return outlines.rectangle(x0, round(front, 2), x1, round(back, 2))
+
+
+def _stair_outline(flats: GalleryFlats, slab: np.ndarray) -> np.ndarray:
+    """Returns the outline (4, 2) of the stair tower beside a slab [m]."""
+    left = slab[1, 0] - _STAIR_JOINT_M
+    if flats.stair_left:
+        left = flats.site.bounds[0]
+    right = left + flats.stair_width + _STAIR_JOINT_M
+    front = slab[0, 1] + _STAIR_SETBACK_M
+    back = slab[2, 1] - _STAIR_SETBACK_M
+    return outlines.rectangle(left, front, right, back)
 
 
 def _add_ground(flats: GalleryFlats, slab: np.ndarray) -> float:
-    """Adds cellars, bicycle rooms and a glazed hall."""
-    h = flats.ground
+    """Adds cellars, bicycle rooms and a hall; returns their top [m]."""
+    height = flats.ground
     store = bays.gate(width=2.4, height=2.2, depth=0.2)
-    window = bays.window(width=1.6, sill=1.4, head=h - 0.5, depth=flats.recess)
-    hall = bays.window(width=3.6, sill=0.3, head=h - 0.4, depth=0.3, mullions=2)
+    window = bays.window(
+        width=1.6, sill=1.4, head=height - 0.5, depth=flats.recess
+    )
+    hall = bays.window(
+        width=3.6,
+        sill=0.3,
+        head=height - 0.4,
+        depth=_HALL_RECESS_M,
+        mullions=2,
+    )
     rows = bays.rhythm(flats.pitch, [window, store], margin=0.5)
     front = bays.with_middle(rows, hall, width=5.0)
-    layout = bays.by_edge({0: front, 2: rows}, bays.plain)
-    bands = (
-        foot_band(height=0.4, reach=0.05),
-        top_band(h, height=0.2, reach=0.1),
+    walls = Facade(
+        height,
+        bands=(
+            foot_band(height=0.4, reach=0.05),
+            top_band(height, height=0.2, reach=0.1),
+        ),
+        layout=bays.by_edge({_FRONT: front, _BACK: rows}, bays.plain),
+        glass=(flats.recess, _HALL_RECESS_M),
     )
-    return tiers.add_ground(
-        flats,
-        slab,
-        Facade(h, bands=bands, layout=layout, glass=(flats.recess, 0.3)),
-    )
+    return tiers.add_ground(flats, slab, walls)
 
 
-def _storey_walls(flats: GalleryFlats, storey: float, open_edge: int) -> Facade:
+def _storey_walls(
+    flats: GalleryFlats, storey: float, gallery_edge: int
+) -> Facade:
     """Returns the facade of a storey, from its floor to the next floor.
 
     Doors and windows of the flats are on the side of the gallery, loggias on
@@ -121,92 +174,143 @@ def _storey_walls(flats: GalleryFlats, storey: float, open_edge: int) -> Facade:
     Args:
         flats: the building.
         storey: height of the storey [m].
-        open_edge: the side of the gallery: 0 for the front, 2 for the back.
+        gallery_edge: the side of the gallery: 0 for the front, 2 for the back.
     """
     head = round(storey - 0.45, 2)
 
-    def flat(a: float, b: float) -> list[Relief]:
+    def flat(x0: float, x1: float) -> list[Relief]:
+        """Returns the door and the window of a flat."""
         door = bays.window(
-            width=1.0, sill=0.05, head=2.1, depth=flats.recess + 0.15
+            width=1.0,
+            sill=0.05,
+            head=2.1,
+            depth=flats.recess + _DOOR_RECESS_M,
         )
-        pane = bays.window(width=1.5, sill=1.0, head=head, depth=flats.recess)
-        middle = a + 0.4 * (b - a)
-        return [*door(a + 0.1, middle), *pane(middle, b - 0.1)]
+        window = bays.window(width=1.5, sill=1.0, head=head, depth=flats.recess)
+        middle = x0 + 0.4 * (x1 - x0)
+        return [*door(x0 + 0.1, middle), *window(middle, x1 - 0.1)]
 
-    behind = bays.loggia(
+    loggia = bays.loggia(
         width=flats.pitch - 0.5, depth=flats.loggia, rail=flats.rail, head=head
     )
     layouts = {
-        open_edge: bays.rhythm(flats.pitch, [flat], margin=0.4),
-        2 - open_edge: bays.rhythm(flats.pitch, [behind], margin=0.4),
+        gallery_edge: bays.rhythm(flats.pitch, [flat], margin=_END_M),
+        _BACK - gallery_edge: bays.rhythm(flats.pitch, [loggia], margin=_END_M),
     }
-    blank = bays.alone(
-        bays.window(width=1.2, sill=0.9, head=head, depth=flats.recess),
-        width=2.2,
-    )
-    glass = (flats.recess, flats.loggia + 0.15)
+    end_window = bays.window(width=1.2, sill=0.9, head=head, depth=flats.recess)
+    ends = bays.alone(end_window, width=2.2)
     return Facade(
-        storey, bands=(), layout=bays.by_edge(layouts, blank), glass=glass
+        storey,
+        layout=bays.by_edge(layouts, ends),
+        glass=(flats.recess, flats.loggia + _DOOR_RECESS_M),
     )
 
 
 def _add_galleries(
-    flats: GalleryFlats, slab: np.ndarray, edge: int, stack: tiers.StoreyGroups
+    flats: GalleryFlats,
+    slab: np.ndarray,
+    edge: int,
+    storeys: tiers.StoreyGroups,
 ) -> None:
-    """Adds a gallery to each storey, with continuous posts, and screens."""
+    """Adds a gallery to each storey, with continuous posts, and screens.
+
+    Args:
+        flats: the building.
+        slab: (4, 2) outline of the flats [m].
+        edge: number of the slab's edge with the galleries.
+        storeys: the storeys above the ground floor.
+    """
     wall = WallFrame(slab, edge)
-    end = wall.length
     reach = flats.gallery - 0.05
-    groups, per_group, storey = stack
-    storeys, step = groups * per_group, per_group * storey
-    gallery = wall.place(
-        balconies.balcony(
-            x0=0.02, x1=end - 0.02, reach=reach, z=0.0, rail=flats.rail
-        )
+    groups, per_group, storey = storeys
+    balcony = balconies.balcony(
+        x0=0.02, x1=wall.length - 0.02, reach=reach, z=0.0, rail=flats.rail
     )
+    gallery = wall.place(balcony)
     group = (gallery.moved((0.0, 0.0, k * storey)) for k in range(per_group))
     flats.stack(
         "gallery",
         merge_meshes(*group),
         z0=flats.ground,
-        step=step,
+        step=per_group * storey,
         count=groups,
     )
-    top = flats.ground + storeys * storey
-    posts = [
-        wall.box(x=(0.02, end - 0.02), y=(-0.05, reach), z=(top - 0.2, top))
-    ]
-    cells = bays.stretches(end, pitch=flats.pitch, margin=0.4)
-    for x in bays.bounds(cells):
-        post = wall.standing(
-            x=around(x, 0.15), y=(reach - 0.35, reach - 0.05), z1=top - 0.1
-        )
-        posts.append(post)
+    cells = bays.stretches(wall.length, pitch=flats.pitch, margin=_END_M)
+    top = flats.ground + storeys.num_storeys * storey
+    posts = _gallery_posts(wall, cells, reach, top)
     flats.add("posts", *posts)
-    screens = []
-    for a, b in cells:
-        for k in range(storeys):
-            if flats.chance(flats.panels):
-                z = flats.ground + k * storey
-                u = flats.uniform(a + 0.2, b - 1.8)
-                screen = wall.box(
-                    x=(round(u, 2), round(u + 1.5, 2)),
-                    y=(reach, reach + 0.06),
-                    z=(z + 0.1, z + storey - 0.15),
-                )
-                screens.append(screen)
+    screens = _screens(flats, wall, cells, reach, storeys)
     flats.add("screens", *screens, finish=flats.colours["panel"])
 
 
+def _gallery_posts(
+    wall: WallFrame, cells: list[bays.Span], reach: float, top: float
+) -> list[Mesh]:
+    """Returns the roof over the topmost gallery, and posts between the flats.
+
+    Args:
+        wall: the wall with the galleries.
+        cells: start and end of each flat along the wall [m].
+        reach: how far the galleries reach out of the wall [m].
+        top: height of the roof's top [m].
+    """
+    roof = wall.box(
+        x=(0.02, wall.length - 0.02), y=(-0.05, reach), z=(top - 0.2, top)
+    )
+    posts = [
+        wall.standing(
+            x=around(x, 0.15), y=(reach - 0.35, reach - 0.05), z1=top - 0.1
+        )
+        for x in bays.bounds(cells)
+    ]
+    return [roof, *posts]
+
+
+def _screens(
+    flats: GalleryFlats,
+    wall: WallFrame,
+    cells: list[bays.Span],
+    reach: float,
+    storeys: tiers.StoreyGroups,
+) -> list[Mesh]:
+    """Returns screens at random places on the outer edge of the galleries.
+
+    Args:
+        flats: the building.
+        wall: the wall with the galleries.
+        cells: start and end of each flat along the wall [m].
+        reach: how far the galleries reach out of the wall [m].
+        storeys: the storeys above the ground floor.
+    """
+    screens = []
+    for start, end in cells:
+        for k in range(storeys.num_storeys):
+            if flats.chance(flats.panels):
+                z = flats.ground + k * storeys.storey
+                x = flats.uniform(start + 0.2, end - 1.8)
+                screen = wall.box(
+                    x=(round(x, 2), round(x + _SCREEN_M, 2)),
+                    y=(reach, reach + 0.06),
+                    z=(z + 0.1, z + storeys.storey - 0.15),
+                )
+                screens.append(screen)
+    return screens
+
+
 def _add_stair(flats: GalleryFlats, shaft: np.ndarray) -> None:
-    slit = bays.window(width=1.4, sill=2.8, head=flats.height - 1.0, depth=0.25)
-    entry = bays.window(
-        width=1.6, sill=0.0, head=flats.height - 1.0, depth=0.25
-    )
+    """Adds the stair tower, with a strip of glass in front and behind.
+
+    `shaft` is the outline (4, 2) of the tower [m].
+    """
+    height = flats.height
+    slit = bays.window(width=1.4, sill=2.8, head=height - 1.0, depth=0.25)
+    entry = bays.window(width=1.6, sill=0.0, head=height - 1.0, depth=0.25)
     walls = tiers.shaft_walls(
-        height=flats.height, entry=entry, slit=slit, room=2.4, rim=(0.4, 0.08)
+        height=height,
+        entry=entry,
+        slit=slit,
+        room=2.4,
+        rim=top_band(height, height=0.4, reach=0.08),
     )
-    body = tiers.lidded_walls(shaft, walls, 0.0)
-    flats.add(
-        "stair", solids.foundation(shaft), body, finish=flats.colours["panel"]
-    )
+    tower = [solids.foundation(shaft), tiers.lidded_walls(shaft, walls, 0.0)]
+    flats.add("stair", *tower, finish=flats.colours["panel"])

@@ -11,6 +11,7 @@ from cns_drake.city.facades import (
     Building,
     Openings,
     Roof,
+    WallFrame,
     Wing,
     add_chimney,
     around,
@@ -21,12 +22,27 @@ from cns_drake.city.facades import (
     wing_openings,
     wing_roofs,
 )
-from cns_drake.city.geometry import MeshShape, merge_meshes
+from cns_drake.city.geometry import Mesh, MeshShape, merge_meshes
 
 # Free strip around the walls, for eaves [m].
 _MARGIN_M = 0.5
 # Height of the ground floor above the ground [m].
 _FLOOR_M = 0.3
+
+# Distance between the windows of the sides [m].
+_SIDE_PITCH_M = 4.5
+# Greatest depth of a house [m].
+_MOST_DEPTH_M = 13.0
+# Houses with lower walls have no window above the entrance [m].
+_STAIR_WALL_M = 6.0
+# Half the width of the canopy and the landing at the door [m].
+_LANDING_HALF_M = 1.4
+# How far canopy and landing reach out of the wall [m].
+_LANDING_REACH_M = 1.3
+# Least width of a veranda [m].
+_LEAST_VERANDA_M = 2.0
+# Distance of the verandas from the ends of the front [m].
+_VERANDA_END_M = 0.9
 
 
 class GardenFlats(Building):
@@ -62,29 +78,31 @@ class GardenFlats(Building):
         count = max(1, round((right - left) / self.section))
         bounds = np.linspace(left, right, count + 1)
         front = y0 + self.veranda_reach + 0.4
-        deep = min(y1 - _MARGIN_M - front - self.stagger, 13.0)
+        deep = min(y1 - _MARGIN_M - front - self.stagger, _MOST_DEPTH_M)
         storeys = storeys_for(self.height, _FLOOR_M, deep, self.pitch_deg)
         storeys = max(2, storeys)
         wall_top = wall_top_for(self.height, _FLOOR_M, deep, storeys)
         boxes = []
         for k in range(count):
-            y = front + self.stagger * (k % 2)
+            is_odd = k % 2 == 1
+            y = front + self.stagger if is_odd else front
+            # Houses overlap a little, so that no gap remains between them.
+            x = bounds[k] - 0.05 if k > 0 else bounds[k]
             top = self.height
-            cross = False
-            if k % 2 and self.crossed:
-                cross = True
+            crossed = is_odd and self.crossed
+            if crossed:
                 run = (bounds[1] - bounds[0]) / 2
                 slope = 2 * (self.height - wall_top - ROOF_M) / deep
                 top = min(wall_top + ROOF_M + slope * run, self.height - 0.1)
-            shape = Roof(
+            roof = Roof(
                 self.roof,
-                along_y=cross,
+                along_y=crossed,
                 eaves=0.4,
                 verge=0.35,
                 thickness=ROOF_M,
             )
-            area = (bounds[k] - 0.05 * (k > 0), y, bounds[k + 1], y + deep)
-            boxes.append(Wing.at(area, wall_top=wall_top, top=top, roof=shape))
+            area = (x, y, bounds[k + 1], y + deep)
+            boxes.append(Wing.at(area, wall_top=wall_top, top=top, roof=roof))
         for k, wing in enumerate(boxes):
             _add_house(self, wing, boxes, storeys, k)
 
@@ -92,10 +110,19 @@ class GardenFlats(Building):
 def _add_house(
     flats: GardenFlats, wing: Wing, boxes: list[Wing], storeys: int, number: int
 ) -> None:
+    """Adds one house of the group.
+
+    Args:
+        flats: the building.
+        wing: the house.
+        boxes: all houses.
+        storeys: number of storeys.
+        number: number of the house, from the left.
+    """
     openings = Openings(flats, wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR_M) / storeys
-    head = min(2.2, storey - 0.4)
-    for edges, pitch in (((0, 2), flats.window_pitch), ((1, 3), 4.5)):
+    pitches = (((0, 2), flats.window_pitch), ((1, 3), _SIDE_PITCH_M))
+    for edges, pitch in pitches:
         wing_openings.add_window_storeys(
             openings,
             edges,
@@ -104,47 +131,53 @@ def _add_house(
             count=storeys,
             pitch=pitch,
             width=flats.window_width,
-            head=head,
+            head=min(2.2, storey - 0.4),
         )
+    _add_entrance(flats, openings)
+    _add_verandas(flats, wing, storeys, storey, number)
+    wing_openings.add_casings(openings, (0,), flats.casing)
+    first_floor = round(_FLOOR_M + storey, 2)
+    bands = (
+        foot_band(height=_FLOOR_M, reach=0.05),
+        top_band(first_floor, height=0.2, reach=0.05),
+    )
+    glass = wing_openings.GLASS_M
+    sill = wing.wall_top + 0.4
+    attic = wing_roofs.attic_window(
+        width=0.9, z0=sill, z1=sill + 1.0, depth=glass, count=2
+    )
+    openings.enclose((glass,), bands=bands, attic=attic)
+    if not wing.roof.along_y:
+        x, y = wing.x0 + 0.3 * wing.wall(0).length, wing.center[1]
+        foot = (x, y, wing.top - 1.3)
+        brick = flats.kind.choices["bricks"][0]
+        add_chimney(flats, f"chimney_{number}", foot, brick)
+
+
+def _add_entrance(flats: GardenFlats, openings: Openings) -> None:
+    """Adds the door in the middle of the front, and a window of the stair."""
+    wing = openings.wing
     wall = wing.wall(0)
     middle = wall.length / 2
-    glass = wing_openings.GLASS_M
     openings.clear(
         0, x0=middle - 1.1, x1=middle + 1.1, z0=0.0, z1=wing.wall_top
     )
-    if wing.wall_top > 6.0:
+    if wing.wall_top > _STAIR_WALL_M:
         stair = bays.window(
             width=1.8,
             sill=_FLOOR_M + 2.6,
             head=wing.wall_top - 0.7,
-            depth=glass,
+            depth=wing_openings.GLASS_M,
         )
         openings.replace_by_bay(0, x=middle, width=2.6, bay=stair)
     wing_openings.add_door(
         openings, 0, x=middle, floor=_FLOOR_M, width=1.2, lights=0.4
     )
-    across, reach = around(middle, 1.4), (-0.05, 1.3)
+    across, reach = around(middle, _LANDING_HALF_M), (-0.05, _LANDING_REACH_M)
     canopy = wall.box(across, reach, z=(_FLOOR_M + 2.3, _FLOOR_M + 2.5))
     landing = wall.standing(across, reach, z1=_FLOOR_M, bottom=True)
     flats.add_to("trim", canopy)
     flats.add_to("base", landing)
-    _add_verandas(flats, wing, storeys, storey, number)
-    wing_openings.add_casings(openings, (0,), flats.casing)
-    z = round(_FLOOR_M + storey, 2)
-    bands = (
-        foot_band(height=_FLOOR_M, reach=0.05),
-        top_band(z, height=0.2, reach=0.05),
-    )
-    low = wing.wall_top + 0.4
-    attic = wing_roofs.attic_window(
-        width=0.9, z0=low, z1=low + 1.0, depth=glass, count=2
-    )
-    openings.enclose((glass,), bands=bands, attic=attic)
-    if not wing.roof.along_y:
-        x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
-        spot = (x, y, wing.top - 1.3)
-        brick = flats.kind.choices["bricks"][0]
-        add_chimney(flats, f"chimney_{number}", spot, brick)
 
 
 def _add_verandas(
@@ -153,38 +186,46 @@ def _add_verandas(
     """Adds verandas above one another, left and right of the entrance."""
     wall = wing.wall(0)
     width = min(flats.veranda_width, wall.length / 2 - 2.2)
-    if width < 2.0:
+    if width < _LEAST_VERANDA_M:
         return
     reach = flats.veranda_reach
     top = wing.wall_top - 0.1
-    pieces, frame = [], []
-    for x in (0.9 + width / 2, wall.length - 0.9 - width / 2):
-        a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-        pieces.append(
-            wall.place(
-                balconies.balcony(x0=a, x1=b, reach=reach, z=0.0, rail=1.0)
-            )
-        )
-        for u in (a + 0.1, b - 0.1):
-            frame.append(
-                wall.standing(
-                    x=around(u, 0.09),
-                    y=(reach - 0.2, reach - 0.02),
-                    z1=top - 0.1,
-                )
-            )
-        frame.append(
-            wall.box(
-                x=(a - 0.1, b + 0.1),
-                y=(-0.05, reach + 0.1),
-                z=(top - 0.25, top),
-            )
-        )
+    from_end = _VERANDA_END_M + width / 2
+    floors, frames = [], []
+    for x in (from_end, wall.length - _VERANDA_END_M - width / 2):
+        x0, x1 = round(x - width / 2, 2), round(x + width / 2, 2)
+        floor = balconies.balcony(x0=x0, x1=x1, reach=reach, z=0.0, rail=1.0)
+        floors.append(wall.place(floor))
+        frames += _veranda_frame(wall, x0, x1, reach, top)
     part = f"house_{number}"
     trim = flats.colours["trim"]
-    mesh = merge_meshes(*pieces)
+    mesh = merge_meshes(*floors)
     shape = MeshShape(flats.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):
         at = (0.0, 0.0, _FLOOR_M + k * storey)
         flats.place(f"{part}_verandas_{k}", shape, at, finish=trim)
-    flats.add(f"{part}_posts", *frame, finish=trim)
+    flats.add(f"{part}_posts", *frames, finish=trim)
+
+
+def _veranda_frame(
+    wall: WallFrame, x0: float, x1: float, reach: float, top: float
+) -> list[Mesh]:
+    """Returns two posts as high as the verandas, and a roof on them.
+
+    Args:
+        wall: the wall with the verandas.
+        x0: left end along the wall [m].
+        x1: right end along the wall [m].
+        reach: how far the verandas reach out of the wall [m].
+        top: height of the roof's top [m].
+    """
+    posts = [
+        wall.standing(
+            x=around(x, 0.09), y=(reach - 0.2, reach - 0.02), z1=top - 0.1
+        )
+        for x in (x0 + 0.1, x1 - 0.1)
+    ]
+    roof = wall.box(
+        x=(x0 - 0.1, x1 + 0.1), y=(-0.05, reach + 0.1), z=(top - 0.25, top)
+    )
+    return [*posts, roof]

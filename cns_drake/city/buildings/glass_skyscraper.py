@@ -1,5 +1,7 @@
 """The glass skyscraper."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cns_drake.city.facades import (
@@ -19,6 +21,38 @@ from cns_drake.city.facades import (
 # Equipment on the roof.
 _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 
+# Where each tier above the first starts, as shares of the tower's height.
+_TIER_STARTS = ((0.62,), (0.45, 0.78))
+# Greatest number of piers around the whole tower.
+_MOST_PIERS = 38
+# Share of the edges of a tier that step back.
+_STEPPING_EDGES = 0.6
+# Height of the parapet around a terrace [m].
+_TERRACE_M = 1.1
+# Greatest length of the chords of round corners [m].
+_CHORD_M = 3.5
+# Depth of the glass of the lobby [m].
+_LOBBY_RECESS_M = 0.7
+# Height of the wall above the glass of the lobby [m].
+_LOBBY_LINTEL_M = 0.8
+# Distance between the columns of the lobby [m].
+_COLUMN_PITCH_M = 7.0
+# Width of the stretch of the front for the door [m].
+_DOOR_BAY_M = 7.0
+
+
+class _Setback(NamedTuple):
+    """Where a tier above the first starts, and how far it steps back.
+
+    Attributes:
+        start: height of the tier's foot, as a share of the tower's height.
+        share: how far the edges step back, as a share of the greatest step: one
+            number for all edges, or (4,) one for each edge.
+    """
+
+    start: float
+    share: float | np.ndarray
+
 
 class GlassSkyscraper(Building):
     """The glass skyscraper: curtain walls with fins, setbacks, a crown."""
@@ -27,16 +61,9 @@ class GlassSkyscraper(Building):
         """Samples sizes and style."""
         site = self.site
         edges = len(site.outline)
-        starts = self.pick(((0.62,), (0.45, 0.78)))
-        # 0 ribbons, 1 a grid, above that fins.
-        style = self.whole(0, 4)
-        # Of each tier above the first: the height at which it starts, as a
-        # share of the tower's height; how far its edges step back, as a share
-        # of the greatest step; and a share by which the start is shifted.
-        self.setbacks = [
-            (start, self._setback_share(edges), self.uniform(-0.06, 0.06))
-            for start in starts
-        ]
+        starts = self.pick(_TIER_STARTS)
+        style = self.pick(("ribbons", "grid", "fins", "fins"))
+        self.setbacks = [self._draw_setback(start, edges) for start in starts]
         walls, glass = (self.kind.choices[part] for part in ("walls", "glass"))
         tint = self.whole(0, len(walls))
         self.walls = walls[tint]
@@ -44,29 +71,52 @@ class GlassSkyscraper(Building):
         wanted = self.pick(("plain", "chamfered", "notched", "rounded"))
         self.corners = wanted if edges == 4 else "plain"
         self.lobby_height = self.uniform(6.0, 9.0, digits=2)
-        self.grooves = tiers.Grooves(
-            storey_height=self.uniform(3.7, 4.2),
-            spandrel=self.uniform(0.6, 1.2, digits=2),
-            ledge=self.uniform(0.3, 0.6, digits=2) * (style < 2),
-            recess=self.uniform(0.2, 0.4, digits=2),
-            pitch=max(self.uniform(2.2, 3.6), site.open_length / 38),
-            pier=self.uniform(0.12, 0.3, digits=2) * (style > 0),
-            pier_reach=self.uniform(0.2, 0.55, digits=2),
-        )
+        self.grooves = self._draw_grooves(style)
         # Size of cut corners, as a share of the shorter side.
         self.corner_size = self.uniform(0.08, 0.16)
         self.crown = self.pick(("screen", "wedge", "stepped"))
         self.crown_height = self.uniform(5.0, 9.0, digits=1)
 
-    def _setback_share(self, edges: int) -> float | np.ndarray:
-        """Returns a random share for how far a tier steps back.
+    def _draw_grooves(self, style: str) -> tiers.Grooves:
+        """Returns random sizes of the windows and the piers.
 
-        With four edges, each edge has a share of its own, which is 0 for an
-        edge that does not step back. Otherwise, one share holds for all edges.
+        `style` is `ribbons` (no piers), `fins` (no ledges) or `grid` (both).
         """
+        storey_height = self.uniform(3.7, 4.2)
+        spandrel = self.uniform(0.6, 1.2, digits=2)
+        ledge = self.uniform(0.3, 0.6, digits=2)
+        recess = self.uniform(0.2, 0.4, digits=2)
+        pitch = self.uniform(2.2, 3.6)
+        pier = self.uniform(0.12, 0.3, digits=2)
+        return tiers.Grooves(
+            storey_height=storey_height,
+            spandrel=spandrel,
+            ledge=ledge if style in ("ribbons", "grid") else 0.0,
+            recess=recess,
+            pitch=max(pitch, self.site.open_length / _MOST_PIERS),
+            pier=pier if style != "ribbons" else 0.0,
+            pier_reach=self.uniform(0.2, 0.55, digits=2),
+        )
+
+    def _draw_setback(self, start: float, edges: int) -> _Setback:
+        """Returns a random setback.
+
+        On a site with four edges, each edge steps back by a share of its own;
+        some edges do not step back at all.
+
+        Args:
+            start: height of the tier's foot, as a share of the tower's height,
+                before a random shift.
+            edges: number of the site's edges.
+        """
+        share: float | np.ndarray
         if edges == 4:
-            return self.rng.uniform(0.06, 0.13, 4) * (self.rng.random(4) < 0.6)
-        return self.uniform(0.5, 1.0)
+            shares = self.rng.uniform(0.06, 0.13, edges)
+            steps_back = self.rng.random(edges) < _STEPPING_EDGES
+            share = np.where(steps_back, shares, 0.0)
+        else:
+            share = self.uniform(0.5, 1.0)
+        return _Setback(start + self.uniform(-0.06, 0.06), share)
 
     def build(self) -> None:
         """Adds all parts of the skyscraper; its site can have any outline."""
@@ -77,23 +127,32 @@ class GlassSkyscraper(Building):
         total = np.zeros(len(base))
         if len(base) != 4:
             reach = min(0.08 * reach, 0.5 * outlines.inset_limit(base))
-        for k, (start, share, jitter) in enumerate(self.setbacks):
-            goal = round((start + jitter) * self.height, 1)
-            part = f"tier_{k}"
+        for k, setback in enumerate(self.setbacks):
+            goal = round(setback.start * self.height, 1)
             top = tiers.add_grooved(
-                self, plan, self.grooves, z0=top, goal=goal, part=part, rise=1.1
+                self,
+                plan,
+                self.grooves,
+                z0=top,
+                goal=goal,
+                part=f"tier_{k}",
+                rise=_TERRACE_M,
             )
-            terrace = Facade(1.1, bands=(Band(z0=0.8, z1=1.1, depth=-0.1),))
+            rim = Band(z0=0.8, z1=_TERRACE_M, depth=-0.1)
+            terrace = Facade(_TERRACE_M, bands=(rim,))
             tiers.add_crown(
                 self, plan, terrace, z0=top, parapet=1.0, part=f"terrace_{k}"
             )
-            total = total + np.round(share * reach, 1)
+            total = total + np.round(setback.share * reach, 1)
             plan = _with_cut_corners(self, outlines.inset(base, total))
-        rise = self.crown_height if self.crown == "screen" else 0.0
-        goal = self.height - self.crown_height
-        part = "tier_top"
         top = tiers.add_grooved(
-            self, plan, self.grooves, z0=top, goal=goal, part=part, rise=rise
+            self,
+            plan,
+            self.grooves,
+            z0=top,
+            goal=self.height - self.crown_height,
+            part="tier_top",
+            rise=self.crown_height if self.crown == "screen" else 0.0,
         )
         _add_crown(self, plan, top)
 
@@ -101,6 +160,7 @@ class GlassSkyscraper(Building):
 def _with_cut_corners(
     tower: GlassSkyscraper, outline: np.ndarray
 ) -> np.ndarray:
+    """Returns an outline (N, 2) whose corners are cut in the tower's style."""
     side = outlines.shortest_side(tower.site.outline)
     size = round(tower.corner_size * side, 1)
     if tower.corners == "chamfered":
@@ -109,53 +169,60 @@ def _with_cut_corners(
         return outlines.notched(outline, 0.6 * size)
     if tower.corners == "rounded":
         corners = dict.fromkeys(range(len(outline)), size)
-        return outlines.rounded(outline, corners, step=3.5)
+        return outlines.rounded(outline, corners, step=_CHORD_M)
     return outline
 
 
 def _add_lobby(tower: GlassSkyscraper, plan: np.ndarray) -> float:
+    """Adds the ground floor: glass behind columns; returns its top [m]."""
     height, length = tower.lobby_height, WallFrame(plan, 0).length
+    glass_top = height - _LOBBY_LINTEL_M
     door = bays.entrance(width=min(5.0, length / 3), height=3.6, depth=1.6)
-    bar = bays.bar(width=0.12, z0=0.0, z1=height - 0.8, depth=0.4)
-    mullions = bays.rhythm(2 * tower.grooves.pitch, [bar], margin=1.0)
-    bands = (
-        Band(z0=0.0, z1=height - 0.8, depth=0.7),
-        Band(z0=0.0, z1=0.3, depth=0.45),
-        Band(z0=height - 0.8, z1=height - 0.5, depth=-0.25),
-    )
-    layout = bays.with_door(mullions, door, width=7.0)
+    mullion = bays.bar(width=0.12, z0=0.0, z1=glass_top, depth=0.4)
+    mullions = bays.rhythm(2 * tower.grooves.pitch, [mullion], margin=1.0)
     columns = piers.wall_piers(
         plan,
-        pitch=7.0,
+        pitch=_COLUMN_PITCH_M,
         width=0.9,
         reach=0.25,
         z0=0.0,
-        z1=height - 0.8,
-        depth=0.75,
+        z1=glass_top,
+        depth=_LOBBY_RECESS_M + 0.05,
         margin=0.55,
         entrance=min(5.8, length / 2),
     )
-    roof = canopies.front_canopy(plan, half=4.0, reach=1.5, z=4.2)
-    lobby = Facade(height, bands=bands, layout=layout, glass=(0.7,))
-    return tiers.add_ground(tower, plan, lobby, extras=[columns, roof])
+    canopy = canopies.front_canopy(plan, half=4.0, reach=1.5, z=4.2)
+    lobby = Facade(
+        height,
+        bands=(
+            Band(z0=0.0, z1=glass_top, depth=_LOBBY_RECESS_M),
+            Band(z0=0.0, z1=0.3, depth=0.45),
+            Band(z0=glass_top, z1=height - 0.5, depth=-0.25),
+        ),
+        layout=bays.with_door(mullions, door, width=_DOOR_BAY_M),
+        glass=(_LOBBY_RECESS_M,),
+    )
+    return tiers.add_ground(tower, plan, lobby, extras=[columns, canopy])
 
 
 def _add_crown(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
+    """Adds the crown: a wedge, a smaller storey on a terrace, or a screen."""
     height = round(tower.height - z0, 3)
     if tower.crown == "wedge":
-        tower.add(
-            "crown", solids.sloped_prism(plan, z0=z0, height=height, low=0.35)
-        )
+        wedge = solids.sloped_prism(plan, z0=z0, height=height, low=0.35)
+        tower.add("crown", wedge)
         return
     if tower.crown == "stepped":
         low = round(0.45 * height, 2)
-        ledge = Facade(low, bands=(top_band(low, height=0.5, reach=0.3),))
+        parapet = 1.0
+        walls = Facade(low, bands=(top_band(low, height=0.5, reach=0.3),))
         tiers.add_crown(
-            tower, plan, ledge, z0=z0, parapet=1.0, part="crown_low"
+            tower, plan, walls, z0=z0, parapet=parapet, part="crown_low"
         )
-        reach = 0.12 * outlines.shortest_side(plan)
-        plan = outlines.inset(plan, min(reach, outlines.inset_limit(plan)))
-        z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
+        inset = 0.12 * outlines.shortest_side(plan)
+        plan = outlines.inset(plan, min(inset, outlines.inset_limit(plan)))
+        z0 = round(z0 + low - parapet, 3)
+        height = round(height - low + parapet, 3)
     louvres = tuple(
         Band(z0=z, z1=z + 0.5, depth=0.2)
         for z in np.arange(0.8, height - 1.5, 1.0).tolist()

@@ -17,6 +17,7 @@ from cns_drake.city.facades import (
     around,
     bay_windows,
     boards,
+    foot_band,
     outlines,
     porches,
     roofs,
@@ -27,6 +28,27 @@ from cns_drake.city.geometry.mesh import Mesh
 
 # Party walls rise this far above a roof whose ridge follows the street [m].
 _FIREWALL_M = 0.25
+# Thickness of these party walls [m].
+_FIREWALL_WIDTH_M = 0.3
+# Height of the wall above the ceiling of the topmost storey [m].
+_WALL_ABOVE_M = 0.25
+# How far the steps of a gable rise above the ridge [m].
+_STEPS_ABOVE_M = 0.4
+# Height of a step of a gable, approximately [m].
+_GABLE_STEP_M = 0.9
+# Distance between the windows of a free side [m].
+_SIDE_PITCH_M = 4.2
+# Distance of the door from the end of the front [m].
+_DOOR_END_M = 0.95
+# Half the width of the landing in front of the door [m].
+_LANDING_HALF_M = 0.65
+# Height and depth of a step of the stoop, approximately [m].
+_RISER_M = 0.17
+_TREAD_M = 0.29
+# Strip beside the walls for the cornice of a flat roof [m].
+_CORNICE_ROOM_M = 0.3
+# Least and greatest width of a bay window [m].
+_BAY_WIDTH_M = (1.7, 2.6)
 
 
 class HouseInRow(Building):
@@ -97,9 +119,12 @@ def add_house(
     """
     wing, storeys = wing_and_storeys(house, area, blind)
     openings = Openings(house, wing)
-    step = (wing.wall_top - 0.25 - house.floor) / storeys
+    step = (wing.wall_top - _WALL_ABOVE_M - house.floor) / storeys
     sides = [k for k in (1, 3) if k not in blind]
-    for edges, pitch in (((0, 2), house.window_pitch), (sides, 4.2)):
+    for edges, pitch in (
+        ((0, 2), house.window_pitch),
+        (sides, _SIDE_PITCH_M),
+    ):
         wing_openings.add_window_storeys(
             openings,
             edges,
@@ -113,18 +138,31 @@ def add_house(
     door = _add_entrance(house, wing, openings, door_material)
     _add_bay(house, wing, openings, storeys, step, door)
     wing_openings.add_casings(openings, (0,), house.casing)
-    bands = [Band(z0=0.0, z1=round(house.floor, 2), depth=-0.05)]
-    if storeys > 1:
-        z = round(house.floor + step, 2)
-        bands.append(Band(z0=round(z - 0.15, 2), z1=z, depth=-0.05))
-    if house.roof == "flat":
-        z = round(wing.wall_top - 0.45, 2)
-        bands.append(Band(z0=z, z1=wing.wall_top, depth=-0.22))
+    first_floor = house.floor + step if storeys > 1 else None
+    bands = _bands(house, wing, first_floor)
     openings.add_walls((wing_openings.GLASS_M,), bands)
     add_roof(house, wing)
     if house.chimney:
         add_roof_chimney(house, wing, f"{part}chimney")
     return wing
+
+
+def _bands(
+    house: HouseInRow, wing: Wing, first_floor: float | None
+) -> list[Band]:
+    """Returns the plinth, the band at the first floor, and the cornice.
+
+    `first_floor` is the height of the first floor [m], or None without one.
+    Only houses with a flat roof have a cornice.
+    """
+    bands = [foot_band(height=round(house.floor, 2), reach=0.05)]
+    if first_floor is not None:
+        z = round(first_floor, 2)
+        bands.append(Band(z0=round(z - 0.15, 2), z1=z, depth=-0.05))
+    if house.roof == "flat":
+        z = round(wing.wall_top - 0.45, 2)
+        bands.append(Band(z0=z, z1=wing.wall_top, depth=-0.22))
+    return bands
 
 
 def wing_and_storeys(
@@ -138,40 +176,36 @@ def wing_and_storeys(
     the edges towards neighbours.
     """
     x0, y0, x1, y1 = area
-    across = house.roof in ("front", "stepped")
-    span = (x1 - x0) if across else (y1 - y0)
+    gable_in_front = house.roof in ("front", "stepped")
+    span = (x1 - x0) if gable_in_front else (y1 - y0)
     top = house.height
     rise = house.rise * span / 2
     if house.roof == "flat":
         rise = 0.5
     elif house.roof == "stepped":
-        top -= 0.4
-    elif not across:
+        top -= _STEPS_ABOVE_M
+    elif not gable_in_front:
         top -= _FIREWALL_M
-    room = top - house.floor - ROOF_M - 0.25
+    room = top - house.floor - ROOF_M - _WALL_ABOVE_M
     storeys = max(1, round((room - rise) / house.storey))
     if house.roof == "flat":
         wall_top = top - rise
     else:
-        wanted = house.floor + storeys * house.storey + 0.25
+        wanted = house.floor + storeys * house.storey + _WALL_ABOVE_M
+        # The slopes are neither too steep nor too flat.
         least = top - ROOF_M - 0.75 * span
-        wall_top = min(max(wanted, least), top - ROOF_M - 0.1 * span)
-    kind = "gable" if across else house.roof
-    eaves, verge = (
-        0.0 if across else 0.35,
-        0.0 if house.roof == "stepped" else 0.3,
-    )
+        most = top - ROOF_M - 0.1 * span
+        wall_top = min(max(wanted, least), most)
     roof = Roof(
-        kind,
-        along_y=across,
-        eaves=eaves,
-        verge=verge,
+        "gable" if gable_in_front else house.roof,
+        along_y=gable_in_front,
+        eaves=0.0 if gable_in_front else 0.35,
+        verge=0.0 if house.roof == "stepped" else 0.3,
         thickness=ROOF_M,
         parapet=0.45,
     )
-    return Wing.at(
-        (x0, y0, x1, y1), wall_top=wall_top, top=top, roof=roof, blind=blind
-    ), storeys
+    wing = Wing.at(area, wall_top=wall_top, top=top, roof=roof, blind=blind)
+    return wing, storeys
 
 
 def _add_entrance(
@@ -179,29 +213,26 @@ def _add_entrance(
 ) -> float:
     """Adds the door and its landing; returns the door's x on the wall [m]."""
     wall = wing.wall(0)
-    inset = min(0.95, 0.3 * wall.length)
+    inset = min(_DOOR_END_M, 0.3 * wall.length)
     x = inset if house.door_left else wall.length - inset
+    floor = house.floor
     wing_openings.add_door(
-        openings, 0, x=x, floor=house.floor, height=2.25, material=material
+        openings, 0, x=x, floor=floor, height=2.25, material=material
     )
-    count = max(1, round(house.floor / 0.17))
-    run = min(0.29 * count, max(house.stoop - 0.5, 0.3 * house.stoop))
+    count = max(1, round(floor / _RISER_M))
+    run = min(_TREAD_M * count, max(house.stoop - 0.5, 0.3 * house.stoop))
     landing = house.stoop - run
-    a, b = x - 0.65, x + 0.65
-    if house.floor > 0.05:
-        slab = wall.standing(
-            x=(a, b), y=(-0.05, landing), z1=house.floor, bottom=True
-        )
+    if floor > 0.05:
+        x0, x1 = around(x, _LANDING_HALF_M)
+        slab = wall.standing((x0, x1), (-0.05, landing), floor, bottom=True)
         house.add_to("base", slab)
         porches.add_steps(
-            house, wall, x0=a, x1=b, start=landing, rise=house.floor, room=run
+            house, wall, x0=x0, x1=x1, start=landing, rise=floor, room=run
         )
     if house.canopy:
-        z = house.floor + 2.4
-        house.add_to(
-            "trim",
-            wall.box(x=around(x, 0.8), y=(-0.05, 0.8), z=(z, z + 0.14)),
-        )
+        z = floor + 2.4
+        hood = wall.box(x=around(x, 0.8), y=(-0.05, 0.8), z=(z, z + 0.14))
+        house.add_to("trim", hood)
     return x
 
 
@@ -213,18 +244,29 @@ def _add_bay(
     step: float,
     door: float,
 ) -> None:
-    """Adds a bay window beside the door, in place of the windows there."""
+    """Adds a bay window beside the door, in place of the windows there.
+
+    Without room for a bay window, nothing is added.
+
+    Args:
+        house: the building.
+        wing: the house.
+        openings: its openings.
+        storeys: its number of storeys.
+        step: height of a storey [m].
+        door: middle of the door along the front [m].
+    """
     wall = wing.wall(0)
-    a, b = (door + 0.8, wall.length) if house.door_left else (0.0, door - 0.8)
-    width = min(b - a - 0.7, 2.6)
-    if (
-        house.bay == "none"
-        or width < 1.7
-        or (house.bay == "oriel" and storeys < 2)
-    ):
+    start, end = 0.0, door - 0.8
+    if house.door_left:
+        start, end = door + 0.8, wall.length
+    least, most = _BAY_WIDTH_M
+    width = min(end - start - 0.7, most)
+    lacks_storey = house.bay == "oriel" and storeys < 2
+    if house.bay == "none" or width < least or lacks_storey:
         return
     count = min(house.bay_storeys, storeys)
-    x = (a + b) / 2
+    x = (start + end) / 2
     low = 0.0
     foot = house.floor
     if house.bay == "oriel":
@@ -262,9 +304,12 @@ def add_roof(house: HouseInRow, wing: Wing) -> None:
         _add_gable_windows(house, wing)
     elif house.roof in ("gable", "gambrel"):
         line = [(u, z + _FIREWALL_M) for u, z in wing.roof_line]
-        for x in (wing.x0, wing.x1 - 0.3):
+        for x in (wing.x0, wing.x1 - _FIREWALL_WIDTH_M):
             firewall = roofs.shell(
-                line, start=x, end=x + 0.3, thickness=_FIREWALL_M + 0.1
+                line,
+                start=x,
+                end=x + _FIREWALL_WIDTH_M,
+                thickness=_FIREWALL_M + 0.1,
             )
             house.add_to("walls", firewall)
         wing_roofs.add_dormers(
@@ -280,8 +325,8 @@ def add_roof(house: HouseInRow, wing: Wing) -> None:
 def _stepped_gable(wing: Wing, wall: WallFrame) -> list[Mesh]:
     """Returns the steps that rise to the middle of a gable."""
     middle = wing.width / 2
-    rise = wing.top + 0.4 - wing.wall_top
-    count = max(3, round(rise / 0.9))
+    rise = wing.top + _STEPS_ABOVE_M - wing.wall_top
+    count = max(3, round(rise / _GABLE_STEP_M))
     pieces = []
     for k in range(count):
         # Each step is wide enough to hide the slope behind it.
@@ -299,14 +344,15 @@ def _stepped_gable(wing: Wing, wall: WallFrame) -> list[Mesh]:
 
 def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     """Adds windows to a stepped gable, with frames in front of the wall."""
-    x, z = wing.width / 2, wing.wall_top + 0.4
-    spots = [x - 1.1, x + 1.1] if wing.top - wing.wall_top > 3.2 else [x]
+    middle, z = wing.width / 2, wing.wall_top + 0.4
+    is_high = wing.top - wing.wall_top > 3.2
+    spots = around(middle, 1.1) if is_high else (middle,)
     for edge in (0, 2):
         wall = wing.wall(edge)
-        for u in spots:
+        for x in spots:
             pane = Patch(
-                x0=u - 0.45,
-                x1=u + 0.45,
+                x0=x - 0.45,
+                x1=x + 0.45,
                 z0=z,
                 z1=z + 1.2,
                 depth=wing_openings.GLASS_M,
@@ -325,15 +371,21 @@ def add_roof_chimney(house: HouseInRow, wing: Wing, name: str) -> None:
     if house.roof in ("front", "stepped"):
         x = wing.x0 + 0.3 * wing.width
         z = roofs.line_height(wing.roof_line, x)
-        spot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
-        add_chimney(house, name, spot, house.brick, yaw=yaw)
+        foot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
+        add_chimney(house, name, foot, house.brick, yaw=yaw)
         return
     x = wing.x0 + 0.45 if house.door_left else wing.x1 - 0.45
     y = wing.y0 + 0.55 * wing.depth
-    spot = (x, y, roofs.line_height(wing.roof_line, y) - 0.8)
-    row = "chimney_row"
-    scale = (0.8, 0.85, 1.0)
-    add_chimney(house, name, spot, house.brick, item=row, yaw=yaw, scale=scale)
+    foot = (x, y, roofs.line_height(wing.roof_line, y) - 0.8)
+    add_chimney(
+        house,
+        name,
+        foot,
+        house.brick,
+        item="chimney_row",
+        yaw=yaw,
+        scale=(0.8, 0.85, 1.0),
+    )
 
 
 def front_of_site(house: HouseInRow) -> tuple[float, float, frozenset[int]]:
@@ -343,6 +395,10 @@ def front_of_site(house: HouseInRow) -> tuple[float, float, frozenset[int]]:
     flat roof, so that the cornice stays on the lot.
     """
     x0, _, x1, _ = house.site.bounds
-    side = 0.3 * (house.roof == "flat")
     blind = house.site.blind_edges & {1, 3}
-    return x0 + side * (3 not in blind), x1 - side * (1 not in blind), blind
+    if house.roof == "flat":
+        if 3 not in blind:
+            x0 += _CORNICE_ROOM_M
+        if 1 not in blind:
+            x1 -= _CORNICE_ROOM_M
+    return x0, x1, blind

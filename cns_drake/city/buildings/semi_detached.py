@@ -74,8 +74,15 @@ class SemiDetached(FamilyHouse):
         garages = []
         if has_garages:
             for a, b in ((left, main.x0 + 0.06), (main.x1 - 0.06, right)):
-                area = (a, b, front + 1.5, main.y1 - 0.3)
-                garages.append(garage_wing(self.garages, *area, self.height))
+                garage = garage_wing(
+                    self.garages,
+                    x0=a,
+                    x1=b,
+                    y0=front + 1.5,
+                    y1=main.y1 - 0.3,
+                    most=self.height,
+                )
+                garages.append(garage)
         self.boxes = (main, *bays, *garages)
         openings = window_rows(self, main, n)
         _add_entrances(self, main, openings, y0)

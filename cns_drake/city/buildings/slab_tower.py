@@ -15,6 +15,7 @@ from cns_drake.city.facades import (
     outlines,
     solids,
     tiers,
+    top_band,
 )
 
 # Height of the walls above the topmost storey [m].
@@ -141,8 +142,13 @@ def _storey_walls(block: SlabTower, storey: float) -> Facade:
 def _add_stair(block: SlabTower, shaft: np.ndarray) -> None:
     """Adds a stair tower beside the slab, with a window slit of full height."""
     slit = bays.window(width=1.2, sill=1.0, head=block.height - 2.0, depth=0.3)
+    height = block.height
     walls = tiers.shaft_walls(
-        height=block.height, entry=slit, slit=slit, room=2.0, rim=(0.5, 0.15)
+        height=height,
+        entry=slit,
+        slit=slit,
+        room=2.0,
+        rim=top_band(height, height=0.5, reach=0.15),
     )
     block.add(
         "stairs",

@@ -242,7 +242,7 @@ def shaft_walls(
     entry: Bay,
     slit: Bay,
     room: float,
-    rim: tuple[float, float],
+    rim: Band,
     glass: tuple[float, ...] = (),
 ) -> Facade:
     """Returns the walls of a stair tower: one bay in front and one behind.
@@ -254,15 +254,12 @@ def shaft_walls(
         entry: the bay in front.
         slit: the bay behind.
         room: width of each bay [m].
-        rim: height of the band around the top, and how far the band protrudes
-            [m].
+        rim: the band around the top.
         glass: depths of the openings that are glazed [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
     layout = bays.by_edge(layouts, bays.plain)
-    return Facade(
-        height, (Band(height - rim[0], height, -rim[1]),), layout, glass
-    )
+    return Facade(height, (rim,), layout, glass)
 
 
 def add_crown(
