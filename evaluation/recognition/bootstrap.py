@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,20 @@ class Interval:
 
 
 UNKNOWN = Interval()
+
+
+class SampledMetrics(NamedTuple):
+    """The metrics of B bootstrap samples, in the order of tables.
+
+    Attributes:
+        auc: (B,) AUC.
+        r1: (B,) R@1.
+        auc_strict: (B,) strict AUC, see `PrCurve.strict_auc`.
+    """
+
+    auc: np.ndarray
+    r1: np.ndarray
+    auc_strict: np.ndarray
 
 
 def route_blocks(positions: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -134,8 +149,8 @@ def weights_by_drive(
 
 def resampled_metrics(
     outcomes: QueryOutcomes, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC of B samples of queries, each (B,).
+) -> SampledMetrics:
+    """Returns AUC, R@1 and strict AUC of B samples of queries.
 
     Args:
         outcomes: outcomes of Q queries, all of which count.
@@ -152,16 +167,14 @@ def resampled_metrics(
     stricts = areas_under(precision, recall_of(tp, with_match[:, None] - tp))
     with np.errstate(invalid="ignore"):
         recalls = (weights * outcomes.is_right).sum(axis=1) / with_match
-    return areas, recalls, stricts
+    return SampledMetrics(areas, recalls, stricts)
 
 
 @lru_cache(maxsize=1024)
-def own_samples(
-    outcomes: QueryOutcomes, seed: int = 0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns AUC, R@1 and strict AUC of B bootstrap samples, each (B,).
+def own_samples(outcomes: QueryOutcomes, seed: int = 0) -> SampledMetrics:
+    """Returns AUC, R@1 and strict AUC of B bootstrap samples.
 
-    Strict AUC is defined at `PrCurve.strict_auc`. The samples consist of whole
+    The samples consist of whole
     blocks of the queries' route, see `resampled_weights`. The samples are
     cached, so several comparisons use the same samples.
 
@@ -175,7 +188,7 @@ def own_samples(
 
 def paired_samples(
     outcomes: QueryOutcomes, other: QueryOutcomes
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> SampledMetrics:
     """Returns metrics of bootstrap samples, paired with samples of `other`.
 
     Sample k contains the same blocks of queries as sample k of
@@ -185,9 +198,6 @@ def paired_samples(
     Args:
         outcomes: outcomes of Q queries.
         other: outcomes of as many queries with another method or condition.
-
-    Returns:
-        AUC, R@1 and strict AUC of the B samples of `outcomes`, each (B,).
     """
     if np.array_equal(outcomes.own_blocks, other.own_blocks):
         return own_samples(outcomes)
@@ -221,8 +231,8 @@ def bootstrap_intervals(
     """
     if len(outcomes) == 0:
         return UNKNOWN, UNKNOWN
-    areas, recalls, _ = own_samples(outcomes, seed)
-    return percentile_interval(areas), percentile_interval(recalls)
+    samples = own_samples(outcomes, seed)
+    return percentile_interval(samples.auc), percentile_interval(samples.r1)
 
 
 def _filled_from_right(values: np.ndarray) -> np.ndarray:

@@ -86,7 +86,7 @@ def compared_by_auc(
         drives, sets, drawn, strict=True
     ):
         samples = [
-            resampled_metrics(outcome, weights)[0] for outcome in outcomes
+            resampled_metrics(outcome, weights).auc for outcome in outcomes
         ]
         sums[drive] = sums.get(drive, 0.0) + np.array(samples)
         of_drive[drive] = number

@@ -21,8 +21,8 @@ from evaluation.results.table import (
 
 _BASELINES = Path(__file__).with_name("baselines")
 SHIPPED = "shipped"
-# Metric -> its index in the result of `resampled_metrics`.
-RESAMPLED_METRICS = {"auc": 0, "r1": 1}
+# Metrics of which bootstrap samples are drawn, fields of `SampledMetrics`.
+RESAMPLED_METRICS = ("auc", "r1")
 # Metrics that are computed from answers to queries.
 _FROM_ANSWERS = ("auc", "r1", "auc_strict")
 # The same for a value and its answers, for tables that were rounded by hand.

@@ -118,9 +118,7 @@ def _means_and_samples(
     )
     samples_of_asked = [
         [
-            resampled_metrics(answers.outcomes, weights)[
-                RESAMPLED_METRICS[metric]
-            ]
+            getattr(resampled_metrics(answers.outcomes, weights), metric)
             for answers in of_condition
         ]
         for of_condition, (_, weights) in zip(asked, drawn, strict=True)

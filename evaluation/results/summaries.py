@@ -190,7 +190,7 @@ def excesses(queries: QueryRows) -> list[Summary]:
             base, *samples = (
                 np.mean(
                     [
-                        paired_samples(a.outcomes, key.outcomes)[0]
+                        paired_samples(a.outcomes, key.outcomes).auc
                         for a in group
                     ],
                     axis=0,
