@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Set
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -24,9 +24,23 @@ Role = Literal["places", "queries"]
 _Waiting: TypeAlias = "tuple[int, Mapping[Role, np.ndarray]]"
 # A method, the roles in which it describes a drive, and the protocol.
 Request: TypeAlias = "tuple[Method, Set[Role], RetrievalProtocol]"
-# How a cloud is made: number of merged scans, how many of these come before its
-# frame, and fields of the points.
-_CloudKind: TypeAlias = "tuple[int, int, tuple[str, ...]]"
+
+
+class _CloudKind(NamedTuple):
+    """How a cloud is made of a drive's scans.
+
+    Attributes:
+        num_scans: number of consecutive scans that are merged.
+        num_before: how many of these come before the frame of the cloud.
+        fields: names of the fields of the points, besides x, y and z.
+    """
+
+    num_scans: int
+    num_before: int
+    fields: tuple[str, ...]
+
+
+_SINGLE_SCAN = _CloudKind(1, 0, ())
 
 
 def describe_drive(
@@ -81,7 +95,7 @@ def describe_drive(
         if visit is not None and frame in visited:
             of_query = "places" not in roles
             shown = seen.sensor(protocol) if of_query else None
-            cloud = seen.cloud(shown, (1, 0, ()), protocol.max_range)
+            cloud = seen.cloud(shown, _SINGLE_SCAN, protocol.max_range)
             visit(frame, cloud)
         for describer in describing:
             describer.add(seen)
@@ -124,20 +138,18 @@ class _FrameClouds:
         Args:
             sensor: sensor that replaces the recorded sensor in a query, rotated
                 or with an occluded sector; None for the sensor as recorded.
-            kind: number of consecutive scans to merge, how many of these come
-                before the frame, and names of the additional fields.
+            kind: how the cloud is made.
             max_range: greatest absolute x, y and z of a point [m].
         """
         key = sensor, kind, max_range
         if key not in self._clouds:
-            number, before, fields = kind
             self._clouds[key] = cloud_at(
                 self._drive,
                 self.frame,
-                number,
+                kind.num_scans,
                 max_range,
-                fields,
-                before,
+                kind.fields,
+                kind.num_before,
                 sensor,
             )
         return self._clouds[key]
@@ -151,6 +163,7 @@ class _FrameClouds:
 def _frames_of_role(
     drive: Drive, role: Role, protocol: RetrievalProtocol
 ) -> np.ndarray:
+    """Returns the frames (K,) of a drive's places or queries."""
     spacing = protocol.place_spacing
     if role == "queries":
         spacing = protocol.query_spacing
@@ -167,7 +180,7 @@ class _DriveDescriber:
         roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
-        self._cloud_kind: _CloudKind = (
+        self._cloud_kind = _CloudKind(
             protocol.scans(method),
             protocol.scans_before(method),
             tuple(method.point_fields),
@@ -220,10 +233,16 @@ class _DriveDescriber:
             self._describe_waiting()
 
     def finish(self) -> DriveDescriptors:
+        """Returns the descriptors of all frames that were added."""
         self._describe_waiting()
         return self._drive
 
     def _describe_waiting(self) -> None:
+        """Describes the waiting frames; none waits afterwards.
+
+        A frame that is a place and a query with the same cloud is described
+        once, if the method describes both alike.
+        """
         places = self._describe("places", {})
         shared = {}
         if self._method.describes_alike:
