@@ -125,34 +125,22 @@ def judge(
         found = retrieve(database, query, method)
         outcomes = judge(found.scores, found.matches)
     """
-    values = np.asarray(scores)
-    if isinstance(scores, np.ma.MaskedArray) or values.dtype.kind not in "biuf":
-        raise ValueError(
-            f"scores are {type(scores).__name__} of {values.dtype}, not plain"
-            " numbers with NaN where a place is no candidate"
-        )
+    values = _as_numbers(scores)
     if values.ndim != 2 or values.shape != np.shape(matches):
         raise ValueError(
             f"scores of shape {values.shape}, matches of {np.shape(matches)}"
         )
-    scores = np.asarray(values, dtype=np.float64)
-    num_queries, num_places = scores.shape
+    num_queries, num_places = values.shape
     first_right = np.full(num_queries, np.inf)
     best_scores = np.full(num_queries, np.nan)
     # One row at a time: a second array of all pairs of long drives could fill
     # the memory.
-    for query, (row, is_match) in enumerate(zip(scores, matches, strict=True)):
+    for query, (row, is_match) in enumerate(zip(values, matches, strict=True)):
         candidates = np.flatnonzero(~np.isnan(row))
-        if len(candidates) == 0:
-            continue
-        found = row[candidates]
-        best_scores[query] = found.max()
-        right = np.flatnonzero(is_match[candidates])
-        if len(right):
-            first = right[found[right].argmax()]
-            better = found > found[first]
-            better[:first] |= found[:first] == found[first]
-            first_right[query] = 1.0 + np.count_nonzero(better)
+        if len(candidates):
+            found = row[candidates]
+            best_scores[query] = found.max()
+            first_right[query] = _first_right_rank(found, is_match[candidates])
     return QueryOutcomes(
         best_scores=best_scores,
         is_right=first_right == 1.0,
@@ -163,5 +151,38 @@ def judge(
     )
 
 
+def _as_numbers(scores: np.ndarray) -> np.ndarray:
+    """Returns scores as float64.
+
+    Raises:
+        ValueError: they are complex, masked or not numbers.
+    """
+    values = np.asarray(scores)
+    if isinstance(scores, np.ma.MaskedArray) or values.dtype.kind not in "biuf":
+        raise ValueError(
+            f"scores are {type(scores).__name__} of {values.dtype}, not plain"
+            " numbers with NaN where a place is no candidate"
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+def _first_right_rank(scores: np.ndarray, is_match: np.ndarray) -> float:
+    """Returns the rank of a query's best true match; infinite without a match.
+
+    Args:
+        scores: (C,) scores of the candidates, in the order of the database.
+        is_match: (C,) bool, which candidates are true matches.
+    """
+    right = np.flatnonzero(is_match)
+    if len(right) == 0:
+        return math.inf
+    first = right[scores[right].argmax()]
+    better = scores > scores[first]
+    # Among places with equal scores, the first ranks higher.
+    better[:first] |= scores[:first] == scores[first]
+    return 1.0 + np.count_nonzero(better)
+
+
 def _mean_or_nan(values: np.ndarray) -> float:
+    """Returns the mean of values (N,); NaN without a value."""
     return float(values.mean()) if len(values) else math.nan
