@@ -9,8 +9,10 @@ from evaluation.methods.method import Method, check_number
 from evaluation.recognition.pose_errors import checked_pose
 from evaluation.recognition.ranking import ranked_places
 
-# These values were chosen on development worlds, see docs/notes/fitting.md.
+# Number of places with the best scores that are tested. This value and the next
+# were chosen on development worlds, see docs/notes/fitting.md.
 NUM_GATED = 30
+# Half the width of the transition of a weight, as a share of the radius.
 SOFTNESS = 0.05
 
 

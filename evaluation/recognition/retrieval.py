@@ -180,17 +180,14 @@ def compare_with_gates(
             length,
             places.drive_of,
         )
-    radii = [radius for radius in gate_radii if radius is not None]
+    # Without geometric verification, only the pose at the top-ranked place is
+    # needed, for its error.
+    is_gated = any(radius is not None for radius in gate_radii)
     tested = [
-        tested_places(scores_of_query)[: None if radii else 1]
+        tested_places(scores_of_query)[: None if is_gated else 1]
         for scores_of_query in alone
     ]
     poses = search.poses(query, tested)
-    scores = [np.empty(is_known.shape) for _ in gate_radii]
-    for row, ungated in enumerate(alone):
-        by_gate = iter(gated_by_poses(ungated, poses[row], radii))
-        for radius, kept in zip(gate_radii, scores, strict=True):
-            kept[row] = ungated if radius is None else next(by_gate)
     distances = _distances(database, query)
     matches = _near_enough(distances, overlaps, protocol) & is_known
     return [
@@ -205,8 +202,30 @@ def compare_with_gates(
             overlaps=overlaps,
             query_blocks=queries.blocks,
         )
-        for kept in scores
+        for kept in _gated_scores(alone, poses, gate_radii)
     ]
+
+
+def _gated_scores(
+    scores: np.ndarray,
+    poses: Sequence[Mapping[int, np.ndarray | None]],
+    gate_radii: Collection[float | None],
+) -> list[np.ndarray]:
+    """Returns the scores (Q, D) after geometric verification by each radius.
+
+    Args:
+        scores: (Q, D) scores; NaN for a place that is no candidate.
+        poses: for each query, place -> estimated pose X_PQ (4, 4), or None.
+        gate_radii: radii of geometric verification [m]; None in place of a
+            radius stands for scores without geometric verification.
+    """
+    radii = [radius for radius in gate_radii if radius is not None]
+    found = [np.empty(scores.shape) for _ in gate_radii]
+    for row, ungated in enumerate(scores):
+        by_gate = iter(gated_by_poses(ungated, poses[row], radii))
+        for radius, kept in zip(gate_radii, found, strict=True):
+            kept[row] = ungated if radius is None else next(by_gate)
+    return found
 
 
 def _errors_at_best(
