@@ -68,17 +68,15 @@ def write_scores(
     query_files = _scan_files(query)
     place_columns = _num_columns(place_files, columns, on_note)
     query_columns = _num_columns(query_files, columns, on_note)
-    on_note = _first_of_each_kind(on_note)
-    num_ignored = 0
+    reader = _CloudReader(method, _first_of_each_kind(on_note))
     descriptors, clouds = [], []
     for path in track(
         place_files, "describing places", len(place_files), "scans"
     ):
-        cloud, ignored = _read_cropped(path, method, place_columns, on_note)
+        cloud = reader.read(path, place_columns)
         descriptors.append(method.describe_place(cloud))
         if method.rerank_best:
             clouds.append(cloud)
-        num_ignored += ignored
     places = method.build_database(descriptors)
     is_known = np.ones(len(place_files), dtype=bool)
     queries: list = []
@@ -89,8 +87,7 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files), "scans"):
-            cloud, ignored = _read_cropped(path, method, query_columns, on_note)
-            num_ignored += ignored
+            cloud = reader.read(path, query_columns)
             queries.append(method.describe(cloud))
             values = score_places(
                 method,
@@ -106,13 +103,22 @@ def write_scores(
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
                 writer.writerow([path.stem, place.stem, text])
-    return num_ignored
+    return reader.num_ignored
 
 
 def _num_columns(
     files: list[Path], columns: int | None, on_note: OnNote
 ) -> int | None:
-    """Returns the number of columns of `.bin` files; None if there are none."""
+    """Returns the number of columns of `.bin` files; None if there are none.
+
+    Args:
+        files: all files of a folder.
+        columns: the number, if the user gives it; otherwise it is guessed.
+        on_note: is called with a note on the guess, if any.
+
+    Raises:
+        InputError: the number cannot be guessed, or does not fit the files.
+    """
     bins = [path for path in files if path.suffix.lower() == ".bin"]
     if not bins:
         return None
@@ -138,26 +144,61 @@ def _first_of_each_kind(on_note: OnNote) -> OnNote:
     return pass_on
 
 
-def _read_cropped(
-    path: Path, method: Method, columns: int | None, on_note: OnNote
-) -> tuple[np.ndarray, int]:
-    """Returns a cropped cloud, N > 0, and its number of non-finite points."""
-    scan = read_cloud(path, columns, on_note)
-    points = point_arrays.xyz(scan)
-    num_finite = int(np.isfinite(points).all(axis=1).sum())
-    max_range = RetrievalProtocol.max_range
-    if method.point_fields:
-        cloud = cropped_with_fields(
-            scan, max_range, method.point_fields, source=str(path)
-        )
-    else:
-        cloud = cropped(scan, max_range)
-    if len(cloud) == 0:
-        raise InputError(f"{path}: no finite point within range")
-    return point_arrays.read_only(cloud), len(points) - num_finite
+class _CloudReader:
+    """Reads clouds for a method, and counts the points that are not finite.
+
+    Attributes:
+        num_ignored: number of points so far that are not finite.
+    """
+
+    def __init__(self, method: Method, on_note: OnNote):
+        """Starts without a cloud.
+
+        Args:
+            method: the method that will describe the clouds.
+            on_note: is called with notes on how files were read.
+        """
+        self.num_ignored = 0
+        self._method = method
+        self._on_note = on_note
+
+    def read(self, path: Path, columns: int | None) -> np.ndarray:
+        """Returns the cloud in a file, cropped to the protocol's range.
+
+        Args:
+            path: the file.
+            columns: number of columns if it is a `.bin` file.
+
+        Returns:
+            (N, 3) float64 points [m], N > 0; for a method with further fields,
+            a structured array (N,). The array is read-only.
+
+        Raises:
+            InputError: the cloud cannot be read, lacks a field that the method
+                needs, or has no point within range.
+        """
+        scan = read_cloud(path, columns, self._on_note)
+        is_finite = np.isfinite(point_arrays.xyz(scan)).all(axis=1)
+        self.num_ignored += int(np.count_nonzero(~is_finite))
+        max_range = RetrievalProtocol.max_range
+        if fields := self._method.point_fields:
+            cloud = cropped_with_fields(
+                scan, max_range, fields, source=str(path)
+            )
+        else:
+            cloud = cropped(scan, max_range)
+        if len(cloud) == 0:
+            raise InputError(f"{path}: no finite point within range")
+        return point_arrays.read_only(cloud)
 
 
 def _scan_files(folder: Path) -> list[Path]:
+    """Returns the files of the clouds in a folder, sorted by name.
+
+    Raises:
+        InputError: there is no folder or no cloud, or two clouds have the same
+            name.
+    """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     files = [path for path in listed(folder) if is_cloud(path)]
