@@ -178,7 +178,14 @@ def overlaps_with_best_match(
 
 
 def sample_points(points: np.ndarray) -> np.ndarray:
-    """Returns at most 8192 of N points, sampled at random."""
+    """Returns at most 8192 of N points, sampled at random.
+
+    Equal numbers of points give the same sample, so that values of points can
+    be sampled like their coordinates.
+
+    Args:
+        points: (N, ...) points, or values of points.
+    """
     if len(points) <= _NUM_POINTS:
         return points
     rng = np.random.default_rng(len(points))

@@ -27,13 +27,21 @@ class Search:
     """
 
     def __init__(self, method: Method, places: DescribedScans):
+        """Divides the database into groups; none is built yet.
+
+        Args:
+            method: method that described the places.
+            places: D described places.
+        """
         self._method = method
         self._places = places
         descriptors = places.descriptors
         self._groups = [slice(0, len(places.frames))]
         if method.divides and isinstance(descriptors, StoredDescriptors):
             self._groups = descriptors.groups
+        # Number of the group in memory, and its database.
         self._built: tuple[int, Any] | None = None
+        # Group -> CPU time to build its database [ms].
         self._build_ms: dict[int, float] = {}
         self.query_ms = np.zeros(0)
 
