@@ -21,6 +21,8 @@ from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
 
 _Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+# Nearer points are not in a picture [m].
+_NEAREST = 0.1
 Place = tuple[_Coordinate, _Coordinate, _Coordinate]
 
 
@@ -74,7 +76,7 @@ class View(BaseModel):
         """
         scale = height / 2 / np.tan(np.deg2rad(self.fov_y_deg) / 2)
         p_C = (self.pose().inverse() @ p_WQset.T).T
-        ahead = np.flatnonzero(p_C[:, 0] > 0.1)
+        ahead = np.flatnonzero(p_C[:, 0] > _NEAREST)
         slopes = p_C[ahead, 1:] / p_C[ahead, :1]
         pixels = np.array([width, height]) / 2 - scale * slopes
         inside = ((pixels > 0) & (pixels < [width, height])).all(axis=1)

@@ -27,6 +27,14 @@ _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 HAZE_LENGTH = 1200.0
 # Range of rays [m].
 _FAR = 5000.0
+# Secondary rays begin this far above their surface [m].
+_SKIN = 0.01
+# Between linear light and sRGB values.
+_GAMMA = 1.6
+# Length of the rays that find the shade between surfaces [m].
+_SHADE_REACH = 6.0
+# What is added to the normal for the direction of each of these rays.
+_TILTS = ((0.6, 0.3, 0.4), (-0.5, 0.6, 0.5), (0.1, -0.8, 0.3))
 
 
 class StageScene:
@@ -121,7 +129,7 @@ def render(
         d_C /= np.linalg.norm(d_C, axis=1, keepdims=True)
         d_W = d_C @ X_WC.rotation().matrix().T
         image += _shade(scene, rgb, X_WC.translation(), d_W, haze_length)
-    srgb = np.clip(image / samples**2, 0.0, 1.0) ** (1.0 / 1.6)
+    srgb = np.clip(image / samples**2, 0.0, 1.0) ** (1.0 / _GAMMA)
     pixels = np.round(255.0 * srgb).astype(np.uint8)
     return pixels.reshape(height, width, 3)
 
@@ -145,7 +153,7 @@ def _shade(
         return color
     normal = hits.normals_W[hit].astype(float)
     distance = hits.ranges[hit].astype(float)[:, None]
-    p_W = p_WC + distance * d_W[hit] + 0.01 * normal
+    p_W = p_WC + distance * d_W[hit] + _SKIN * normal
     facing = normal @ _SUN_W
     sun = np.broadcast_to(_SUN_W, p_W.shape)
     lit = ~np.isfinite(scene.cast_rays(p_W, sun, _FAR).ranges)
@@ -157,7 +165,7 @@ def _shade(
         np.where(lit, np.clip(facing, 0.0, None), 0.0)[:, None] * _SUN_RGB
         + sky[:, None] * _AMBIENT_RGB
     )
-    albedo = rgb[hits.geometry[hit]] ** 1.6
+    albedo = rgb[hits.geometry[hit]] ** _GAMMA
     haze = np.exp(-distance / haze_length)
     color[hit] = haze * albedo * light + (1.0 - haze) * _HORIZON_RGB
     return color
@@ -167,11 +175,10 @@ def _openness(
     scene: RayCastingScene, p_W: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:
     """Returns which share of the short rays around a normal hits nothing."""
-    reach = 6.0
     total = np.zeros(len(p_W))
-    tilts = ([0.6, 0.3, 0.4], [-0.5, 0.6, 0.5], [0.1, -0.8, 0.3])
-    for tilt in tilts:
+    for tilt in _TILTS:
         d_W = normal + np.asarray(tilt)
         d_W /= np.linalg.norm(d_W, axis=1, keepdims=True) + 1e-9
-        total += np.minimum(scene.cast_rays(p_W, d_W, reach).ranges, reach)
-    return total / (len(tilts) * reach)
+        ranges = scene.cast_rays(p_W, d_W, _SHADE_REACH).ranges
+        total += np.minimum(ranges, _SHADE_REACH)
+    return total / (len(_TILTS) * _SHADE_REACH)

@@ -13,6 +13,11 @@ from cns_drake.base.elementary import arctan2, cos, power, sin, tan
 # that they can meet in one point although corners are given in centimetres
 # [m].
 _FIT_TOLERANCE = 0.02
+# Two directions are joined by an arc if the sine of the angle between them is
+# greater, and by a cubic curve otherwise.
+_LEAST_SINE = 0.2
+# The same for the distance from the nearer end to the corner [m].
+_LEAST_TANGENT = 0.5
 
 
 @dataclass(frozen=True)
@@ -154,11 +159,11 @@ def blend(
     d_end = _direction(heading_end)
     sine = d_start[0] * d_end[1] - d_start[1] * d_end[0]
     gap = p_end - p_start
-    if abs(sine) > 0.2:
+    if abs(sine) > _LEAST_SINE:
         ahead = (gap[0] * d_end[1] - gap[1] * d_end[0]) / sine
         behind = (d_start[0] * gap[1] - d_start[1] * gap[0]) / sine
         tangent = min(ahead, behind)
-        if tangent > 0.5:
+        if tangent > _LEAST_TANGENT:
             cosine = d_start[0] * d_end[0] + d_start[1] * d_end[1]
             widest = tangent / math.tan(math.atan2(abs(sine), cosine) / 2)
             corner = p_start + ahead * d_start

@@ -23,6 +23,8 @@ from cns_drake.simulation.station import make_station
 # A point is drawn unless it lies farther than this behind the visible surface
 # [m].
 _DEPTH_TOLERANCE = 0.4
+# Nearer points are not drawn [m].
+_NEAREST = 0.1
 
 
 @dataclass(frozen=True)
@@ -127,8 +129,8 @@ def _draw_points(
         camera.width, camera.height, math.radians(camera.fov_y_deg)
     ).intrinsic_matrix()
     x, y, z = K @ (X_WC.inverse() @ p_WQset.T)
-    column, row = np.floor([x, y] / np.maximum(z, 0.1)).astype(int)
-    seen = (z > 0.1) & (column >= 0) & (row >= 0)
+    column, row = np.floor([x, y] / np.maximum(z, _NEAREST)).astype(int)
+    seen = (z > _NEAREST) & (column >= 0) & (row >= 0)
     seen &= (column < camera.width) & (row < camera.height)
     seen[seen] = z[seen] < depth[row[seen], column[seen]] + _DEPTH_TOLERANCE
     rgb = np.round(255 * height_rgb(p_WQset[seen, 2]))

@@ -107,9 +107,9 @@ def plan_traffic_of_drive(
     _check_room(wanted, _error_source(scenario), graph, walkways)
     if wanted.walkers:
         world = world or load_stage(drive, with_vehicle=False)
-        things = _sidewalk_obstacles(world)
-        walkways = kept_clear(walkways, things)
-        graph, walkways = with_unmarked_crossings(graph, walkways, things)
+        obstacles = _sidewalk_obstacles(world)
+        walkways = kept_clear(walkways, obstacles)
+        graph, walkways = with_unmarked_crossings(graph, walkways, obstacles)
     return _plan_moving_traffic(scenario, trajectory, ego, graph, walkways)
 
 
@@ -179,10 +179,10 @@ def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
     Buildings are left out, because walkways lead along them.
     """
     passed = GROUND_CLASSES | {"building"}
-    things = geometry_by_structure(
+    structures = geometry_by_structure(
         world, lambda name: world.structures[name].semantic_class not in passed
     )
-    return [thing.footprint for thing in things.values()]
+    return [structure.footprint for structure in structures.values()]
 
 
 def load_ways(folder: MapFolder) -> LaneFile:

@@ -24,6 +24,11 @@ _NO_GAP = 0.05
 BEFORE_LINE = 0.5
 # Greatest distance that drivers look ahead [m].
 SIGHT = 120.0
+# Lower desired speeds count as zero [m/s].
+_NO_SPEED = 0.01
+# Drivers brake for a slower piece ahead when this share of their comfortable
+# braking is needed.
+_BRAKES_FROM = 0.6
 # At this gap, drivers brake as in an emergency [m].
 _LEAST_GAP = 0.5
 
@@ -38,7 +43,7 @@ def free_acceleration(car: Any, v0: float) -> float:
         car: the vehicle, a record of dtype `VEHICLE`.
         v0: the vehicle's desired speed [m/s].
     """
-    if v0 < 0.01:
+    if v0 < _NO_SPEED:
         return -car.b
     return max(car.a * (1.0 - (car.v / v0) ** 4), -car.b)
 
@@ -99,7 +104,7 @@ def accelerations(traffic: Traffic) -> np.ndarray:
             v1 = min(car.top, car.factor * speed_on(streets, piece, 0.0))
             if v1 < v:
                 braking = (v**2 - v1**2) / (2.0 * max(begin, 0.5))
-                if braking > 0.6 * car.b:
+                if braking > _BRAKES_FROM * car.b:
                     wanted = min(wanted, -braking)
             if gap == np.inf:
                 gap, speed = find_ahead(traffic, piece, -begin, i)

@@ -14,6 +14,8 @@ from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 _STEP = 1.0
 # Free space around this outline [m].
 _CLEARANCE = 0.25
+# Axles of a small vehicle: x from its middle [m].
+_SMALL_AXLES = (-1.6, 1.75)
 # Two ways share the lane before them.
 SPLIT = 1
 # Two ways share the lane behind them.
@@ -49,7 +51,6 @@ def find_conflicts(
           they come from the same lane; `MERGE` for two ways that overlap only
           at their end, because they lead to the same lane; otherwise 0.
     """
-    small_axles = (-1.6, 1.75)
     num_pieces = len(graph.pieces)
     number = num_pieces + len(graph.crossings)
     begin = np.full((2, number, number), np.inf)
@@ -57,7 +58,7 @@ def find_conflicts(
     joint = np.zeros(begin.shape, np.int8)
     origin = {way: k for k in graph.lanes for way in graph.pieces[k].after}
     for k, (size, axles) in enumerate(
-        ((SMALL_SIZE, small_axles), (LARGEST.size[:2], LARGEST.axles))
+        ((SMALL_SIZE, _SMALL_AXLES), (LARGEST.size[:2], LARGEST.axles))
     ):
         swept = [
             swept_hulls(piece, size, axles) if piece.is_way else None

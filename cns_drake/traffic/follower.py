@@ -41,6 +41,8 @@ _HEADWAY = 1.3
 _PART_OF_BOUND = 0.95
 # The bounds of the speed are taken at least this far ahead [m].
 _AHEAD = 0.05
+# At the end of its path, the car has arrived once it is slower than this [m/s].
+_ARRIVED_SPEED = 0.1
 
 
 class Follower:
@@ -132,7 +134,7 @@ class Follower:
         ahead = u + max(car["v"] * STEP, _AHEAD)
         v = min(v, np.interp(ahead, self._profile.u, self._square) ** 0.5)
         u += 0.5 * (car["v"] + v) * STEP
-        if u > self._path.end - 2 * _AHEAD and v < 0.1:
+        if u > self._path.end - 2 * _AHEAD and v < _ARRIVED_SPEED:
             u = self._path.end
             v = 0.0
             self.arrived = True

@@ -60,6 +60,8 @@ _LAST_BRAKES = 4.0
 _REQUEST_DISTANCE = 10.0
 # Drivers also request it within this multiple of their braking distance.
 _REQUEST_BRAKING = 1.4
+# Added to that distance, and once more at a signal [m].
+_REQUEST_MARGIN = 5.0
 # At a signal, drivers request their way this much earlier, since nobody brakes
 # before a green signal [s].
 _REQUEST_AT_SIGNAL = 3.0
@@ -198,11 +200,13 @@ def _arrivals(traffic: Traffic, first: np.ndarray, k: int) -> np.ndarray:
         if car.guided and car.path[CURRENT + 1] < 0:
             continue
         braking = car.v**2 / (2.0 * car.b)
-        asked_from = max(_REQUEST_DISTANCE, _REQUEST_BRAKING * braking + 5.0)
+        asked_from = max(
+            _REQUEST_DISTANCE, _REQUEST_BRAKING * braking + _REQUEST_MARGIN
+        )
         left = pieces[lane].length - car.s
         phase = pieces[streets.after[pieces[lane].after_first]].phase
         if phase >= 0:
-            asked_from += _REQUEST_AT_SIGNAL * car.v + 5.0
+            asked_from += _REQUEST_AT_SIGNAL * car.v + _REQUEST_MARGIN
         if left <= asked_from:
             if 0.0 < streets.until[k, lane] < _EGO_IS_NEAR:
                 since[first[lane]] = streets.until[k, lane] - _GOES_FIRST

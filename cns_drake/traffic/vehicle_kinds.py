@@ -8,6 +8,9 @@ from pydantic import TypeAdapter
 
 from cns_drake.base.yaml_files import parse_yaml
 
+# Longer vehicles leave their lane in turns [m].
+_LARGE_FROM = 5.8
+
 
 @dataclass(frozen=True)
 class VehicleKind:
@@ -45,7 +48,7 @@ class VehicleKind:
     @property
     def is_large(self) -> bool:
         """Whether the vehicle needs more than its lane's width in a turn."""
-        return self.size[0] > 5.8
+        return self.size[0] > _LARGE_FROM
 
 
 # Gap to a standing vehicle ahead, s0 of the model [m].

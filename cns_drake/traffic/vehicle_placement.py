@@ -13,6 +13,10 @@ from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
 _SPACE = 9.0
 # At the start, a vehicle drives at this share of the allowed speed.
 _PART_OF_SPEED = 0.5
+# Greatest braking that a vehicle needs at the start [m/s^2].
+_FIRST_BRAKING = 0.75
+# Drivers' wanted speeds differ from those of their kind by up to this share.
+_FACTOR_SPREAD = 0.1
 # Number of random places that are tried for a vehicle.
 _TRIES = 200
 
@@ -76,12 +80,14 @@ def place_vehicles(
         car["top"], car["factor"] = kind.top_speed, kind.speed_factor
         car["a"], car["b"] = kind.acceleration, kind.deceleration
         car["headway"] = kind.headway
-    cars["factor"] *= rng.uniform(0.9, 1.1, len(cars))
+    cars["factor"] *= rng.uniform(
+        1.0 - _FACTOR_SPREAD, 1.0 + _FACTOR_SPREAD, len(cars)
+    )
     lanes = streets.pieces[paths]
     points = lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
     allowed = streets.speed[points]
     v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
     # Vehicles must be able to stop before the line or behind the vehicle ahead.
     left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
-    cars["v"] = np.minimum(v, np.sqrt(1.5 * left))
+    cars["v"] = np.minimum(v, np.sqrt(2.0 * _FIRST_BRAKING * left))
     return cars, found

@@ -28,6 +28,13 @@ from cns_drake.traffic.social_force import (
 _MEAN_SPEED = 1.34
 # Standard deviation of the wanted speed [m/s].
 _SPEED_SPREAD = 0.26
+# Least and greatest wanted speed [m/s].
+_SPEED_LIMITS = (0.6, 2.2)
+# Pedestrians keep to the right of the middle of their walkway by a distance
+# from the first to the second of these shares of half its width.
+_ASIDE = (0.1, 0.7)
+# Least distance between the first places of pedestrians [m].
+_APART_AT_FIRST = 1.4 * APART
 # A pedestrian that was blocked for this time turns back [s].
 _PATIENCE = 4.0
 # A waiting pedestrian turns back within this distance of one that does so [m].
@@ -349,7 +356,9 @@ def _place_walkers(
         aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
         aside = (aside if forward else -aside) / np.hypot(x, y)
         xy = line[at, :2] + aside * np.array([y, -x])
-        is_free = all(np.hypot(*(xy - row[2])) > 1.4 * APART for row in rows)
+        is_free = all(
+            np.hypot(*(xy - row[2])) > _APART_AT_FIRST for row in rows
+        )
         if is_free:
             yaw = math.atan2(y, x)
             rows.append((2 * way + 1 - forward, at, xy, yaw, group))
@@ -372,10 +381,10 @@ def _place_walkers(
         walkers[name] = values
     number = len(rows)
     walkers["speed"] = np.clip(
-        rng.normal(_MEAN_SPEED, _SPEED_SPREAD, number), 0.6, 2.2
+        rng.normal(_MEAN_SPEED, _SPEED_SPREAD, number), *_SPEED_LIMITS
     )
     walkers["phase"] = rng.uniform(0.0, 2 * np.pi, number)
-    walkers["aside"] = rng.uniform(0.1, 0.7, number)
+    walkers["aside"] = rng.uniform(*_ASIDE, number)
     for name in ("speed", "aside"):
         walkers[name] = walkers[name][walkers["group"]]
     walkers["next_path"] = -1

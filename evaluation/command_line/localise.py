@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from evaluation.study.tasks.localise import LocaliseTask
     from evaluation.study.tasks.pair import Pair
 
+# Drift of the odometry by default, as a share of the distance.
+_USUAL_DRIFT = 0.01
 # Parameters that have an effect together with `--estimate`.
 _WITH_ESTIMATE = (
     "place",
@@ -135,7 +137,8 @@ def localise(
     if method is None:
         raise InputError("--method: missing")
     _check_together(context, query_spacing, odometry_drift, track=track)
-    odometry_drift = 0.01 if odometry_drift is None else odometry_drift
+    if odometry_drift is None:
+        odometry_drift = _USUAL_DRIFT
     num_jobs = choose_cluster(jobs, None).num_workers
     Starts(start, start_turn, seed)  # It checks them.
     name = Path(method).stem

@@ -47,6 +47,9 @@ _MOST_FOLDS = 3
 _TREES = 120
 # Greatest intensity after scaling, like KITTI's, which never reaches 1.
 _FULL = 99.0
+# Least and greatest number of rings of a LiDAR. Outside of it, the points are
+# not in the order of rings.
+_RINGS = (8, 160)
 
 
 def scan_table(scan: np.ndarray) -> np.ndarray:
@@ -70,7 +73,7 @@ def scan_table(scan: np.ndarray) -> np.ndarray:
     if ring is None:
         azimuth = np.arctan2(table[:, 1], table[:, 0]) % (2.0 * np.pi)
         ring = np.cumsum(np.diff(azimuth, prepend=0.0) < -np.pi).astype(float)
-        if not 8 <= ring[-1] <= 160:
+        if not _RINGS[0] <= ring[-1] <= _RINGS[1]:
             ring = np.full(len(table), np.nan)
     table = np.column_stack([table[:, :3], bright, ring])
     return table[np.isfinite(table[:, :3]).all(axis=1)]

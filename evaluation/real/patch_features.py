@@ -22,6 +22,8 @@ _FEWEST_POINTS = 150
 _NEIGHBOURHOODS = 160
 # Radius of a neighbourhood [m].
 _RADIUS = 0.75
+# Least number of points of a neighbourhood.
+_FEWEST_NEIGHBOURS = 8
 # Quantiles of values over a patch that are features.
 _QUANTILES = (0.1, 0.5, 0.9)
 
@@ -75,8 +77,9 @@ def describe(patch: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
     count = min(len(p), _NEIGHBOURHOODS)
     chosen = rng.choice(len(p), count, replace=False)
     groups = tree.query_ball_point(p[chosen], _RADIUS)
-    chosen = chosen[[len(g) >= 8 for g in groups]]
-    shapes = [_shape(p[g], ring[g]) for g in groups if len(g) >= 8]
+    has_shape = [len(g) >= _FEWEST_NEIGHBOURS for g in groups]
+    chosen, groups = chosen[has_shape], groups[has_shape]
+    shapes = [_shape(p[g], ring[g]) for g in groups]
     if not shapes:
         return result
     table = np.array(shapes)

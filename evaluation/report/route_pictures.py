@@ -17,6 +17,8 @@ from evaluation.results.page_frame import environment
 _NUM_PIECES = 48
 # Size of the marks of start and end, as a part of the picture.
 _MARK = 0.016
+# Distance of the scale bar from the edges, as a part of the picture.
+_INSET = 0.03
 # Length of the scale bar [m].
 BAR_LENGTH = 50.0
 
@@ -35,7 +37,7 @@ def route_picture(drive: PageDrive) -> Markup:
     data = base64.b64encode(drive.view).decode("ascii")
     route = drive.route * [1.0, -1.0]
     (x0, y0), (x1, y1) = route[0], route[-1]
-    end, base = right - 0.03 * width, -bottom - 0.03 * height
+    end, base = right - _INSET * width, -bottom - _INSET * height
     mark = [[x0, y0 - size], [x0 - size, y0 + size], [x0 + size, y0 + size]]
     # Pieces are joined at their ends.
     last = len(route) - 1

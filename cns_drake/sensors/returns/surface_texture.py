@@ -22,6 +22,8 @@ _AREA_CONTRAST = 0.15
 _DARKEST_STAIN = 1.15
 # Height of a wall's courses [m].
 _COURSE_HEIGHT = 0.3
+# How far a wall's courses protrude, as a share of the objects on the wall.
+_COURSE_SHARE = 0.04
 # Width of objects that hang on a wall [m].
 _FITTING_WIDTH = 0.25
 # Height of objects that hang on a wall [m].
@@ -110,13 +112,12 @@ def with_texture(
             distance[k] -= max(min(height / down, _MOST_SHIFT), -_MOST_SHIFT)
         out = fittings[geometry[k]]
         if out > 0.0:
-            distance[k] -= (
-                0.04 * out * cell_number(0.0, 0.0, z / _COURSE_HEIGHT)
-            )
-            thing = cell_number(
+            course = cell_number(0.0, 0.0, z / _COURSE_HEIGHT)
+            distance[k] -= _COURSE_SHARE * out * course
+            fitting = cell_number(
                 a / _FITTING_WIDTH, b / _FITTING_WIDTH, z / _FITTING_HEIGHT
             )
-            if thing > 1.0 - 2.0 * _FITTING_SHARE:
+            if fitting > 1.0 - 2.0 * _FITTING_SHARE:
                 distance[k] -= out * (0.5 + 0.5 * patch)
     return Light(light.beam, distance, energy, light.geometry)
 
