@@ -27,6 +27,10 @@ _MOST_JUNCTIONS = 4
 # Roads with more lanes have signals at their junctions, as in the city
 # generator.
 _LANES_WITHOUT_SIGNAL = 2
+# Least number of arms of a junction with crossings, and with signals.
+_FEWEST_ARMS = 3
+# Points nearer than this to the new end of a line are left out [m].
+_AT_END = 1e-3
 
 
 def make_lane_graph(network: RoadNetwork) -> LaneGraph:
@@ -46,33 +50,24 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
         if road.length - sum(trims[road.name, end] for end in ENDS)
         >= _SHORTEST_LANE
     }
-    lanes = [ref for ref in network.lanes() if ref.road in long]
-    number = {ref: k for k, ref in enumerate(lanes)}
+    number = {
+        ref: k
+        for k, ref in enumerate(
+            one for one in network.lanes() if one.road in long
+        )
+    }
     clusters = _clusters(network, long)
     lines = {
         ref: network.roads[ref.road].lane_centreline(*ref[1:], 0.5)
         for ref in network.lanes()
     }
-    onward: dict[LaneRef, list[Connection]] = {ref: [] for ref in lines}
-    for name in network.junctions:
-        for connection in network.connections(name):
-            onward[connection.incoming].append(connection)
-    pieces: list[Piece] = []
-    for ref in lanes:
-        start, end = _trims_of(ref, trims)
-        pieces.append(
-            Piece(
-                resampled(_shortened(lines[ref], start, end)),
-                network.roads[ref.road].speed_limit,
-                False,
-                left=number.get(ref._replace(lane=ref.lane - 1), -1),
-                right=number.get(ref._replace(lane=ref.lane + 1), -1),
-                junction=clusters[network.exit_junction(ref)],
-            )
-        )
-    for ref in lanes:
+    onward = _connections_from(network)
+    pieces = [
+        _lane_piece(network, ref, lines[ref], trims, number, clusters)
+        for ref in number
+    ]
+    for ref, k in number.items():
         first = len(pieces)
-        junction = clusters[network.exit_junction(ref)]
         phase = _signal_phase(network, clusters, ref)
         for way, last in _ways(onward, ref, long):
             roads = {ref.road, *(c.outgoing.road for c in way)}
@@ -82,21 +77,62 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
                     min(network.roads[name].speed_limit for name in roads),
                     True,
                     (number[last],),
-                    junction=junction,
+                    junction=clusters[network.exit_junction(ref)],
                     phase=phase,
                 )
             )
-        pieces[number[ref]] = replace(
-            pieces[number[ref]], after=tuple(range(first, len(pieces)))
-        )
+        pieces[k] = replace(pieces[k], after=tuple(range(first, len(pieces))))
     crossings = tuple(_crossings(network, trims))
     return LaneGraph(tuple(lane_graph.without_dead_ends(pieces)), crossings)
+
+
+def _connections_from(
+    network: RoadNetwork,
+) -> dict[LaneRef, list[Connection]]:
+    """Returns lane -> connections that begin at its exit."""
+    onward: dict[LaneRef, list[Connection]] = {
+        ref: [] for ref in network.lanes()
+    }
+    for name in network.junctions:
+        for connection in network.connections(name):
+            onward[connection.incoming].append(connection)
+    return onward
+
+
+def _lane_piece(
+    network: RoadNetwork,
+    ref: LaneRef,
+    line: np.ndarray,
+    trims: dict[tuple[str, End], float],
+    number: Mapping[LaneRef, int],
+    clusters: dict[str, int],
+) -> Piece:
+    """Returns a lane as a piece that no way follows yet.
+
+    Args:
+        network: the road network.
+        ref: the lane.
+        line: (N, 3) its centreline [m].
+        trims: distance of each stop line from the end of its road [m].
+        number: lane -> number of its piece, for all lanes that are pieces.
+        clusters: see `_clusters`.
+    """
+    return Piece(
+        resampled(_shortened(line, *_trims_of(ref, trims))),
+        network.roads[ref.road].speed_limit,
+        False,
+        left=number.get(ref._replace(lane=ref.lane - 1), -1),
+        right=number.get(ref._replace(lane=ref.lane + 1), -1),
+        junction=clusters[network.exit_junction(ref)],
+    )
 
 
 def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
     """Returns the distance of the stop line from the end of a road [m]."""
     junction = network.junctions[road.start if end == "start" else road.end]
-    crosses = len(junction.arms) >= 3 and road.length >= 2 * _STOP_LINE
+    crosses = (
+        len(junction.arms) >= _FEWEST_ARMS and road.length >= 2 * _STOP_LINE
+    )
     return _STOP_LINE if crosses else _STOP_LINE_ALONE
 
 
@@ -109,16 +145,26 @@ def _trims_of(
 
 
 def _shortened(line: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Returns a line (N, 3) shortened at both ends [m]."""
+    """Returns a line shortened at both ends.
+
+    Args:
+        line: (N, 3) the line [m].
+        start, end: lengths to cut off [m].
+    """
     along = distances_along(line)
     low, high = start, along[-1] - end
-    inside = along[(along > low + 1e-3) & (along < high - 1e-3)]
+    inside = along[(along > low + _AT_END) & (along < high - _AT_END)]
     wanted = np.concatenate([[low], inside, [high]])
     return np.column_stack([np.interp(wanted, along, x) for x in line.T])
 
 
 def _clusters(network: RoadNetwork, long: set[str]) -> dict[str, int]:
-    """Returns junction -> number; junctions joined by short roads share one."""
+    """Returns junction -> number; junctions joined by short roads share one.
+
+    Args:
+        network: the road network.
+        long: names of the roads whose lanes are long enough to be pieces.
+    """
     group = {name: {name} for name in network.junctions}
     for road in network.roads.values():
         if road.name not in long:
@@ -137,6 +183,11 @@ def _signal_phase(
 
     Phase 0 is along the junction's first arm, in both directions, and phase 1
     across it.
+
+    Args:
+        network: the road network.
+        clusters: see `_clusters`.
+        ref: the lane.
     """
     number = clusters[network.exit_junction(ref)]
     if not _has_signals(network, clusters, number):
@@ -181,8 +232,15 @@ def _way_line(
 def _has_signals(
     network: RoadNetwork, clusters: dict[str, int], number: int
 ) -> bool:
+    """Returns whether a cluster has signals: where a wide road ends.
+
+    Args:
+        network: the road network.
+        clusters: see `_clusters`.
+        number: number of the cluster.
+    """
     return any(
-        len(junction.arms) >= 3
+        len(junction.arms) >= _FEWEST_ARMS
         and any(
             sum(network.roads[arm.road].lanes.values()) > _LANES_WITHOUT_SIGNAL
             for arm in junction.arms
@@ -200,6 +258,14 @@ def _ways(
     """Yields the ways from a lane to the next lanes that are long enough.
 
     No way passes a junction twice.
+
+    Args:
+        onward: lane -> connections that begin at its exit.
+        ref: the lane.
+        long: names of the roads whose lanes are long enough.
+
+    Yields:
+        The connections of a way, and the lane behind it.
     """
     waiting: list[tuple[list[Connection], LaneRef]] = [([], ref)]
     while waiting:
@@ -218,6 +284,7 @@ def _ways(
 def _crossings(
     network: RoadNetwork, trims: dict[tuple[str, End], float]
 ) -> Iterator[lane_graph.Crossing]:
+    """Yields a crossing at each end of a road with a far stop line."""
     for road in network.roads.values():
         for end in ENDS:
             if trims[road.name, end] == _STOP_LINE:
