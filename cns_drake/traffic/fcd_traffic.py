@@ -24,6 +24,14 @@ from cns_drake.traffic.walkers import gait_rate
 # In a trace that belongs to the map, at least half of the vehicles are closer
 # than this to its lanes [m].
 _OFF_ROAD = 5.0
+# The same for persons, in a trace without vehicles [m].
+_OFF_ROAD_PERSONS = 50.0
+# A drive may take this much longer than the trace because of rounding [s].
+_ROUNDING = 1e-6
+# Greatest time between two comparisons of road users with the ego car [s]: they
+# notice everything that crosses its path.
+_COMPARISON_STEP = 0.1
+# Kinds of cars from which a vehicle of unknown type is drawn.
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
 
 
@@ -60,7 +68,7 @@ def play_trace(
         InputError: the trace is shorter than the drive, or belongs to another
             map.
     """
-    if trace.duration < duration - 1e-6:
+    if trace.duration < duration - _ROUNDING:
         raise InputError(
             f"{path}: the trace has {trace.duration:g} s from {trace.begin:g} "
             f"s on, but the drive takes {duration:.2f} s: record more, or "
@@ -79,9 +87,7 @@ def play_trace(
     rows = [_person_rows(person, ground, trace.dt) for person in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
-    # The steps are short enough to notice everything that crosses the ego car's
-    # path.
-    step = min(trace.dt, 0.1)
+    step = min(trace.dt, _COMPARISON_STEP)
     times = np.arange(0.0, min(trace.duration, end) + step, step)
     kept = ~_meet_ego(vehicles, half, times, ego, ego_box)
     half = [(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * len(trace.persons)
@@ -100,13 +106,18 @@ def play_trace(
 def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
     """Checks that vehicles are on lanes; without vehicles, checks persons.
 
+    Args:
+        trace: the trace.
+        path: its file, for error messages.
+        lanes: (N, 3) points of all lanes [m].
+
     Raises:
         InputError: half of the trace is too far from the lanes.
     """
     traced = trace.vehicles or trace.persons
     places = np.concatenate([road_user.xy for road_user in traced])
     distances, _ = cKDTree(lanes[:, :2]).query(places)
-    off_road = _OFF_ROAD if trace.vehicles else 10.0 * _OFF_ROAD
+    off_road = _OFF_ROAD if trace.vehicles else _OFF_ROAD_PERSONS
     if np.median(distances) > off_road:
         raise InputError(
             f"{path}: half of the trace is more than {off_road:g} m from the "
@@ -117,6 +128,7 @@ def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
 
 
 def _extent_text(places: np.ndarray) -> str:
+    """Returns the extent of places (N, 2 or 3) [m] in words."""
     low, high = places.min(axis=0), places.max(axis=0)
     return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
 
@@ -158,7 +170,13 @@ def _vehicle_kind(vehicle: TracedObject, seed: int) -> VehicleKind:
 def _vehicle_rows(
     vehicle: TracedObject, kind: VehicleKind, heights: LaneHeights
 ) -> np.ndarray:
-    """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`."""
+    """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`.
+
+    Args:
+        vehicle: the vehicle, with its place at M steps.
+        kind: its kind.
+        heights: heights of the lanes.
+    """
     ahead = np.column_stack([cos(vehicle.yaw), sin(vehicle.yaw)])
     xy = vehicle.xy - kind.size[0] / 2 * ahead
     # An upward slope is a rotation about -y.
@@ -169,9 +187,16 @@ def _vehicle_rows(
 def _person_rows(
     person: TracedObject, heights: LaneHeights, dt: float
 ) -> np.ndarray:
-    """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`."""
+    """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`.
+
+    Args:
+        person: the pedestrian, with its place at M steps.
+        heights: heights of lanes and walkways.
+        dt: time between two steps [s].
+    """
     steps = np.linalg.norm(np.diff(person.xy, axis=0), axis=1)
     turned = dt * gait_rate(steps / dt)
+    # A random phase that depends only on the name.
     start = zlib.crc32(person.name.encode()) % 1000 * 2e-3 * np.pi
     phase = start + np.concatenate([[0.0], np.cumsum(turned)])
     z = heights.along(person.xy, person.z, None)
@@ -181,7 +206,13 @@ def _person_rows(
 def _make_tracks(
     trace: FcdTrace, traced: Sequence[TracedObject], rows: Sequence[np.ndarray]
 ) -> Tracks:
-    """Returns tracks of objects, each of which exists at some times only."""
+    """Returns tracks of objects, each of which exists at some times only.
+
+    Args:
+        trace: the trace.
+        traced: the objects, with the numbers of their M steps.
+        rows: coordinates (M, 5) of each object.
+    """
     values = np.zeros((trace.num_steps, len(traced), 5))
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)
@@ -208,7 +239,15 @@ def _meet_ego(
     ego: EgoPath,
     box: EgoBox,
 ) -> np.ndarray:
-    """Returns (N,) which bodies overlap the ego car at any of the times."""
+    """Returns (N,) which bodies overlap the ego car at any of the times.
+
+    Args:
+        tracks: tracks of the N bodies.
+        half: half the length and half the width of each body [m].
+        times: (K,) the times [s].
+        ego: motion of the ego car.
+        box: size of the ego car.
+    """
     num = len(half)
     poses = np.full((len(times), 1 + num, 3), np.nan)
     poses[:, 0] = box.middles(*ego(times))
