@@ -59,11 +59,13 @@ class Limb(NamedTuple):
 
 
 def _mesh_shape(name: str, mesh: str, rgb: Rgb) -> BodyShape:
+    """Returns a shape by the name of its mesh among the objects' meshes."""
     shape = Mesh(str(OBJECT_MESHES / f"{mesh}.obj"))
     return BodyShape(name, shape, RigidTransform(), rgb)
 
 
 def _box_shape(name: str, size: Point, middle: Point, rgb: Rgb) -> BodyShape:
+    """Returns a box of a given size around its middle [m]."""
     return BodyShape(name, Box(*size), RigidTransform(middle), rgb)
 
 
@@ -75,7 +77,15 @@ def _round_shape(
     rgb: Rgb,
     kind: type[Capsule] | type[Cylinder] = Capsule,
 ) -> BodyShape:
-    """Returns a capsule, or a cylinder, around the axis from start to end."""
+    """Returns a capsule, or a cylinder, around the axis from start to end.
+
+    Args:
+        name: name of the shape.
+        radius: radius [m].
+        start, end: ends of the axis in the limb's frame [m].
+        rgb: colour.
+        kind: whether it is a capsule or a cylinder.
+    """
     p, q = np.array(start, float), np.array(end, float)
     shape = kind(radius, math.dist(start, end))
     R = RotationMatrix.MakeFromOneVector(q - p, 2)
@@ -112,7 +122,13 @@ def vehicle_limbs(
 def _two_wheeler(
     name: str, paint: Rgb, rng: np.random.Generator
 ) -> tuple[BodyShape, ...]:
-    """Returns a bicycle or a motorcycle with its rider."""
+    """Returns a bicycle or a motorcycle with its rider.
+
+    Args:
+        name: `bicycle` or `motorcycle`.
+        paint: colour of the vehicle.
+        rng: random generator for the rider's colours.
+    """
     coat = _CLOTHES[int(rng.integers(len(_CLOTHES)))]
     heavy = name == "motorcycle"
     radius, width = (0.31, 0.13) if heavy else (0.34, 0.04)

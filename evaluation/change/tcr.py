@@ -269,6 +269,10 @@ def _directed_change(
     margin: float,
     restrict: bool,
 ) -> DirectedChange:
+    """Returns which points of the source are unchanged in the target.
+
+    For the arguments, see `temporal_change`.
+    """
     in_hull = in_convex_hull(source, target, margin)
     if len(source) and len(target):
         centre = target.mean(axis=0)
@@ -282,6 +286,7 @@ def _directed_change(
 
 
 def _changed_share(num_unchanged: int, num_in_hull: int) -> float:
+    """Returns the share of points in the hull that changed; NaN without any."""
     if num_in_hull == 0:
         return math.nan
     return 1.0 - num_unchanged / num_in_hull
