@@ -27,6 +27,34 @@ _ROOF_ITEMS = (
     "mast",
 )
 
+# Greatest number of windows around the tower.
+_MOST_BAYS = 19
+# Height of a storey of the podium [m].
+_PODIUM_STOREY_M = 4.2
+# Height of the walls around the terrace on the podium [m].
+_TERRACE_WALL_M = 1.6
+# Height of everything above the topmost storey [m].
+_TOP_M = 3.0
+# Depths of the shop windows, and of the windows of the podium [m].
+_SHOP_RECESS_M = 0.45
+_PODIUM_RECESS_M = 0.3
+# Distance of the shops from the ends of a wall [m].
+_SHOP_END_M = 0.8
+# Half the width of the stretch of the front for the door and its canopy [m].
+_DOOR_HALF_M = 3.2
+# Width of a balcony [m].
+_BALCONY_M = 2.6
+# Distance of the tower's bays from its corners [m].
+_END_M = 0.5
+# Distance of the garden from the edges of the terrace [m].
+_GARDEN_EDGE_M = 1.4
+# Least width of a garden [m].
+_LEAST_GARDEN_M = 2.0
+# Side of the posts, and width of the beams, of a pergola [m].
+_PERGOLA_M = 0.15
+# Finish of planters and pergola.
+_GARDEN = Finish((0.45, 0.40, 0.33))
+
 
 class PodiumTower(Building):
     """The podium tower: a block of shops with a tower set back on its roof."""
@@ -52,7 +80,7 @@ class PodiumTower(Building):
         # Place of the tower along x and y, as a share of the free length there.
         self.at = self.rng.choice([0.15, 0.5, 0.85], 2).tolist()
         self.chamfer = self.pick((0.0, 2.0, 3.5))
-        self.pitch = max(self.uniform(3.0, 4.2), run / 19)
+        self.pitch = max(self.uniform(3.0, 4.2), run / _MOST_BAYS)
         self.recess = self.uniform(0.35, 0.5, digits=2)
         self.frame = self.uniform(0.5, 0.9, digits=2)
         self.mullions = int(run < 70.0)
@@ -64,32 +92,27 @@ class PodiumTower(Building):
 
         The building's site must be a rectangle.
         """
-        (x0, y0, x1, y1), base = self.site.bounds, self.site.outline
-        top, walls = _add_shops(self), _podium_storey(self)
+        base = self.site.outline
+        top = _add_shops(self)
         top = tiers.add_storeys(
             self,
             base,
-            walls,
+            _podium_storey(self),
             z0=top,
             groups=self.podium_storeys,
             per_group=1,
             part="podium",
         )
-        edge = Facade(
-            1.6,
-            bands=(
-                Band(z0=0.2, z1=0.7, depth=-0.3),
-                Band(z0=1.4, z1=1.6, depth=-0.1),
-            ),
+        height = _TERRACE_WALL_M
+        bands = (
+            Band(z0=0.2, z1=0.7, depth=-0.3),
+            Band(z0=1.4, z1=height, depth=-0.1),
         )
+        walls = Facade(height, bands=bands)
         roof = tiers.add_crown(
-            self, base, edge, z0=top, parapet=1.2, part="terrace"
+            self, base, walls, z0=top, parapet=1.2, part="terrace"
         )
-        width, depth = self.tower[0] * (x1 - x0), self.tower[1] * (y1 - y0)
-        left = round(x0 + self.at[0] * (x1 - x0 - width), 2)
-        near = round(y0 + self.at[1] * (y1 - y0 - depth), 2)
-        right, far = round(left + width, 2), round(near + depth, 2)
-        plan = outlines.rectangle(left, near, right, far)
+        plan = _tower_outline(self)
         _add_garden(self, plan, roof)
         if self.chamfer:
             plan = outlines.chamfered(plan, self.chamfer)
@@ -97,84 +120,110 @@ class PodiumTower(Building):
         _add_tower(self, plan, roof)
 
 
+def _tower_outline(building: PodiumTower) -> np.ndarray:
+    """Returns the outline (4, 2) of the tower on the podium [m]."""
+    x0, y0, x1, y1 = building.site.bounds
+    x_share, y_share = building.tower
+    x_at, y_at = building.at
+    width, depth = x_share * (x1 - x0), y_share * (y1 - y0)
+    left = round(x0 + x_at * (x1 - x0 - width), 2)
+    near = round(y0 + y_at * (y1 - y0 - depth), 2)
+    right, far = round(left + width, 2), round(near + depth, 2)
+    return outlines.rectangle(left, near, right, far)
+
+
 def _add_shops(building: PodiumTower) -> float:
-    outline, h = building.site.outline, building.ground_height
-    front = WallFrame(outline, 0)
+    """Adds the ground floor of the podium; returns the height of its top [m].
+
+    Shops are on three sides, and gates for deliveries at the back.
+    """
+    outline, height = building.site.outline, building.ground_height
     pitch = building.shop_pitch
     choices = [
-        bays.shop_front(head=h - 0.6, depth=0.45, door=d) for d in (True, False)
+        bays.shop_front(head=height - 0.6, depth=_SHOP_RECESS_M, door=has_door)
+        for has_door in (True, False)
     ]
-    shops = bays.rhythm(pitch, choices, margin=0.8)
+    shops = bays.rhythm(pitch, choices, margin=_SHOP_END_M)
+    entrance = bays.entrance(width=4.0, height=3.8, depth=1.6)
+    front = bays.with_middle(shops, entrance, width=6.0)
     gates = [bays.gate(width=4.0, height=3.4), bays.blank]
-    main = bays.with_middle(
-        shops, bays.entrance(width=4.0, height=3.8, depth=1.6), width=6.0
-    )
     service = bays.rhythm(pitch, gates, margin=1.0)
-    layout = bays.by_edge({0: main, 2: service}, shops)
-    bands = (
-        foot_band(height=0.3, reach=0.06),
-        Band(z0=h - 1.1, z1=h - 0.2, depth=-0.2),
+    walls = Facade(
+        height,
+        bands=(
+            foot_band(height=0.3, reach=0.06),
+            Band(z0=height - 1.1, z1=height - 0.2, depth=-0.2),
+        ),
+        layout=bays.by_edge({0: front, 2: service}, shops),
+        glass=(_SHOP_RECESS_M,),
     )
-    cells = bays.stretches(front.length, pitch=pitch, margin=0.8)
-    shape = canopies.AwningShape(narrower=0.4, reach=1.35, z0=2.7, z1=h - 1.3)
-    shades = canopies.awnings(
+    _add_awnings(building)
+    canopy = canopies.front_canopy(
+        outline, half=_DOOR_HALF_M, reach=1.45, z=4.0
+    )
+    return tiers.add_ground(building, outline, walls, extras=[canopy])
+
+
+def _add_awnings(building: PodiumTower) -> None:
+    """Adds awnings to some of the shops in front."""
+    front = WallFrame(building.site.outline, 0)
+    shops = bays.stretches(
+        front.length, pitch=building.shop_pitch, margin=_SHOP_END_M
+    )
+    shape = canopies.AwningShape(
+        narrower=0.4, reach=1.35, z0=2.7, z1=building.ground_height - 1.3
+    )
+    awnings = canopies.awnings(
         front,
-        cells,
+        shops,
         building.rng,
         share=building.awnings,
         shape=shape,
-        door=3.2,
+        door=_DOOR_HALF_M,
     )
-    canopies.add_awnings(building, shades)
-    roof = canopies.front_canopy(outline, half=3.2, reach=1.45, z=4.0)
-    facade = Facade(h, bands=bands, layout=layout, glass=(0.45,))
-    return tiers.add_ground(building, outline, facade, extras=[roof])
+    canopies.add_awnings(building, awnings)
 
 
 def _podium_storey(building: PodiumTower) -> Facade:
-    storey = 4.2
+    """Returns the walls of a storey of the podium above the shops."""
     window = bays.window(
         width=building.shop_pitch - 1.4,
         sill=0.7,
-        head=storey - 0.7,
-        depth=0.3,
+        head=_PODIUM_STOREY_M - 0.7,
+        depth=_PODIUM_RECESS_M,
         mullions=2,
     )
-    layout = bays.rhythm(building.shop_pitch, [window], margin=0.8)
     return Facade(
-        storey,
+        _PODIUM_STOREY_M,
         bands=(foot_band(height=0.25, reach=0.12),),
-        layout=layout,
-        glass=(0.3,),
+        layout=bays.rhythm(building.shop_pitch, [window], margin=_SHOP_END_M),
+        glass=(_PODIUM_RECESS_M,),
     )
 
 
 def _add_tower(building: PodiumTower, plan: np.ndarray, z0: float) -> None:
-    room = building.height - 3.0 - z0
+    """Adds the storeys of the tower, and a screen around its roof.
+
+    `plan` contains the corners (N, 2) of the tower, and `z0` is the height of
+    its foot [m].
+    """
+    room = building.height - _TOP_M - z0
     groups, per_group, storey = tiers.storey_groups(
         room, storey=building.storey_height
     )
     # Deep frames, one bay wide, with the glass at their backs.
+    frame_half = building.frame / 2
     frame = bays.window(
         width=1e3,
-        sill=round(building.frame / 2, 2),
-        head=round(storey - building.frame / 2, 2),
+        sill=round(frame_half, 2),
+        head=round(storey - frame_half, 2),
         depth=building.recess,
-        pier=round(building.frame / 2, 2),
+        pier=round(frame_half, 2),
         mullions=building.mullions,
     )
-    layout = bays.rhythm(building.pitch, [frame], margin=0.5)
-    walls = Facade(storey, bands=(), layout=layout, glass=(building.recess,))
-    extras = []
-    for edge in range(len(plan)) if building.balconies else ():
-        wall = WallFrame(plan, edge)
-        if wall.length > 3 * building.pitch:
-            x = 0.5 + building.pitch
-            extras.append(
-                wall.place(
-                    balconies.balcony(x0=x - 2.6, x1=x, reach=1.4, z=0.0)
-                )
-            )
+    layout = bays.rhythm(building.pitch, [frame], margin=_END_M)
+    walls = Facade(storey, layout=layout, glass=(building.recess,))
+    rails = _tower_balconies(building, plan) if building.balconies else []
     top = tiers.add_storeys(
         building,
         plan,
@@ -182,58 +231,84 @@ def _add_tower(building: PodiumTower, plan: np.ndarray, z0: float) -> None:
         z0=z0,
         groups=groups,
         per_group=per_group,
-        extras=extras,
+        extras=rails,
     )
     crown = round(building.height - top, 3)
     louvres = tuple(
         Band(z0=z, z1=z + 0.35, depth=0.15) for z in (0.5, 1.2, 1.9)
     )
-    screen = Facade(
-        crown, bands=(*louvres, Band(z0=2.6, z1=crown, depth=-0.15))
+    rim = Band(z0=2.6, z1=crown, depth=-0.15)
+    screen = Facade(crown, bands=(*louvres, rim))
+    tiers.add_crown(
+        building, plan, screen, z0=top, parapet=2.2, items=_ROOF_ITEMS
     )
-    items = _ROOF_ITEMS
-    tiers.add_crown(building, plan, screen, z0=top, parapet=2.2, items=items)
+
+
+def _tower_balconies(building: PodiumTower, plan: np.ndarray) -> list[Mesh]:
+    """Returns a balcony for each wall of a storey that is long enough."""
+    rails = []
+    for edge in range(len(plan)):
+        wall = WallFrame(plan, edge)
+        if wall.length > 3 * building.pitch:
+            # The balcony ends where the second bay begins.
+            end = _END_M + building.pitch
+            rail = balconies.balcony(
+                x0=end - _BALCONY_M, x1=end, reach=1.4, z=0.0
+            )
+            rails.append(wall.place(rail))
+    return rails
 
 
 def _add_garden(building: PodiumTower, tower: np.ndarray, z: float) -> None:
-    """Adds planters and a pergola to the podium roof's widest free strip."""
+    """Adds planters and a pergola to the podium roof's widest free strip.
+
+    `tower` is the outline (4, 2) of the tower, and `z` the height of the roof
+    [m].
+    """
     x0, y0, x1, y1 = building.site.bounds
-    (tx0, ty0), (tx1, ty1) = tower[0], tower[2]
+    (left, near), (right, far) = tower[0], tower[2]
     strips = (
-        (x0, tx0, y0, y1),
-        (tx1, x1, y0, y1),
-        (x0, x1, y0, ty0),
-        (x0, x1, ty1, y1),
+        (x0, y0, left, y1),
+        (right, y0, x1, y1),
+        (x0, y0, x1, near),
+        (x0, far, x1, y1),
     )
-    a, b, c, d = max(strips, key=lambda s: min(s[1] - s[0], s[3] - s[2]))
-    a, b, c, d = a + 1.4, b - 1.4, c + 1.4, d - 1.4
-    if min(b - a, d - c) < 2.0:
+    x0, y0, x1, y1 = max(strips, key=lambda s: min(s[2] - s[0], s[3] - s[1]))
+    x0, x1 = x0 + _GARDEN_EDGE_M, x1 - _GARDEN_EDGE_M
+    y0, y1 = y0 + _GARDEN_EDGE_M, y1 - _GARDEN_EDGE_M
+    if min(x1 - x0, y1 - y0) < _LEAST_GARDEN_M:
         return
-    if b - a > d - c:
-        garden = _garden(b - a, d - c).moved((a, c, z))
+    if x1 - x0 > y1 - y0:
+        garden = _garden(x1 - x0, y1 - y0).moved((x0, y0, z))
     else:
-        garden = _garden(d - c, b - a).moved((b, c, z), math.pi / 2)
-    building.add("garden", garden, finish=Finish((0.45, 0.40, 0.33)))
+        garden = _garden(y1 - y0, x1 - x0).moved((x1, y0, z), math.pi / 2)
+    building.add("garden", garden, finish=_GARDEN)
 
 
 def _garden(length: float, width: float) -> Mesh:
     """Returns planters along x, with a pergola behind them."""
     planters = (
-        ((u * length, (u + 0.12) * length), (0.0, 1.2), (-0.1, 0.8))
-        for u in (0.1, 0.32, 0.54, 0.76)
+        solids.box(
+            x=(start * length, (start + 0.12) * length),
+            y=(0.0, 1.2),
+            z=(-0.1, 0.8),
+            bottom=False,
+        )
+        for start in (0.1, 0.32, 0.54, 0.76)
     )
-    places = [round(u * length, 2) for u in np.linspace(0.25, 0.75, 7)]
+    spots = [round(share * length, 2) for share in np.linspace(0.25, 0.75, 7)]
     beams = (
-        solids.box(x=(x, x + 0.15), y=(1.5, width), z=(2.6, 2.85))
-        for x in places
+        solids.box(x=(x, x + _PERGOLA_M), y=(1.5, width), z=(2.6, 2.85))
+        for x in spots
     )
     posts = (
-        ((x, x + 0.15), (y, y + 0.15), (-0.1, 2.7))
-        for x in (places[0], places[-1])
+        solids.box(
+            x=(x, x + _PERGOLA_M),
+            y=(y, y + _PERGOLA_M),
+            z=(-0.1, 2.7),
+            bottom=False,
+        )
+        for x in (spots[0], spots[-1])
         for y in (1.6, width - 0.2)
     )
-    return merge_meshes(
-        *(solids.box(x, y, z, bottom=False) for x, y, z in planters),
-        *beams,
-        *(solids.box(x, y, z, bottom=False) for x, y, z in posts),
-    )
+    return merge_meshes(*planters, *beams, *posts)

@@ -84,15 +84,31 @@ def place_buildings(draft: Draft, district: District) -> None:
 def _add_house(
     draft: Draft,
     district: str,
-    kind: str | None,
+    stem: str | None,
     house: _House,
     rng: Generator,
     fault_at: str,
 ) -> None:
-    name = draft.names.next_name(kind or house.archetype)
-    what = house.archetype, house.footprint, house.height
+    """Builds a house, and adds it to a draft.
+
+    Args:
+        draft: the city so far.
+        district: name of the district.
+        stem: first part of the house's name; None for the archetype.
+        house: the house.
+        rng: random generator for its parameters.
+        fault_at: entry of the plan, named in error messages.
+    """
+    name = draft.names.next_name(stem or house.archetype)
     with value_errors(fault_at):
-        model = sample(*what, rng, name, house.blind_edges)
+        model = sample(
+            house.archetype,
+            house.footprint,
+            house.height,
+            rng,
+            name,
+            house.blind_edges,
+        )
     x, y = (round(float(value), 3) for value in house.xy)
     xyz = (x, y, _ground_height_before(draft, house))
     tags = (district, house.archetype)

@@ -121,13 +121,13 @@ class Draft:
 
     def place(
         self,
-        name: str,
+        object_kind: str,
         model: Model,
         xy: tuple[float, float],
         yaw: float,
         tags: Iterable[str],
         *,
-        kind: str | None = None,
+        stem: str | None = None,
         clearance: float = 0.0,
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
@@ -139,12 +139,12 @@ class Draft:
         the names of later objects do not depend on whether this object fits.
 
         Args:
-            name: kind of object, a key of `OBJECTS`.
+            object_kind: kind of object, a key of `OBJECTS`.
             model: the object.
             xy: position of the object in W [m].
             yaw: heading of the object in W [rad].
             tags: tags of the structure.
-            kind: first part of the structure's name, such as `tree`; by default
+            stem: first part of the structure's name, such as `tree`; by default
                 the word that `name_stem` returns.
             clearance: least distance from all objects placed before [m].
             crown_part: share of the reach of a tree's crown that must be clear
@@ -153,8 +153,8 @@ class Draft:
         """
         x, y = (round(float(value), 3) for value in xy)
         structure = Structure(
-            self.names.next_name(kind or name_stem(name)),
-            OBJECTS[name].semantic_class,
+            self.names.next_name(stem or name_stem(object_kind)),
+            OBJECTS[object_kind].semantic_class,
             model,
             (x, y, 0.0),
             float(yaw),

@@ -41,7 +41,9 @@ def _furnish_arm(
     incoming: Direction = "backward" if starts else "forward"
     outgoing: Direction = "forward" if starts else "backward"
 
-    def place(name: str, distance: float, side: int, turn: float) -> None:
+    def place(
+        object_kind: str, distance: float, side: int, turn: float
+    ) -> None:
         """Places an object beside the arm, `distance` from the junction [m].
 
         `side` is 1 for the left side of the arm, looking away from the
@@ -60,8 +62,8 @@ def _furnish_arm(
                 break
         yaw = (heading if starts else heading + math.pi) + turn
         tags = ("junction", junction.name)
-        model = OBJECTS[name].build(rng)
-        draft.place(name, model, (x, y), yaw, tags, clearance=0.1)
+        model = OBJECTS[object_kind].build(rng)
+        draft.place(object_kind, model, (x, y), yaw, tags, clearance=0.1)
 
     if road.lanes[incoming]:
         if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:

@@ -1,4 +1,4 @@
-"""Names of structures: a word for the kind, and a number."""
+"""Names of structures: a word for the kind (the stem), and a number."""
 
 from collections import Counter
 
@@ -12,27 +12,27 @@ _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 _RANGE = 50
 
 
-def name_stem(object_name: str) -> str:
+def name_stem(object_kind: str) -> str:
     """Returns the everyday word for an object, with which its name begins.
 
-    For example, the word for `lime_tree` is `tree`. `object_name` is a key of
+    For example, the word for `lime_tree` is `tree`. `object_kind` is a key of
     `cns_drake.city.placement.objects.OBJECTS`.
     """
-    if object_name in SPECIES:
+    if object_kind in SPECIES:
         return "tree"
-    return _WORDS.get(OBJECTS[object_name].semantic_class, object_name)
+    return _WORDS.get(OBJECTS[object_kind].semantic_class, object_kind)
 
 
 class NameCounter:
-    """Numbers the names of structures, separately for each kind."""
+    """Numbers the names of structures, separately for each stem."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
 
-    def next_name(self, kind: str) -> str:
-        """Returns a new name, e.g. `tower_017` for the kind `tower`."""
-        self._counts[kind] += 1
-        return f"{kind}_{self._counts[kind]:03d}"
+    def next_name(self, stem: str) -> str:
+        """Returns a new name, e.g. `tower_017` for the stem `tower`."""
+        self._counts[stem] += 1
+        return f"{stem}_{self._counts[stem]:03d}"
 
     def open_range(self) -> None:
         """Makes the numbers in new names begin after the next multiple of 50.
@@ -42,5 +42,5 @@ class NameCounter:
         structures in later tasks stay the same. `stages.yaml` refers to such
         names.
         """
-        for kind, count in self._counts.items():
-            self._counts[kind] = -(-count // _RANGE) * _RANGE
+        for stem, count in self._counts.items():
+            self._counts[stem] = -(-count // _RANGE) * _RANGE

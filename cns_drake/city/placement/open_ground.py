@@ -29,6 +29,8 @@ _CROWN_PART = 0.8
 # Greatest length of a fence or hedge [m]. A longer line is divided, so that a
 # stage can lack one piece without lacking all of them.
 _LONGEST_RUN = 24.0
+# Gap between two pieces, which prevents overlaps [m].
+_RUN_GAP = 0.06
 # On slopes, the height from one piece to the next is at most this [m].
 _HIGHEST_STEP = 0.3
 
@@ -70,7 +72,7 @@ def _place_object(
         raise InputError(f"{field}.parameters: {error}") from error
     yaw = math.radians(plan.yaw_deg)
     if not draft.place(
-        plan.object, model, plan.at, yaw, (district,), kind=plan.kind
+        plan.object, model, plan.at, yaw, (district,), stem=plan.kind
     ):
         raise InputError(f"{field}.at: the place is taken by another structure")
 
@@ -87,9 +89,11 @@ def _place_line(
     s = 0.0
     while s <= line.length:
         at = station_at(line, s)
-        name = pick_key(plan.objects, rng)
+        object_kind = pick_key(plan.objects, rng)
         yaw = at.yaw + math.radians(plan.yaw_deg)
-        _place_if_free(draft, district, name, plan.kind, at[:2], yaw, rng)
+        _place_if_free(
+            draft, district, object_kind, plan.kind, at[:2], yaw, rng
+        )
         s += float(rng.uniform(*plan.spacing))
 
 
@@ -109,15 +113,19 @@ def _place_run(
     fall = float(np.abs(np.diff(draft.base(*line.T))).sum())
     count = max(count, math.ceil(round(fall, 3) / _HIGHEST_STEP))
     yaw = math.atan2(*(end - start)[::-1]) + math.radians(plan.yaw_deg)
-    name = pick_key(plan.objects, rng)
+    object_kind = pick_key(plan.objects, rng)
     for k in range(count):
         middle = start + (end - start) * (k + 0.5) / count
-        # A small gap between pieces prevents overlaps.
-        model = OBJECTS[name].build(
-            rng, length=length / count - 0.06, **plan.parameters
+        model = OBJECTS[object_kind].build(
+            rng, length=length / count - _RUN_GAP, **plan.parameters
         )
         draft.place(
-            name, model, tuple(middle), yaw, (district,), kind=plan.kind
+            object_kind,
+            model,
+            tuple(middle),
+            yaw,
+            (district,),
+            stem=plan.kind,
         )
 
 
@@ -146,28 +154,41 @@ def _scatter(
         # fill does not move the objects.
         keep = rng.uniform() < plan.fill
         yaw = rng.uniform(-math.pi, math.pi)
-        name = pick_key(plan.objects, rng)
+        object_kind = pick_key(plan.objects, rng)
         if keep:
             xy = float(dart[0]), float(dart[1])
-            _place_if_free(draft, district, name, plan.kind, xy, yaw, rng)
+            _place_if_free(
+                draft, district, object_kind, plan.kind, xy, yaw, rng
+            )
 
 
 def _place_if_free(
     draft: Draft,
     district: District,
-    name: str,
-    kind: str | None,
+    object_kind: str,
+    stem: str | None,
     xy: tuple[float, float],
     yaw: float,
     rng: Generator,
 ) -> None:
+    """Places an object within the district, if there is room.
+
+    Args:
+        draft: the city so far.
+        district: the district.
+        object_kind: kind of object, a key of `OBJECTS`.
+        stem: first part of the structure's name; None for the usual one.
+        xy: position of the object in W [m].
+        yaw: heading of the object in W [rad].
+        rng: random generator for the object.
+    """
     draft.place(
-        name,
-        OBJECTS[name].build(rng),
+        object_kind,
+        OBJECTS[object_kind].build(rng),
         xy,
         yaw,
         (district.plan.name,),
-        kind=kind,
+        stem=stem,
         clearance=_CLEARANCE,
         crown_part=_CROWN_PART,
         within=district.area,

@@ -14,7 +14,10 @@ from cns_drake.roads.network import RoadNetwork
 
 # Length of a parking bay along the street, least and greatest [m].
 _BAY_LENGTH = (5.6, 7.0)
+# Share of the bays along a street in which a car stands.
 _BAY_FILL = 0.72
+# Share of the drivers who park nose in.
+_NOSE_IN = 0.7
 # Cars are parked a little closer to the kerb than to the lane [m].
 _TO_KERB = 0.08
 
@@ -60,8 +63,7 @@ def park_in_bays(
             continue
         at = start + along * (k + 0.5) * width + inwards * depth / 2
         at = at + rng.uniform(-0.15, 0.15, 2)
-        # Most drivers park nose in.
-        nose = inwards if rng.uniform() < 0.7 else -inwards
+        nose = inwards if rng.uniform() < _NOSE_IN else -inwards
         yaw = math.atan2(nose[1], nose[0]) + float(rng.uniform(-0.04, 0.04))
         place_car(draft, draft.plan.cars, tuple(at), yaw, rng, (district,))
 
@@ -84,5 +86,5 @@ def place_car(
         rng: random generator for the choice of the car.
         tags: tags of the structure.
     """
-    name = pick_key(cars, rng)
-    draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
+    car_kind = pick_key(cars, rng)
+    draft.place(car_kind, OBJECTS[car_kind].build(rng), xy, yaw, tags)

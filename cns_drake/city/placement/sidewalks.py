@@ -22,6 +22,7 @@ _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
 _JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
 # Least distance between two objects, and from objects to lanes [m].
 _CLEARANCE = 0.4
+# A trunk's least distance from any building, as a share of the crown's reach.
 _CROWN_PART = 0.85
 
 
@@ -57,8 +58,8 @@ def plant_medians(draft: Draft) -> None:
         s = float(rng.uniform(1.0, 3.0))
         while s < line.length - 1.0:
             at = station_at(line, s)
-            name = pick_key(plan.trees, rng)
-            _place_along(draft, name, at, rng, ("median",))
+            species = pick_key(plan.trees, rng)
+            _place_along(draft, species, at, rng, ("median",))
             s += float(rng.uniform(*plan.tree_spacing))
 
 
@@ -89,19 +90,19 @@ def _furnish_sidewalk(
         here = shapely.Point(at.x, at.y)
         district = min(districts, key=lambda d: d.area.distance(here))
         street = district.plan.street or draft.plan.street
-        step, name = _draw_next(street, task, rng)
-        if name is not None and not keep_off.intersects(here):
+        step, object_kind = _draw_next(street, task, rng)
+        if object_kind is not None and not keep_off.intersects(here):
             tags = ("sidewalk", district.plan.name)
-            _place_along(draft, name, at, rng, tags, facing_street=True)
+            _place_along(draft, object_kind, at, rng, tags, facing_street=True)
         s += step
 
 
 def _draw_next(
     street: StreetPlan, task: str, rng: Generator
 ) -> tuple[float, str | None]:
-    """Returns the distance to the next place [m], and the object at this place.
+    """Returns the distance to the next place [m], and the kind of object here.
 
-    The object is None if the place stays empty.
+    The kind is None if the place stays empty.
     """
     if task == "lamp":
         return street.lamp_spacing, street.lamp
@@ -109,8 +110,9 @@ def _draw_next(
         step = float(rng.uniform(*street.tree_spacing))
         if not street.trees:
             return step, None
-        name = pick_key(street.trees, rng)
-        return step, None if rng.uniform() < street.tree_gaps else name
+        species = pick_key(street.trees, rng)
+        is_gap = rng.uniform() < street.tree_gaps
+        return step, None if is_gap else species
     step = float(rng.uniform(*street.furniture_spacing))
     if not street.furniture:
         return step, None
@@ -119,7 +121,7 @@ def _draw_next(
 
 def _place_along(
     draft: Draft,
-    name: str,
+    object_kind: str,
     at: Station,
     rng: Generator,
     tags: tuple[str, ...],
@@ -131,13 +133,18 @@ def _place_along(
     With `facing_street`, the object faces the street on the right of the line,
     and stands back so that the object's front (+x) touches the line.
     """
-    model = OBJECTS[name].build(rng)
+    model = OBJECTS[object_kind].build(rng)
     xy, yaw = (at.x, at.y), at.yaw
     if facing_street:
         front = model.footprint.bounds[2]
         xy = (at.x - front * math.sin(at.yaw), at.y + front * math.cos(at.yaw))
         yaw = at.yaw - math.pi / 2
     draft.place(
-        name, model, xy, yaw, tags,
-        clearance=_CLEARANCE, crown_part=_CROWN_PART,
-    )  # fmt: skip
+        object_kind,
+        model,
+        xy,
+        yaw,
+        tags,
+        clearance=_CLEARANCE,
+        crown_part=_CROWN_PART,
+    )
