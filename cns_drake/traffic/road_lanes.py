@@ -197,7 +197,7 @@ def _signal_phase(
         for name, junction in network.junctions.items()
         if clusters[name] == number
     )
-    heading = network.roads[ref.road].lane_end(*ref[1:], "exit")[3]
+    *_, heading = network.roads[ref.road].lane_end(*ref[1:], "exit")
     return int(abs(np.sin(heading - axis)) > np.sin(np.pi / 4))
 
 

@@ -13,7 +13,7 @@ from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.results.figure_files import save_figure
 from evaluation.results.figure_text import escape_dollars, name_lines
-from evaluation.results.styles import INK, PALE, method_styles
+from evaluation.results.styles import INK, PALE, MethodStyle, method_styles
 from evaluation.results.table_forms import by_pair, in_table_order, title
 
 # Size of the names of curves [pt]: 12 px on a phone, which shows one panel.
@@ -71,10 +71,9 @@ def draw_pr_curves(
 def _draw_curve(
     axes: Axes,
     method: str,
-    look: tuple[str, str, str],
+    style: MethodStyle,
     metrics: PlaceRecognitionMetrics,
 ) -> None:
-    colour, style, marker = look
     curve = metrics.curve
     # The curve begins at recall 0 with the precision of its first point. The
     # drawn area is then the AUC.
@@ -83,10 +82,10 @@ def _draw_curve(
     axes.plot(
         recall[: len(precision)],
         precision,
-        color=colour,
-        linestyle=style,
+        color=style.colour,
+        linestyle=style.line,
         linewidth=1.5,
-        marker=marker,
+        marker=style.marker,
         markersize=4,
         markevery=0.2,
         label=escape_dollars(f"{title(method)} {metrics.auc:.3f}"),

@@ -1,28 +1,43 @@
 """Colours, line styles and markers, the same in all figures."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from evaluation.results.table_forms import title
 
-# Method -> colour, line style and marker. All kinds of colour vision can
-# distinguish these colours by Okabe and Ito. Line styles and markers are for
-# prints without colour.
+
+class MethodStyle(NamedTuple):
+    """How a method is drawn, in the terms of Matplotlib.
+
+    Attributes:
+        colour: the colour, as hexadecimal digits.
+        line: the line style; empty in a legend whose chart has no such line.
+        marker: the marker.
+    """
+
+    colour: str
+    line: str
+    marker: str
+
+
+# Style of each method. All kinds of colour vision can distinguish these colours
+# by Okabe and Ito. Line styles and markers are for prints without colour.
 METHOD_STYLES = {
-    "ring++": ("#0072B2", "-", "o"),
-    "btc": ("#D55E00", "--", "s"),
-    "scan-context++": ("#009E73", "-.", "^"),
-    "solid": ("#CC79A7", ":", "D"),
-    "layered-overlap": ("#E69F00", "-", "v"),
-    "learned": ("#56B4E9", "--", "P"),
+    "ring++": MethodStyle("#0072B2", "-", "o"),
+    "btc": MethodStyle("#D55E00", "--", "s"),
+    "scan-context++": MethodStyle("#009E73", "-.", "^"),
+    "solid": MethodStyle("#CC79A7", ":", "D"),
+    "layered-overlap": MethodStyle("#E69F00", "-", "v"),
+    "learned": MethodStyle("#56B4E9", "--", "P"),
 }
 # Styles of methods that are not shipped.
 _OTHERS = (
-    ("#000000", "-.", "X"),
-    ("#8C564B", ":", "p"),
-    ("#882255", "-", "<"),
-    ("#44AA99", "--", ">"),
-    ("#999933", "-.", "h"),
-    ("#6F6F6F", ":", "*"),
+    MethodStyle("#000000", "-.", "X"),
+    MethodStyle("#8C564B", ":", "p"),
+    MethodStyle("#882255", "-", "<"),
+    MethodStyle("#44AA99", "--", ">"),
+    MethodStyle("#999933", "-.", "h"),
+    MethodStyle("#6F6F6F", ":", "*"),
 )
 
 # Colours of what belongs to no method.
@@ -42,14 +57,14 @@ def unit_rgb(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
     return red / 255.0, green / 255.0, blue / 255.0
 
 
-def method_styles(labels: Sequence[str]) -> dict[str, tuple[str, str, str]]:
-    """Returns the colour, line style and marker of each method in a figure.
+def method_styles(labels: Sequence[str]) -> dict[str, MethodStyle]:
+    """Returns the style of each method in a figure.
 
     Args:
         labels: names of the methods, with their settings.
 
     Returns:
-        Method as written in the legend (see `title`) -> the three values.
+        Method as written in the legend (see `title`) -> its style.
     """
     others = [name for name in labels if name not in METHOD_STYLES]
     return {

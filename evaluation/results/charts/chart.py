@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import lead_by_auc
 from evaluation.results.ranges import range_of
+from evaluation.results.styles import MethodStyle
 from evaluation.results.table import QueryRows, Results, Row
 
 # Width of a chart on a screen [px].
@@ -33,7 +34,7 @@ class Chart:
             fields that select rows.
         results: the whole table of results.
         rows: the selected rows of the chart's metric.
-        styles: method as in the legend -> its colour, line style and marker.
+        styles: method as in the legend -> its style.
         width: width of the drawing [px].
         queries: the answers from which the table was made; None if unknown.
     """
@@ -41,7 +42,7 @@ class Chart:
     keys: Mapping[str, str]
     results: Results
     rows: Sequence[Row]
-    styles: Mapping[str, tuple[str, str, str]]
+    styles: Mapping[str, MethodStyle]
     width: int
     queries: QueryRows | None
 

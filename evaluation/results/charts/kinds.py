@@ -19,7 +19,7 @@ from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import SETTINGS
-from evaluation.results.styles import method_styles
+from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
 from evaluation.results.table_forms import in_table_order
 
@@ -35,14 +35,13 @@ class DrawnChart:
     Attributes:
         message: sentence that says what the chart shows.
         figure: the drawing.
-        legend: name -> colour, line style (empty if no line has this name) and
-            marker; the mapping is empty if the drawing itself contains the
-            names.
+        legend: name of a method -> its style; the mapping is empty if the
+            drawing itself contains the names.
     """
 
     message: str
     figure: Figure
-    legend: Mapping[str, tuple[str, str, str]]
+    legend: Mapping[str, MethodStyle]
 
 
 def draw_chart(
@@ -145,8 +144,8 @@ def _renamed(
 
 
 def _legend(
-    figure: Figure, looks: Mapping[str, tuple[str, str, str]]
-) -> dict[str, tuple[str, str, str]]:
+    figure: Figure, styles: Mapping[str, MethodStyle]
+) -> dict[str, MethodStyle]:
     """Returns methods' styles; the line style is empty if no line is drawn."""
     with_line = {
         line.get_color()
@@ -155,22 +154,22 @@ def _legend(
         if line.get_linestyle() != "None"
     }
     return {
-        name: (colour, style if colour in with_line else "", marker)
-        for name, (colour, style, marker) in looks.items()
+        name: style if style.colour in with_line else style._replace(line="")
+        for name, style in styles.items()
     }
 
 
 def _add_legend(
-    figure: Figure, legend: Mapping[str, tuple[str, str, str]], width: int
+    figure: Figure, legend: Mapping[str, MethodStyle], width: int
 ) -> None:
     """Adds a legend below a figure, and makes room for the legend's rows."""
     if not legend:
         return
     handles = []
-    for name, (colour, style, marker) in legend.items():
-        options: dict = {"linestyle": style, "marker": marker}
+    for name, style in legend.items():
+        options: dict = {"linestyle": style.line, "marker": style.marker}
         options["label"] = escape_dollars(name)
-        handles.append(Line2D([], [], color=colour, **options))
+        handles.append(Line2D([], [], color=style.colour, **options))
     columns = max(1, width // _LEGEND_COLUMN)
     lines = math.ceil(len(handles) / columns)
     figure.set_figheight(figure.get_figheight() + lines * ROW * PX)
