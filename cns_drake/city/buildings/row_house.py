@@ -12,6 +12,14 @@ _ROOFS = ("gable", "gambrel", "flat")
 _NARROW_ROOFS = (*_ROOFS, "front", "stepped")
 # A house deeper than this gets a lower wing at its back [m].
 _MOST_DEPTH_M = 10.5
+# A house narrower than this can have a gable to the street [m].
+_NARROW_M = 9.5
+# Depth of the stoop in front of the house [m].
+_STOOP_M = 1.3
+# Strip between the house and the back of the site, for eaves [m].
+_BACK_M = 0.35
+# Least depth of a lower wing [m].
+_LEAST_ANNEX_M = 1.5
 
 
 class RowHouse(HouseInRow):
@@ -20,8 +28,8 @@ class RowHouse(HouseInRow):
     def draw(self) -> None:
         """Samples sizes and style."""
         width = self.site.width
-        self.draw_house(width, _NARROW_ROOFS if width < 9.5 else _ROOFS)
-        self.stoop = 1.3
+        self.draw_house(width, _NARROW_ROOFS if width < _NARROW_M else _ROOFS)
+        self.stoop = _STOOP_M
         self.floor = self.plinth
         # Height and side of the lower wing behind the house, and its width as a
         # share of the width of the house.
@@ -36,9 +44,9 @@ class RowHouse(HouseInRow):
         """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = front_of_site(self)
-        front, back = y0 + self.stoop, y1 - 0.35
+        front, back = y0 + self.stoop, y1 - _BACK_M
         deep = min(back - front, _MOST_DEPTH_M)
-        if back - front - deep < 1.5:
+        if back - front - deep < _LEAST_ANNEX_M:
             deep = back - front
         main = add_house(self, (left, front, right, front + deep), blind)
         if back - main.y1 > 1.0:
