@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -340,46 +341,38 @@ def _make_paths(walkways: Sequence[Walkway]) -> Paths:
     )
 
 
+class _Place(NamedTuple):
+    """Where a pedestrian begins.
+
+    Attributes:
+        path: number of the walkway, in walking direction.
+        at: row of the point at which it begins.
+        xy: (2,) position [m].
+        yaw: heading [rad].
+        group: number of the pedestrian whom it follows, or its own.
+    """
+
+    path: int
+    at: int
+    xy: np.ndarray
+    yaw: float
+    group: int
+
+
 def _place_walkers(
     count: int, walkways: Sequence[Walkway], rng: np.random.Generator
 ) -> np.ndarray:
-    """Returns the records of pedestrians at their first places; see `Crowd`."""
-    free = [k for k, way in enumerate(walkways) if way.crossing < 0]
-    sizes = np.array([len(walkways[k].points) for k in free], float)
-    rows: list[tuple[int, int, np.ndarray, float, int]] = []
+    """Returns the records of pedestrians at their first places.
 
-    def place(way: int, forward: bool, at: int, group: int) -> bool:
-        """Places a pedestrian; returns False instead if another one is near."""
-        points = walkways[way].points
-        line = points if forward else points[::-1]
-        x, y = (line[at + 1] - line[at])[:2]
-        aside = walkways[way].limits[:: 1 if forward else -1][at].mean()
-        aside = (aside if forward else -aside) / np.hypot(x, y)
-        xy = line[at, :2] + aside * np.array([y, -x])
-        is_free = all(
-            np.hypot(*(xy - row[2])) > _APART_AT_FIRST for row in rows
-        )
-        if is_free:
-            yaw = math.atan2(y, x)
-            rows.append((2 * way + 1 - forward, at, xy, yaw, group))
-        return is_free
-
-    while free and len(rows) < count:
-        for _ in range(_TRIES):
-            way = free[int(rng.choice(len(free), p=sizes / sizes.sum()))]
-            forward = bool(rng.integers(2))
-            at = int(rng.integers(len(walkways[way].points) - 1))
-            if place(way, forward, at, len(rows)):
-                break
-        else:
-            break
-        if rng.uniform() < _COMPANIONS and len(rows) < count and at >= _BEHIND:
-            place(way, forward, at - _BEHIND, len(rows) - 1)
-    walkers = np.zeros(len(rows), WALKER)
-    names = ("path", "at", "xy", "yaw", "group")
-    for name, values in zip(names, zip(*rows, strict=True), strict=False):
+    For the arguments, see `Crowd`.
+    """
+    places = _draw_places(count, walkways, rng)
+    number = len(places)
+    walkers = np.zeros(number, WALKER)
+    for name, values in zip(
+        _Place._fields, zip(*places, strict=True), strict=False
+    ):
         walkers[name] = values
-    number = len(rows)
     walkers["speed"] = np.clip(
         rng.normal(_MEAN_SPEED, _SPEED_SPREAD, number), *_SPEED_LIMITS
     )
@@ -389,3 +382,64 @@ def _place_walkers(
         walkers[name] = walkers[name][walkers["group"]]
     walkers["next_path"] = -1
     return walkers
+
+
+def _draw_places(
+    count: int, walkways: Sequence[Walkway], rng: np.random.Generator
+) -> list[_Place]:
+    """Returns random places of pedestrians, at most `count` of them.
+
+    The search ends when no place is found for a pedestrian.
+    """
+    free = [k for k, way in enumerate(walkways) if way.crossing < 0]
+    sizes = np.array([len(walkways[k].points) for k in free], float)
+    places: list[_Place] = []
+    while free and len(places) < count:
+        for _ in range(_TRIES):
+            k = free[int(rng.choice(len(free), p=sizes / sizes.sum()))]
+            forward = bool(rng.integers(2))
+            at = int(rng.integers(len(walkways[k].points) - 1))
+            place = _place_on(walkways, k, forward, at, len(places))
+            if _is_free(place, places):
+                places.append(place)
+                break
+        else:
+            break
+        if (
+            rng.uniform() < _COMPANIONS
+            and len(places) < count
+            and at >= _BEHIND
+        ):
+            leader = len(places) - 1
+            place = _place_on(walkways, k, forward, at - _BEHIND, leader)
+            if _is_free(place, places):
+                places.append(place)
+    return places
+
+
+def _place_on(
+    walkways: Sequence[Walkway], k: int, forward: bool, at: int, group: int
+) -> _Place:
+    """Returns the place in the middle of a walkway, at one of its points.
+
+    Args:
+        walkways: the walkways.
+        k: number of the walkway.
+        forward: whether the pedestrian walks in its direction.
+        at: row of the point, counted in walking direction.
+        group: see `_Place`.
+    """
+    way = walkways[k]
+    line = way.points if forward else way.points[::-1]
+    x, y = (line[at + 1] - line[at])[:2]
+    aside = way.limits[:: 1 if forward else -1][at].mean()
+    aside = (aside if forward else -aside) / np.hypot(x, y)
+    xy = line[at, :2] + aside * np.array([y, -x])
+    return _Place(2 * k + 1 - forward, at, xy, math.atan2(y, x), group)
+
+
+def _is_free(place: _Place, others: Sequence[_Place]) -> bool:
+    """Returns whether a place is far enough from all others."""
+    return all(
+        np.hypot(*(place.xy - other.xy)) > _APART_AT_FIRST for other in others
+    )
