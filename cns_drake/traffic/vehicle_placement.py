@@ -1,6 +1,7 @@
 """Where vehicles begin: at random places in lanes."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,8 @@ _PART_OF_SPEED = 0.5
 _FIRST_BRAKING = 0.75
 # Drivers' wanted speeds differ from those of their kind by up to this share.
 _FACTOR_SPREAD = 0.1
+# Least distance of a vehicle's ends from the ends of its lane at the start [m].
+_FROM_ENDS = 1.0
 # Number of random places that are tried for a vehicle.
 _TRIES = 200
 
@@ -44,36 +47,14 @@ def place_vehicles(
         Records of dtype `VEHICLE` of the vehicles for which a place was found;
         and the index of each of these vehicles in `kinds`.
     """
-    free = np.flatnonzero(~streets.pieces["is_way"])
-    lengths = streets.pieces["length"]
-    share = lengths[free] / lengths[free].sum()
-    taken: dict[int, list[tuple[float, float]]] = {}
-    found, paths, places = [], [], []
-    for number, kind in enumerate(kinds):
-        for _ in range(_TRIES):
-            lane = int(rng.choice(free, p=share))
-            length = lengths[lane]
-            low = kind.size[0] + 1.0
-            if length < low + 1.0:
-                continue
-            s = float(rng.uniform(low, length - 1.0))
-            span = (s - kind.size[0] - _SPACE / 2, s + _SPACE / 2)
-            if any(span[0] < b and a < span[1] for a, b in taken.get(lane, [])):
-                continue
-            if streets.until[0, lane] == 0.0 or not is_ego_far(
-                streets, 0, lane, s
-            ):
-                continue
-            taken.setdefault(lane, []).append(span)
-            found.append(number)
-            paths.append(lane)
-            places.append(s)
-            break
+    places = _draw_places(kinds, streets, rng)
+    found = [place.number for place in places]
     cars = np.zeros(len(found), VEHICLE)
     for name in ("held", "left_lane", "path"):
         cars[name] = -1
     cars["since"], cars["change_length"] = np.inf, 1.0
-    cars["path"][:, CURRENT], cars["s"] = paths, places
+    cars["path"][:, CURRENT] = [place.lane for place in places]
+    cars["s"] = [place.s for place in places]
     for car, kind in zip(cars, (kinds[k] for k in found), strict=True):
         car["length"], car["large"] = kind.size[0], kind.is_large
         car["rear_axle"], car["front_axle"] = kind.axles
@@ -83,11 +64,69 @@ def place_vehicles(
     cars["factor"] *= rng.uniform(
         1.0 - _FACTOR_SPREAD, 1.0 + _FACTOR_SPREAD, len(cars)
     )
-    lanes = streets.pieces[paths]
+    cars["v"] = _first_speeds(streets, cars)
+    return cars, found
+
+
+class _Place(NamedTuple):
+    """Where a vehicle begins.
+
+    Attributes:
+        number: number of the vehicle.
+        lane: number of the lane's piece.
+        s: place of the front bumper on the lane [m].
+    """
+
+    number: int
+    lane: int
+    s: float
+
+
+def _draw_places(
+    kinds: Sequence[VehicleKind], streets: Streets, rng: np.random.Generator
+) -> list[_Place]:
+    """Returns the random places of vehicles; some may find none.
+
+    For the arguments, see `place_vehicles`.
+    """
+    free = np.flatnonzero(~streets.pieces["is_way"])
+    lengths = streets.pieces["length"]
+    share = lengths[free] / lengths[free].sum()
+    # Lane -> the spans in it that vehicles need [m].
+    taken: dict[int, list[tuple[float, float]]] = {}
+    places = []
+    for number, kind in enumerate(kinds):
+        for _ in range(_TRIES):
+            lane = int(rng.choice(free, p=share))
+            low = kind.size[0] + _FROM_ENDS
+            if lengths[lane] < low + _FROM_ENDS:
+                continue
+            s = float(rng.uniform(low, lengths[lane] - _FROM_ENDS))
+            start, end = s - kind.size[0] - _SPACE / 2, s + _SPACE / 2
+            if any(start < b and a < end for a, b in taken.get(lane, [])):
+                continue
+            if streets.until[0, lane] == 0.0 or not is_ego_far(
+                streets, 0, lane, s
+            ):
+                continue
+            taken.setdefault(lane, []).append((start, end))
+            places.append(_Place(number, lane, s))
+            break
+    return places
+
+
+def _first_speeds(streets: Streets, cars: np.ndarray) -> np.ndarray:
+    """Returns the speeds (N,) at which vehicles begin [m/s].
+
+    They can stop before the line, or behind the vehicle ahead.
+
+    Args:
+        streets: arrays of all lanes.
+        cars: (N,) records of dtype `VEHICLE`, with all but the speed.
+    """
+    lanes = streets.pieces[cars["path"][:, CURRENT]]
     points = lanes["first"] + (cars["s"] / lanes["step"]).astype(int)
     allowed = streets.speed[points]
     v = _PART_OF_SPEED * np.minimum(cars["top"], cars["factor"] * allowed)
-    # Vehicles must be able to stop before the line or behind the vehicle ahead.
     left = np.minimum(lanes["length"] - cars["s"], _SPACE / 2)
-    cars["v"] = np.minimum(v, np.sqrt(2.0 * _FIRST_BRAKING * left))
-    return cars, found
+    return np.minimum(v, np.sqrt(2.0 * _FIRST_BRAKING * left))
