@@ -173,18 +173,37 @@ class Follower:
         return gap, speed, np.inf
 
     def _place(self, streets: Streets, car: np.void) -> None:
-        """Sets the pieces on which the car is now."""
+        """Sets the pieces on which the car is now, and its permission.
+
+        Args:
+            streets: arrays of all lanes.
+            car: record of the car, changed in place.
+        """
         front = self.u[-1] + self._box.front
         runs = self._runs
         while self._run < len(runs) - 1 and front >= runs[self._run].last:
             self._run += 1
         run = runs[self._run]
-        piece = run.piece
-        path = car["path"]
-        path[:] = -1
-        is_way = piece >= 0 and bool(streets.pieces[piece]["is_way"])
         after = runs[self._run + 1] if self._run < len(runs) - 1 else None
+        car["path"][:] = -1
         car["left_lane"] = run.beside if front < run.parts else -1
+        self._update_permission(car, front, after)
+        if run.piece < 0:
+            return
+        car["s"] = run.s + front - run.first
+        self._set_pieces_behind(streets, car["path"])
+        self._set_pieces_ahead(streets, car, front, after)
+
+    def _update_permission(
+        self, car: np.void, front: float, after: PathRun | None
+    ) -> None:
+        """Updates which way is kept free for the car.
+
+        Args:
+            car: record of the car, changed in place.
+            front: distance of the front bumper along its path [m].
+            after: the run behind the present one, if any.
+        """
         if car["held"] < 0:
             self._held = None
         if car["granted"] and self._held is None:
@@ -194,21 +213,47 @@ class Follower:
             if front - car["length"] >= self._held.last:
                 car["held"] = -1
                 self._held = None
-        if piece < 0:
-            return
-        path[CURRENT] = piece
-        car["s"] = run.s + front - run.first
+
+    def _set_pieces_behind(self, streets: Streets, path: np.ndarray) -> None:
+        """Sets the present piece of the car, and those that its rear may be on.
+
+        Args:
+            streets: arrays of all lanes.
+            path: (NUM_PIECES,) the car's field `path`, changed in place.
+        """
+        before = self._runs[self._run]
+        path[CURRENT] = before.piece
         column = CURRENT
-        before = run
-        for other in runs[: self._run][::-1]:
+        for other in self._runs[: self._run][::-1]:
             column -= 1
             if column < 0 or other.piece < 0:
                 break
             if not _leads(streets, other.piece, before.piece):
                 break
             path[column], before = other.piece, other
-        way = piece
-        if not is_way:
+
+    def _set_pieces_ahead(
+        self,
+        streets: Streets,
+        car: np.void,
+        front: float,
+        after: PathRun | None,
+    ) -> None:
+        """Sets the way and the lane ahead of the car.
+
+        If the next piece is a lane beside the present one, the car is on both
+        shortly before.
+
+        Args:
+            streets: arrays of all lanes.
+            car: record of the car, changed in place.
+            front: distance of the front bumper along its path [m].
+            after: the run behind the present one, if any.
+        """
+        path = car["path"]
+        run = self._runs[self._run]
+        way, column = run.piece, CURRENT + 1
+        if not streets.pieces[way]["is_way"]:
             if after is None or after.piece < 0:
                 return
             way = after.piece
@@ -216,9 +261,9 @@ class Follower:
                 if run.last - front < IN_BOTH_LANES:
                     car["left_lane"] = way
                 return
-            path[CURRENT + 1] = way
-        first = streets.pieces[way]["after_first"]
-        path[CURRENT + 1 + (not is_way)] = streets.after[first]
+            path[column] = way
+            column += 1
+        path[column] = streets.after[streets.pieces[way]["after_first"]]
 
     def poses(self, steps: np.ndarray) -> np.ndarray:
         """Returns x, y [m] and yaw [rad] of the car box's centre, (N, 3).
