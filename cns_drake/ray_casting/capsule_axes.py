@@ -47,7 +47,7 @@ class CapsuleAxes:
             rays: N rays.
             hits: hits of the N rays as Embree found them, changed in place.
         """
-        seen = [one for one in self._found if one[1].in_sight]
+        seen = [entry for entry in self._found if entry[1].in_sight]
         if not (seen and len(rays.d_Sset)):
             return
         _, groups, _, matrices, sizes = zip(*seen, strict=True)

@@ -326,10 +326,10 @@ def _quantiles(
 ) -> dict[str, float]:
     """Returns quantiles by name; NaN if there are no values."""
     if len(values) == 0:
-        return {name.format(one): math.nan for one in percentages}
+        return {name.format(percentage): math.nan for percentage in percentages}
     return {
-        name.format(one): float(np.percentile(values, one))
-        for one in percentages
+        name.format(percentage): float(np.percentile(values, percentage))
+        for percentage in percentages
     }
 
 

@@ -84,7 +84,7 @@ def by_m3c2(mine: Session, theirs: Session) -> np.ndarray:
     """
     py4dgeo = _py4dgeo()
     unobserved, kept, changed = SIDES[mine.side]
-    epochs = [py4dgeo.Epoch(one.points) for one in (mine, theirs)]
+    epochs = [py4dgeo.Epoch(session.points) for session in (mine, theirs)]
     chunks = np.array_split(mine.points, len(mine.points) // _CHUNK + 1)
     found = [
         py4dgeo.M3C2(

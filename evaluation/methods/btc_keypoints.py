@@ -206,9 +206,9 @@ def peaks(
     peak = num_heights[row, column]
     in_line = np.zeros(len(row), dtype=bool)
     for down, right in _NEIGHBOURS:
-        one = num_heights[row + down, column + right]
+        neighbour = num_heights[row + down, column + right]
         other = num_heights[row - down, column - right]
-        low, high = np.minimum(one, other), np.maximum(one, other)
+        low, high = np.minimum(neighbour, other), np.maximum(neighbour, other)
         in_line |= (high >= peak - _LINE_MARGIN) & (
             (low >= 0.5 * peak) | (low >= peak - _LINE_MARGIN)
         )

@@ -29,7 +29,7 @@ class JudgeTask(Task):
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         part = jobs.files.part("judge", pair.key)
-        made = tuple(one.source for one in jobs.distractors)
+        made = tuple(drive.source for drive in jobs.distractors)
         return (jobs.add(part, judge_scans, (pair.query.source, made)),)
 
     def numbers(
@@ -70,5 +70,7 @@ def judge_scans(
     if len(places) < 2:
         reporter.note(f"{drive.name}: one place, not judged")
         return None
-    simulated = judge.places_of((one() for one in made), table, reporter.note)
+    simulated = judge.places_of(
+        (recording() for recording in made), table, reporter.note
+    )
     return judge.judge_draws(places, simulated, _DRAWS)

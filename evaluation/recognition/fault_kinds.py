@@ -18,7 +18,7 @@ from evaluation.recognition.visible_change import (
 ELSEWHERE_KINDS = ("occluded", "no_overlap", "changed", "twin", "unexplained")
 # All reasons between two drives through one city.
 FAULT_KINDS = (
-    *(one for one in FAULTS if one not in ("other_city", ELSEWHERE)),
+    *(fault for fault in FAULTS if fault not in ("other_city", ELSEWHERE)),
     *ELSEWHERE_KINDS,
 )
 # Names of reasons in words, where these differ from the values in tables.

@@ -56,8 +56,8 @@ def sequence_scores(
     )
     result = np.concatenate(
         [
-            _mean_scores(some, of_query, travelled(p), length)
-            for some, p in parts
+            _mean_scores(of_drive, of_query, travelled(p), length)
+            for of_drive, p in parts
         ],
         axis=1,
     )

@@ -256,7 +256,7 @@ def _content(
         "tables": tables,
         "ranked": ranked,
         "beside": ranking.further_columns(report.results),
-        "styles": method_styles(in_table_order(one.method for one in ranked)),
+        "styles": method_styles(in_table_order(mean.method for mean in ranked)),
         "headline": headline if report.pairs else "",
         "judgements": report.reference.judge(
             [*report.recognitions, *report.repeated], report.changes

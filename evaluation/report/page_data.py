@@ -120,8 +120,16 @@ def browser_data(
     }
     num_scans = sum(len(drives[name].frames) for name in used)
     num_points = min(MAX_POINTS, _POINTS_OF_A_PAGE // max(num_scans, 1))
-    images = {name: one for name in used if (one := drives[name].images)}
-    num_bytes = sum(len(one) for some in images.values() for one in some.files)
+    images = {
+        name: images_of_drive
+        for name in used
+        if (images_of_drive := drives[name].images)
+    }
+    num_bytes = sum(
+        len(content)
+        for of_drive in images.values()
+        for content in of_drive.files
+    )
     image_step = 1 + num_bytes // _IMAGES_OF_A_PAGE
     return {
         "radius": recognitions[0].protocol.radius,

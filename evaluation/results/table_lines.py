@@ -215,7 +215,7 @@ class TableLines:
             if name in RESERVED:
                 raise InputError(f"{file}: line 1: '{name}' names no factor")
         columns = {name: k for k, name in enumerate(names)}
-        rows = [one for one in lines if any(one[1])]
+        rows = [line for line in lines if any(line[1])]
         if not (rows or may_be_empty):
             raise InputError(f"{file}: no rows")
         for number, row in rows:

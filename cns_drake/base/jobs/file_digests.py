@@ -39,7 +39,9 @@ def file_digests(files: Sequence[Path]) -> list[str]:
     with contextlib.suppress(Exception):
         known = dict(json.loads(kept.read_bytes()))
     found = {path: _state_and_digest(path, known.get(path)) for path in paths}
-    settled = {path: one for path, one in found.items() if one[0] is not None}
+    settled = {
+        path: entry for path, entry in found.items() if entry[0] is not None
+    }
     if settled != known:
         with contextlib.suppress(Exception):
             kept.parent.mkdir(parents=True, exist_ok=True)

@@ -85,7 +85,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     figure.supxlabel(escape_dollars(text), fontsize=FONT)
     share, name, words = min(weakest)
     message = f"Least {in_words(chart.metric)}: {share:.2f}"
-    number = sum(f"{one:.2f}" == f"{share:.2f}" for one, *_ in weakest)
+    number = sum(f"{value:.2f}" == f"{share:.2f}" for value, *_ in weakest)
     if number > 1:
         return f"{message}, in {number} of {len(weakest)} cells", figure
     return f"{message} ({name}; {words})", figure
