@@ -22,7 +22,16 @@ _ASTRAY = np.radians(20.0)
 _SHORTEST_RING = 10.0
 # A car needs this width at both ends of a lane [m].
 _LEAST_WIDTH = 1.8
+# Shorter lanes are not driven [m].
 _LEAST_LENGTH = 0.05
+# Places on a lane that are closer than this are one place [m].
+_SAME_PLACE = 1e-3
+# Points of a drive that are closer than this to the point before are left out
+# [m].
+_LEAST_STEP = 0.05
+# A step of a drive goes backwards if the cosine of its angle to the step before
+# is at most this (60 deg).
+_BACKWARD_COSINE = 0.5
 # Distance between waypoints [m].
 _WAYPOINT_SPACING = 2.0
 # Numbers of waypoints to both sides in the running mean of a drive, tried in
@@ -55,7 +64,6 @@ class BandGraph(way_graph.WayGraph):
         # road.
         self._roads = np.array([band.road.name for band in self.bands])
         before, after = self._followers(lengths)
-        # The second lane of a pair follows the first one.
         self.followers = list(zip(before.tolist(), after.tolist(), strict=True))
         others = before != after
         super().__init__(np.array(lengths), before[others], after[others])
@@ -73,12 +81,12 @@ class BandGraph(way_graph.WayGraph):
             first = [_heading(line[:2]) for line in lines]
             last = [_heading(line[-2:]) for line in lines]
             near = cKDTree(starts).query_ball_point(ends, _JOINED_WITHIN)
-            for k, some in enumerate(near):
-                for m in sorted(some):
-                    turn = wrapped(first[m] - last[k])
-                    is_other = m != k or lengths[k] > _SHORTEST_RING
-                    if is_other and abs(turn) < _ASTRAY:
-                        pairs.append((k, m))
+            for lane, followers in enumerate(near):
+                for after in sorted(followers):
+                    turn = wrapped(first[after] - last[lane])
+                    may_be_ring = lengths[lane] > _SHORTEST_RING
+                    if abs(turn) < _ASTRAY and (after != lane or may_be_ring):
+                        pairs.append((lane, after))
         before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
         return before, after
 
@@ -106,13 +114,13 @@ class BandGraph(way_graph.WayGraph):
         points = steerable_drives.evenly_spaced(
             _without_backward_points(line), _WAYPOINT_SPACING
         )[: int(search.LONGEST / _WAYPOINT_SPACING) + 1]
-        found: WaypointRoute | Obstacle = points[0, :2]
+        drive: WaypointRoute | Obstacle = points[0, :2]
         for window in _SMOOTHING:
-            found = steerable_drives.steerable_drive(_smoothed(points, window))
-            if isinstance(found, WaypointRoute):
-                some = [self.bands[k] for k in way]
-                return replace(found, limit=usual_limit_of(some))
-        return found
+            drive = steerable_drives.steerable_drive(_smoothed(points, window))
+            if isinstance(drive, WaypointRoute):
+                limit = usual_limit_of(self.bands[k] for k in way)
+                return replace(drive, limit=limit)
+        return drive
 
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
         distances = [
@@ -123,6 +131,7 @@ class BandGraph(way_graph.WayGraph):
 
 
 def _is_driven(band: LaneBand) -> bool:
+    """Returns whether cars drive on a lane, and fit in at both ends."""
     width = band.width
     return (
         band.kind in DRIVEN
@@ -137,7 +146,7 @@ def _driven_line(band: LaneBand) -> np.ndarray:
     along ^= band.lane.is_reversed
     line = band.middle if along else band.middle[::-1]
     steps = np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1)
-    kept = np.concatenate([[True], steps > 1e-3])
+    kept = np.concatenate([[True], steps > _SAME_PLACE])
     kept[-1] = True
     return line[kept]
 
@@ -153,8 +162,9 @@ def usual_limit_of(bands: Iterable[LaneBand]) -> float:
     return usual_limit(np.concatenate(limits), np.concatenate(lengths))
 
 
-def _heading(two: np.ndarray) -> float:
-    return float(np.arctan2(two[1, 1] - two[0, 1], two[1, 0] - two[0, 0]))
+def _heading(ends: np.ndarray) -> float:
+    """Returns the heading from the first of two places (2, 3) to the second."""
+    return float(np.arctan2(ends[1, 1] - ends[0, 1], ends[1, 0] - ends[0, 0]))
 
 
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
@@ -178,6 +188,7 @@ def _without_backward_points(line: np.ndarray) -> np.ndarray:
     for point in line[2:]:
         step, last = (point - kept[-1])[:2], (kept[-1] - kept[-2])[:2]
         size = float(np.hypot(*step))
-        if size > 0.05 and step @ last > 0.5 * size * np.hypot(*last):
+        ahead = step @ last > _BACKWARD_COSINE * size * np.hypot(*last)
+        if size > _LEAST_STEP and ahead:
             kept.append(point)
     return np.array(kept)

@@ -36,64 +36,65 @@ def read_course(
         ValueError: a piece has an impossible length or curve; the message names
             its line.
     """
-    found: list[road_model.CoursePiece] = []
-    for one in elements:
-        length = one.number("length")
+    pieces: list[road_model.CoursePiece] = []
+    for element in elements:
+        where = f"line {element.line}: geometry: "
+        length = element.number("length")
         if length < 0.0:
-            raise ValueError(f"line {one.line}: geometry: length: {length:g}")
+            raise ValueError(f"{where}length: {length:g}")
         if length < SHORTEST_PIECE:
             faults.add("geometry without length, left out", name)
             continue
         if length > LONGEST_ROAD:
             raise ValueError(
-                f"line {one.line}: geometry: length: {length:g} m are more"
-                f" than {LONGEST_ROAD:g} m"
+                f"{where}length: {length:g} m are more than {LONGEST_ROAD:g} m"
             )
         try:
-            shape = _read_curve(one, length)
+            shape = _read_curve(element, length)
         except ValueError as error:
-            at = f"line {one.line}: geometry: "
             text = str(error)
-            prefix = "" if text.startswith("line") else at
+            # Numbers that cannot be read already name their line.
+            prefix = "" if text.startswith("line") else where
             raise ValueError(prefix + text) from error
-        s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
-        found.append(road_model.CoursePiece(s, x, y, heading, length, shape))
-    found.sort(key=lambda piece: piece.s)
-    for piece, after in pairwise(found):
+        s, x, y, heading = (element.number(k) for k in ("s", "x", "y", "hdg"))
+        pieces.append(road_model.CoursePiece(s, x, y, heading, length, shape))
+    pieces.sort(key=lambda piece: piece.s)
+    for piece, after in pairwise(pieces):
         end = piece.evaluate(np.array([after.s]))[0]
         gap = math.hypot(end[0] - after.x, end[1] - after.y)
         if max(gap, abs(piece.s + piece.length - after.s)) > WIDEST_JOINT:
             faults.add("gap of over 0.1 m in the course of a road", name)
-    return found
+    return pieces
 
 
 def _read_curve(geometry: Element, length: float) -> curves.Shape:
     """Returns the curve of a `geometry` element.
 
     Raises:
-        ValueError: if it has no curve, or one that is too sharp.
+        ValueError: the element has no curve, or a curve that is too sharp. The
+            message names the fault only.
     """
     shape: curves.Shape | None = None
-    for one in geometry.all("*"):
-        if one.tag == "line":
+    for curve in geometry.all("*"):
+        if curve.tag == "line":
             shape = curves.Arc(0.0)
-        elif one.tag == "arc":
-            shape = curves.Arc(one.number("curvature"))
-        elif one.tag == "spiral":
-            ends = one.number("curvStart"), one.number("curvEnd")
+        elif curve.tag == "arc":
+            shape = curves.Arc(curve.number("curvature"))
+        elif curve.tag == "spiral":
+            ends = curve.number("curvStart"), curve.number("curvEnd")
             if max(map(abs, ends)) > _SHARPEST:
                 raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
             shape = curves.Spiral(*ends, length)
-        elif one.tag == "poly3":
-            v = [one.number(k) for k in "abcd"]
+        elif curve.tag == "poly3":
+            v = [curve.number(k) for k in "abcd"]
             # At the curve's length in the file, u is not greater than that
             # length.
             shape = curves.Cubic(
                 (0, 1, 0, 0), v, length, length, stretched=False
             )
-        elif one.tag == "paramPoly3":
-            u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
-            by_arc = one.value("pRange", "normalized") == "arcLength"
+        elif curve.tag == "paramPoly3":
+            u, v = ([curve.number(k + c) for k in "abcd"] for c in "UV")
+            by_arc = curve.value("pRange", "normalized") == "arcLength"
             last = length if by_arc else 1.0
             shape = curves.Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:

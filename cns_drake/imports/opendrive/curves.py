@@ -20,6 +20,14 @@ _MOST_TURN = 10_000.0
 _PANELS = 64
 # Number of steps of Newton's method for the parameter at an arc length.
 _NEWTON_STEPS = 8
+# Number of intervals on which the sharpest bend of a cubic curve is searched.
+_INTERVALS = 4 * _PANELS
+# Curves must be longer than this [m].
+_LEAST_LENGTH = 1e-9
+# Least divisors, where a curve stands still: length of a panel [m], and speed
+# [m per unit of the parameter].
+_LEAST_PANEL = 1e-12
+_LEAST_SPEED = 1e-9
 
 
 def _integral(
@@ -116,7 +124,7 @@ class Cubic:
             stretched: whether the whole curve is stretched to `length`;
                 otherwise it ends where `length` is reached.
         """
-        self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
+        self._u, self._v = (np.polynomial.Polynomial(c) for c in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()
         self._by_parameter = by_parameter
         self._panel = last / _PANELS
@@ -124,12 +132,12 @@ class Cubic:
         steps = self._arc(panels, np.full(_PANELS, self._panel))
         self._reached = np.concatenate([[0.0], np.cumsum(steps)])
         whole = float(self._reached[-1])
-        if not whole > 1e-9:
+        if not whole > _LEAST_LENGTH:
             raise ValueError("a curve without length")
         self._scale = whole / length if stretched else 1.0
-        p = np.linspace(0.0, last, 4 * _PANELS + 1)
+        p = np.linspace(0.0, last, _INTERVALS + 1)
         turns = np.abs(np.diff(np.unwrap(self._heading(p))))
-        self.sharpest = float(turns.max()) / (length / (4 * _PANELS))
+        self.sharpest = float(turns.max()) / (length / _INTERVALS)
 
     def evaluate(self, ds: np.ndarray) -> np.ndarray:
         """Returns u, v [m] and heading [rad], (N, 3), as `Shape` says."""
@@ -143,6 +151,7 @@ class Cubic:
         return np.hypot(self._du(p), self._dv(p))
 
     def _arc(self, begin: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Returns arc lengths (N,) from `begin` over parameters `size` [m]."""
         return _integral(self._speed, begin, size)
 
     def _parameter(self, arc: np.ndarray) -> np.ndarray:
@@ -154,10 +163,10 @@ class Cubic:
         )
         low = self._reached[index]
         begin = index * self._panel
-        whole = np.maximum(self._reached[index + 1] - low, 1e-12)
+        whole = np.maximum(self._reached[index + 1] - low, _LEAST_PANEL)
         size = (arc - low) / whole * self._panel
         for _ in range(_NEWTON_STEPS):
-            speed = np.maximum(self._speed(begin + size), 1e-9)
+            speed = np.maximum(self._speed(begin + size), _LEAST_SPEED)
             size = size - (self._arc(begin, size) - (arc - low)) / speed
             size = np.clip(size, -self._panel, 2.0 * self._panel)
         return begin + size

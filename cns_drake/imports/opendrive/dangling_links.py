@@ -16,8 +16,10 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
     Objects are roads, lanes and junctions. `top` is the root element of the
     file.
     """
-    roads = {one.attrib.get("id", ""): one for one in top.all("road")}
-    junctions = {one.attrib.get("id", "") for one in top.all("junction")}
+    roads = {road.attrib.get("id", ""): road for road in top.all("road")}
+    junctions = {
+        junction.attrib.get("id", "") for junction in top.all("junction")
+    }
     for name, road in roads.items():
         own = road.attrib.get("junction", "-1")
         if own not in ("-1", "") and own not in junctions:
@@ -55,10 +57,10 @@ def _dangling_lane_links(
     road: Element, roads: Mapping[str, Element]
 ) -> Iterator[Element]:
     """Yields the links of a road's lanes to lanes that do not exist."""
-    own = _lane_sections(road)
-    for k, section in enumerate(own):
+    sections = _lane_sections(road)
+    for number, section in enumerate(sections):
         for end in _ENDS:
-            beyond = _lanes_beyond(road, own, k, end, roads)
+            beyond = _lanes_beyond(road, sections, number, end, roads)
             if beyond is None:
                 continue
             for lane in _section_lanes(section):
@@ -69,8 +71,8 @@ def _dangling_lane_links(
 
 def _lanes_beyond(
     road: Element,
-    own: Sequence[Element],
-    k: int,
+    sections: Sequence[Element],
+    number: int,
     end: str,
     roads: Mapping[str, Element],
 ) -> set[str | None] | None:
@@ -78,8 +80,8 @@ def _lanes_beyond(
 
     Args:
         road: the road.
-        own: the road's lane sections, in their order along the road.
-        k: index of the section.
+        sections: the road's lane sections, in their order along the road.
+        number: index of the section.
         end: `predecessor` or `successor`.
         roads: name of a road -> the road.
 
@@ -88,13 +90,13 @@ def _lanes_beyond(
         known road follows.
     """
     step = 1 if end == "successor" else -1
-    at = k + step
-    if 0 <= at < len(own):
-        beside = [own[at]]
-        # One side of a road may continue through others.
-        while is_single_sided(own[at]) and 0 < at < len(own) - 1:
+    at = number + step
+    if 0 <= at < len(sections):
+        beside = [sections[at]]
+        # One side of a road may continue through sections of the other side.
+        while is_single_sided(sections[at]) and 0 < at < len(sections) - 1:
             at += step
-            beside.append(own[at])
+            beside.append(sections[at])
     else:
         kind, linked = _link_at(road, end)
         if kind != "road" or linked is None or linked not in roads:
@@ -103,14 +105,16 @@ def _lanes_beyond(
         others = _lane_sections(roads[linked])
         beside = others[:1] + others[-1:]
     return {
-        lane.attrib.get("id") for one in beside for lane in _section_lanes(one)
+        lane.attrib.get("id")
+        for section in beside
+        for lane in _section_lanes(section)
     }
 
 
 def _lane_sections(road: Element) -> list[Element]:
     """Returns the sections of a road's lanes, sorted along the road."""
-    found = list(road.all("lanes", "laneSection"))
-    return sorted(found, key=lambda section: section.number("s", 0.0))
+    sections = road.all("lanes", "laneSection")
+    return sorted(sections, key=lambda section: section.number("s", 0.0))
 
 
 def _section_lanes(section: Element) -> Iterator[Element]:

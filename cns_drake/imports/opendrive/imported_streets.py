@@ -1,7 +1,7 @@
 """The areas of imported streets, along which a city is built."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +23,7 @@ _SIMPLIFY = 0.005
 # Ground that lanes enclose beside a junction belongs to it up to this area
 # [m^2]; larger ground is an island.
 _LARGEST_GAP = 60.0
-# Classes of lanes at road level.
+# Classes of lanes at road level. Where lanes overlap, the first class counts.
 _LEVEL_CLASSES = ("road", "parking", "sidewalk", "other-ground")
 # Lanes with less area are left out [m^2].
 _LEAST_AREA = 1e-6
@@ -51,34 +51,23 @@ class ImportedStreets:
         self, bands: Sequence[LaneBand], kerbless: BaseGeometry = _NOWHERE
     ):
         """Finds the areas of lanes; `kerbless` is an area without kerbs [m]."""
-        alike, in_junctions = _areas_by_kind(bands)
+        by_kind, in_junctions = _areas_by_kind(bands)
         junctions = shapely.union_all(in_junctions)
-        islands = shapely.union_all([*alike["median"], *alike["walk"]])
-        level = [one for kind in _LEVEL_CLASSES for one in alike[kind]]
-        gaps = [
-            gap
-            for gap in _enclosed_gaps(shapely.union_all(level))
-            if gap.intersects(junctions) and not gap.intersects(islands)
-        ]
-        road = _simplified(union_without_slits([*alike["road"], *gaps], _SEAM))
-        parking = _simplified(
-            shapely.union_all(alike["parking"]).difference(road)
+        gaps = _gaps_in_junctions(by_kind, junctions)
+        road = _simplified(
+            union_without_slits([*by_kind["road"], *gaps], _SEAM)
         )
-        paved = road.union(parking)
-        path = _simplified(
-            shapely.union_all(alike["sidewalk"]).difference(paved)
+        parking, path, other = _areas_beside(
+            road, [by_kind[kind] for kind in _LEVEL_CLASSES[1:]]
         )
-        paved = paved.union(path)
-        other = _simplified(
-            shapely.union_all(alike["other-ground"]).difference(paved)
-        )
+        paved = road.union(parking).union(path)
         whole = _simplified(union_without_slits([paved, other], _SEAM))
         tapers = kerb_tapers(whole)
         whole = _simplified(union_without_slits([whole, *tapers], _SEAM))
         carriageway = _cut_at_tiles(_without_slivers(whole))
-        medians = _simplified(shapely.union_all(alike["median"]))
+        medians = _simplified(shapely.union_all(by_kind["median"]))
         medians = _without_slivers(medians.difference(carriageway))
-        walks = _simplified(shapely.union_all(alike["walk"]))
+        walks = _simplified(shapely.union_all(by_kind["walk"]))
         taken = carriageway.union(medians)
         # A carriageway without a sidewalk, as in junctions, has a kerb that
         # takes ground, too.
@@ -95,7 +84,7 @@ class ImportedStreets:
             Covering("islands", "other-ground", snap(other), _ISLAND_RGB),
         ]
         taken = taken.union(sidewalks)
-        margins = shapely.union_all(alike["margins"]).difference(taken)
+        margins = shapely.union_all(by_kind["margins"]).difference(taken)
         self.margins = _without_slivers(snap(margins))
 
 
@@ -107,7 +96,7 @@ def _areas_by_kind(
     The kinds are the semantic classes of lanes at road level, `walk` and
     `median` for lanes above a kerb, and `margins` for lanes without a use.
     """
-    alike: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
+    by_kind: defaultdict[str, list[BaseGeometry]] = defaultdict(list)
     in_junctions: list[BaseGeometry] = []
     for band in bands:
         area = lane_polygon(band)
@@ -115,15 +104,43 @@ def _areas_by_kind(
             continue
         kind = lane_class(band.kind)
         if kind is None:
-            alike["margins"].append(area)
+            by_kind["margins"].append(area)
             continue
         raised = is_raised(band.kind, band.lane.height)
         if raised:
             kind = "median" if band.kind == "median" else "walk"
-        alike[kind].append(area)
+        by_kind[kind].append(area)
         if band.road.junction is not None and not raised:
             in_junctions.append(area)
-    return alike, in_junctions
+    return by_kind, in_junctions
+
+
+def _gaps_in_junctions(
+    by_kind: Mapping[str, Sequence[BaseGeometry]], junctions: BaseGeometry
+) -> list[Polygon]:
+    """Returns the ground that lanes enclose in junctions, without islands.
+
+    `by_kind` contains areas as in `_areas_by_kind`, and `junctions` is the area
+    of all junctions in W [m].
+    """
+    islands = shapely.union_all([*by_kind["median"], *by_kind["walk"]])
+    level = [area for kind in _LEVEL_CLASSES for area in by_kind[kind]]
+    return [
+        gap
+        for gap in _enclosed_gaps(shapely.union_all(level))
+        if gap.intersects(junctions) and not gap.intersects(islands)
+    ]
+
+
+def _areas_beside(
+    road: BaseGeometry, areas_of_kinds: Iterable[Sequence[BaseGeometry]]
+) -> Iterator[BaseGeometry]:
+    """Yields the area of each kind, outside the road and the kinds before."""
+    paved = road
+    for areas in areas_of_kinds:
+        area = _simplified(shapely.union_all(areas).difference(paved))
+        yield area
+        paved = paved.union(area)
 
 
 def lane_polygon(band: LaneBand) -> BaseGeometry:
@@ -135,10 +152,12 @@ def lane_polygon(band: LaneBand) -> BaseGeometry:
     # In a bend tighter than the width of the lane, its edge folds over.
     corners = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
     pieces = [
-        shapely.make_valid(Polygon(four), method="structure")
-        for four in corners
+        shapely.make_valid(Polygon(quad), method="structure")
+        for quad in corners
     ]
-    return shapely.union_all([p for p in pieces if p.area > _LEAST_AREA])
+    return shapely.union_all(
+        [piece for piece in pieces if piece.area > _LEAST_AREA]
+    )
 
 
 def _enclosed_gaps(lanes: BaseGeometry) -> list[Polygon]:
@@ -167,22 +186,25 @@ def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
     """
 
     def cut(ring: LinearRing) -> np.ndarray:
-        xy = shapely.get_coordinates(ring)
+        corners = shapely.get_coordinates(ring)
         pieces = []
-        for a, b in pairwise(xy):
+        for a, b in pairwise(corners):
             low, high = np.sort([a, b], axis=0)
-            parts = [0.0]
-            for k in range(2):
-                lines = np.arange(np.ceil(low[k] / TILE) * TILE, high[k], TILE)
-                parts += ((lines - a[k]) / (b[k] - a[k])).tolist()
-            pieces.append(a + np.unique(parts)[:, None] * (b - a))
-        return np.concatenate([*pieces, xy[-1:]])
+            shares = [0.0]
+            for axis in range(2):
+                first = np.ceil(low[axis] / TILE) * TILE
+                lines = np.arange(first, high[axis], TILE)
+                shares += ((lines - a[axis]) / (b[axis] - a[axis])).tolist()
+            pieces.append(a + np.unique(shares)[:, None] * (b - a))
+        return np.concatenate([*pieces, corners[-1:]])
 
-    cut_open = [
-        Polygon(cut(one.exterior), [cut(hole) for hole in one.interiors])
-        for one in area.geoms
+    polygons = [
+        Polygon(
+            cut(polygon.exterior), [cut(hole) for hole in polygon.interiors]
+        )
+        for polygon in area.geoms
     ]
-    return _without_slivers(snap(MultiPolygon(cut_open)))
+    return _without_slivers(snap(MultiPolygon(polygons)))
 
 
 def _without_slivers(area: BaseGeometry) -> MultiPolygon:

@@ -30,6 +30,8 @@ _LONGEST_TAPER = 6.0
 _SPACING = 0.25
 # Corners this close to a straight edge are dropped [m].
 _CORNER_TOLERANCE = 0.005
+# A taper may be longer than allowed by a rounding error [m].
+_ROUNDING = 1e-6
 
 
 def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
@@ -38,18 +40,19 @@ def kerb_tapers(carriageway: BaseGeometry) -> list[Polygon]:
     `carriageway` is the area of the carriageway in W. The tapers lie outside of
     the carriageway.
     """
-    found: list[Polygon] = []
+    mirror = np.array([-1.0, 1.0])
+    tapers: list[Polygon] = []
     for polygon in polygons_of(carriageway):
         polygon = shapely.orient_polygons(polygon)
         for ring in (polygon.exterior, *polygon.interiors):
             simple = LinearRing(ring).simplify(_CORNER_TOLERANCE)
             xy = shapely.get_coordinates(simple)[:-1]
-            found += map(Polygon, _tapers(xy))
+            tapers += map(Polygon, _tapers(xy))
             # Reversed and mirrored, the ring has the carriageway on its left
-            # again.
-            mirror = np.array([-1.0, 1.0])
-            found += (Polygon(a * mirror) for a in _tapers(xy[::-1] * mirror))
-    return found
+            # again, and its steps to the right are steps to the left.
+            mirrored = _tapers(xy[::-1] * mirror)
+            tapers += (Polygon(corners * mirror) for corners in mirrored)
+    return tapers
 
 
 def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
@@ -79,13 +82,15 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         reach = np.hypot(*np.diff(straight, axis=0).T).sum()
         if reach < _KERB_BEFORE or len(chain) < 2:
             continue
-        within = min(_LONGEST_TAPER, _TAPER_RATIO * aside)
+        longest = min(_LONGEST_TAPER, _TAPER_RATIO * aside)
         dense = shapely.get_coordinates(
             shapely.segmentize(shapely.linestrings(chain), _SPACING)
         )
         away = dense - xy[k]
         along, left = away @ ahead, away @ [-ahead[1], ahead[0]]
-        reached = np.flatnonzero((along > _SPACING) & (along < within + 1e-6))
+        reached = np.flatnonzero(
+            (along > _SPACING) & (along < longest + _ROUNDING)
+        )
         if not len(reached):
             continue
         # The taper touches the kerb at the place that is farthest to the right

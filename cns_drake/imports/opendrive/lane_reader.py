@@ -1,6 +1,7 @@
 """Reads lanes, section by section, from an OpenDRIVE file."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from cns_drake.base.xml_elements import Element
 from cns_drake.imports.faults import ImportFaults
@@ -12,6 +13,14 @@ from cns_drake.imports.opendrive.mark_reader import read_marks
 _WIDEST_LANE = 100.0
 # Greatest height of a kerb [m].
 _HIGHEST_LANE = 1.0
+
+
+class _HeightStep(NamedTuple):
+    """Heights of a lane's edges above the road from a distance `s` on [m]."""
+
+    s: float
+    inner: float
+    outer: float
 
 
 def read_cubics(
@@ -26,10 +35,10 @@ def read_cubics(
     return road_model.Cubics(
         [
             (
-                one.number(start, 0.0) + offset,
-                *(one.number(k, 0.0) for k in "abcd"),
+                element.number(start, 0.0) + offset,
+                *(element.number(coefficient, 0.0) for coefficient in "abcd"),
             )
-            for one in elements
+            for element in elements
         ]
     )
 
@@ -57,39 +66,61 @@ def read_sections(
         ValueError: a lane is impossible; the message names its line.
     """
     elements = list(road.all("lanes", "laneSection"))
-    elements.sort(key=lambda one: one.number("s"))
-    starts = [one.number("s") for one in elements]
+    elements.sort(key=lambda element: element.number("s"))
+    starts = [element.number("s") for element in elements]
     ends = [*starts[1:], length][: len(starts)]
-    found = []
+    sections = []
     before: dict[int, road_model.Lane] = {}
-    for one, start, end in zip(elements, starts, ends, strict=True):
+    for element, start, end in zip(elements, starts, ends, strict=True):
         start, end = max(start, 0.0), min(end, length)
         if end - start < SHORTEST_PIECE:
             continue
-        lanes: dict[int, road_model.Lane] = {}
-        for side in ("left", "right"):
-            for element in one.all(side, "lane"):
-                lane = _read_lane(element, start, name, faults)
-                if lane.number == 0:
-                    continue
-                if lane.number in lanes:
-                    raise ValueError(
-                        f"line {element.line}: lane {lane.number}: duplicate"
-                        " id, that of a lane before it"
-                    )
-                lanes[lane.number] = lane
-        middle = [
+        lanes = _read_lanes(element, start, name, faults)
+        middle_marks = tuple(
             mark
-            for element in one.all("center", "lane")
-            for mark in read_marks(element, start, name, faults)
-        ]
-        if is_single_sided(one):
+            for lane in element.all("center", "lane")
+            for mark in read_marks(lane, start, name, faults)
+        )
+        if is_single_sided(element):
             # The lanes of the other side continue.
             sides = {number > 0 for number in lanes}
-            lanes |= {k: v for k, v in before.items() if (k > 0) not in sides}
+            lanes |= {
+                number: lane
+                for number, lane in before.items()
+                if (number > 0) not in sides
+            }
         before = lanes
-        found.append(road_model.LaneSection(start, end, lanes, tuple(middle)))
-    return found
+        sections.append(road_model.LaneSection(start, end, lanes, middle_marks))
+    return sections
+
+
+def _read_lanes(
+    section: Element, start: float, name: str, faults: ImportFaults
+) -> dict[int, road_model.Lane]:
+    """Returns the lanes of a section by their number, without lane 0.
+
+    Args:
+        section: the section in the file.
+        start: distance along the road at which the section begins [m].
+        name: name of the road, as an example in `faults`.
+        faults: counts lanes and marks that are changed.
+
+    Raises:
+        ValueError: a lane is impossible; the message names its line.
+    """
+    lanes: dict[int, road_model.Lane] = {}
+    for side in ("left", "right"):
+        for element in section.all(side, "lane"):
+            lane = _read_lane(element, start, name, faults)
+            if lane.number == 0:
+                continue
+            if lane.number in lanes:
+                raise ValueError(
+                    f"line {element.line}: lane {lane.number}: duplicate id,"
+                    " that of a lane before it"
+                )
+            lanes[lane.number] = lane
+    return lanes
 
 
 def is_single_sided(section: Element) -> bool:
@@ -103,21 +134,24 @@ def is_single_sided(section: Element) -> bool:
 def _read_lane(
     element: Element, start: float, name: str, faults: ImportFaults
 ) -> road_model.Lane:
+    """Returns a lane of the file; the arguments are as for `_read_lanes`."""
     number = element.number("id")
     if number != int(number):
         raise ValueError(
             f"line {element.line}: lane: id: {number} is not a valid id"
         )
     heights = sorted(
-        (
-            one.number("sOffset", 0.0) + start,
-            one.number("inner", 0.0),
-            one.number("outer", one.number("inner", 0.0)),
+        _HeightStep(
+            height.number("sOffset", 0.0) + start,
+            height.number("inner", 0.0),
+            height.number("outer", height.number("inner", 0.0)),
         )
-        for one in element.all("height")
+        for height in element.all("height")
     )
     if any(
-        abs(value) > _HIGHEST_LANE for _, *both in heights for value in both
+        abs(height) > _HIGHEST_LANE
+        for step in heights
+        for height in (step.inner, step.outer)
     ):
         faults.add("lane more than 1 m above its road, laid on it", name)
         heights = []
@@ -127,19 +161,19 @@ def _read_lane(
         kind=element.value("type", "none"),
         width=read_cubics(element.all("width"), "sOffset", start),
         border=read_cubics(element.all("border"), "sOffset", start),
-        height=max((inner for _, inner, _ in heights), default=0.0),
+        height=max((step.inner for step in heights), default=0.0),
         marks=tuple(read_marks(element, start, name, faults)),
-        inner_height=step_function((s, inner) for s, inner, _ in heights),
-        outer_height=step_function((s, outer) for s, _, outer in heights),
+        inner_height=step_function((one.s, one.inner) for one in heights),
+        outer_height=step_function((one.s, one.outer) for one in heights),
         is_level=element.value("level", "false").lower() in ("true", "1"),
         is_reversed=direction == "reversed",
     )
     if direction not in ("standard", "reversed"):
         faults.add(f"lane with traffic in direction {direction}", name)
-    for one in (*element.all("width"), *element.all("border")):
-        if abs(one.number("a", 0.0)) > _WIDEST_LANE:
+    for width in (*element.all("width"), *element.all("border")):
+        if abs(width.number("a", 0.0)) > _WIDEST_LANE:
             raise ValueError(
-                f"line {one.line}: lane {lane.number}: {one.tag}: "
-                f"{one.number('a'):g} m is more than {_WIDEST_LANE:g} m"
+                f"line {width.line}: lane {lane.number}: {width.tag}: "
+                f"{width.number('a'):g} m is more than {_WIDEST_LANE:g} m"
             )
     return lane

@@ -43,22 +43,22 @@ def lane_text_of_bands(
     joined = join_lanes(lanes, graph.followers)
     if not joined.pieces:
         return None
-    walks = [band for band in bands if band.lane.kind in _SIDEWALKS]
-    return lane_text(joined, _walkways(walks, kerbs))
+    sidewalks = [band for band in bands if band.lane.kind in _SIDEWALKS]
+    return lane_text(joined, _walkways(sidewalks, kerbs))
 
 
 def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
     """Returns a walkway for each sidewalk; pedestrians turn at its ends."""
-    found: list[Walkway] = []
+    walkways: list[Walkway] = []
     for band in bands:
         half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
         steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
         if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST_WALKWAY:
             continue
-        first = 2 * len(found)
+        first = 2 * len(walkways)
         kerb = kerbs(band.middle[:, :2])
         points = resampled(
             np.column_stack([band.middle[:, :2], band.middle[:, 2] + kerb])
         )
-        found.append(Walkway(points, half, first, first + 1))
-    return found
+        walkways.append(Walkway(points, half, first, first + 1))
+    return walkways

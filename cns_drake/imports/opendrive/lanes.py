@@ -3,7 +3,7 @@
 Edges are sampled densely enough for simulated LiDARs.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 import math
@@ -39,8 +39,10 @@ _MOST_STATIONS = 200_000
 _FARTHEST_LANE = 50_000.0
 # No lane is farther above or below the origin of W than this [m].
 _HIGHEST_LANE = 10_000.0
-# Distances along the road that differ by less than this are the same [m].
+# Places on both sides of a joint are this far from it [m].
 _JOINT_TOLERANCE = 1e-6
+# Joints that are closer than this are one joint [m].
+_SAME_JOINT = 4.0 * _JOINT_TOLERANCE
 
 
 def lane_class(kind: str) -> str | None:
@@ -110,12 +112,14 @@ class LaneBand:
 def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle outwards.
 
+    The lanes on the left of a section come before the lanes on the right.
+
     Raises:
         ValueError: the road bends so often that too many sample points would be
             needed, or a lane leads out of the world. The message names the road
             and the fault.
     """
-    for k, section in enumerate(road.sections):
+    for index, section in enumerate(road.sections):
         s, inside = stations(
             road, section.start, section.end, _cubics_of(section)
         )
@@ -152,7 +156,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                 yield _at_own_height(
                     LaneBand(
                         road=road,
-                        section=k,
+                        section=index,
                         lane=lane,
                         kind=_kind_of(road, section, lane),
                         inner=inner,
@@ -178,10 +182,11 @@ def _across(
 
 
 def _edge_heights(lane: Lane, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Returns the heights (N, 2) of a lane's edges, as in `LaneBand.rise`."""
     if not lane.inner_height:
         return np.full((len(s), 2), np.nan)
-    both = lane.inner_height, lane.outer_height
-    return np.stack([one.at(s, inside) for one in both], axis=1)
+    edges = lane.inner_height, lane.outer_height
+    return np.stack([height.at(s, inside) for height in edges], axis=1)
 
 
 def _at_own_height(band: LaneBand) -> LaneBand:
@@ -219,6 +224,7 @@ def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
 
 
 def _kind_of(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
+    """Returns the type of a lane, as in `LaneBand.kind`."""
     if lane.kind != "none" or road.junction is not None:
         return lane.kind
     beyond = [
@@ -231,10 +237,11 @@ def _kind_of(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
 
 
 def _cubics_of(section: LaneSection) -> list[Cubics]:
+    """Returns the functions along the road that shape a section's lanes."""
     return [
-        one
+        cubics
         for lane in section.lanes.values()
-        for one in (lane.width, lane.border, lane.inner_height)
+        for cubics in (lane.width, lane.border, lane.inner_height)
     ]
 
 
@@ -263,37 +270,22 @@ def stations(
     Raises:
         ValueError: there are too many sample points.
     """
-    cubics: list[Cubics] = [
+    functions = [
         road.elevation,
         road.superelevation,
         road.lane_offset,
         *more,
     ]
-    joints = np.concatenate(
-        [
-            [start, end],
-            [piece.s for piece in road.pieces],
-            *(one.starts for one in cubics),
-        ]
-    )
-    joints = np.unique(np.clip(joints, start, end))
-    between = joints[
-        (joints > start + 4.0 * _JOINT_TOLERANCE)
-        & (joints < end - 4.0 * _JOINT_TOLERANCE)
-    ]
-    between = between[
-        np.diff(between, prepend=-math.inf) > 4.0 * _JOINT_TOLERANCE
-    ]
-    ends = np.concatenate([[start], between, [end]])
     starts = np.array([piece.s for piece in road.pieces])
     places, inside = [], []
     total = 0
-    for a, b in pairwise(ends):
+    for a, b in pairwise(_joints(road, start, end, functions)):
         piece = int(np.searchsorted(starts, a + _JOINT_TOLERANCE, "right")) - 1
         sharpest = road.pieces[max(0, piece)].shape.sharpest
-        bend = max(sharpest, *(one.bend(a, b) for one in cubics))
+        bend = max(sharpest, *(one.bend(a, b) for one in functions))
         step = _SPACING
         if bend > 0.0:
+            # A chord of this length is at most `SAG` from an arc.
             step = min(step, math.sqrt(8.0 * SAG / bend))
         number = math.ceil((b - a) / step) + 1
         total += number
@@ -303,3 +295,26 @@ def stations(
         places.append(s)
         inside.append(np.clip(s, a + _JOINT_TOLERANCE, b - _JOINT_TOLERANCE))
     return np.concatenate(places), np.concatenate(inside)
+
+
+def _joints(
+    road: ImportedRoad, start: float, end: float, functions: Iterable[Cubics]
+) -> np.ndarray:
+    """Returns the joints of a road's pieces and of functions along the road.
+
+    The result is increasing distances (N,) along the road from `start` to
+    `end`, including both [m].
+    """
+    joints = np.concatenate(
+        [
+            [start, end],
+            [piece.s for piece in road.pieces],
+            *(function.starts for function in functions),
+        ]
+    )
+    joints = np.unique(np.clip(joints, start, end))
+    between = joints[
+        (joints > start + _SAME_JOINT) & (joints < end - _SAME_JOINT)
+    ]
+    between = between[np.diff(between, prepend=-math.inf) > _SAME_JOINT]
+    return np.concatenate([[start], between, [end]])

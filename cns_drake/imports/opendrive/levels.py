@@ -52,7 +52,8 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
 
     The result maps the name of a road to increasing distances along it [m].
     """
-    number_of = {band.road.name: k for k, band in enumerate(bands)}
+    # Roads are numbered by one of their bands.
+    number_of = {band.road.name: number for number, band in enumerate(bands)}
     rows = [np.zeros((0, 5))]
     for band in bands:
         wide = band.width > LEAST_WIDTH
@@ -65,22 +66,26 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     if len(places) == 0 or np.ptp(z) < _HEADROOM:
         return {}
     tree = cKDTree(xy)
-    found: dict[str, list[float]] = {}
+    raised: dict[str, list[float]] = {}
     high = np.flatnonzero(z > z.min() + _HEADROOM)
-    for k, near in zip(
+    for place, near in zip(
         high, tree.query_ball_point(xy[high], _ABOVE_WITHIN), strict=True
     ):
-        below = z[near] < z[k] - _HEADROOM
-        if (below & (number[near] != number[k])).any():
-            road = bands[int(number[k])].road.name
-            found.setdefault(road, []).append(float(s[k]))
-    return {road: np.unique(some) for road, some in found.items()}
+        is_below = z[near] < z[place] - _HEADROOM
+        if (is_below & (number[near] != number[place])).any():
+            road = bands[int(number[place])].road.name
+            raised.setdefault(road, []).append(float(s[place]))
+    return {road: np.unique(along) for road, along in raised.items()}
 
 
 def _stretches_of_one_level(
     is_bridge: np.ndarray,
 ) -> Iterator[tuple[slice, bool]]:
-    """Yields stretches of one level; neighbouring stretches share a place."""
+    """Yields stretches of a lane with one level, and whether it is a bridge.
+
+    `is_bridge` (N,) says which places along the lane are on a bridge.
+    Neighbouring stretches share a place.
+    """
     starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
     for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
         last = min(b + 1, len(is_bridge))

@@ -6,6 +6,8 @@ from cns_drake.imports.opendrive import road_model
 
 # Width of a painted line without a plausible width [m].
 _MARK_WIDTH = 0.12
+# Bold lines without a width are this many times as wide.
+_BOLD = 2.0
 # Greatest plausible width of a painted line [m].
 _WIDEST_MARK = 1.0
 # Least distance between the starts of two dashes [m].
@@ -30,19 +32,19 @@ def read_marks(
         ValueError: a text is not a number; the error names its line.
     """
     marks = []
-    for one in lane.all("roadMark"):
-        stated = one.number("width", 0.0)
+    for element in lane.all("roadMark"):
+        stated = element.number("width", 0.0)
         width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
-        if one.value("weight", "standard") == "bold" and not stated:
-            width *= 2.0
-        lines = _read_mark_lines(one, width)
+        if element.value("weight", "standard") == "bold" and not stated:
+            width *= _BOLD
+        lines = _read_mark_lines(element, width)
         if lines is None:
             faults.add("road mark with impossible dashes, made usual", road)
         marks.append(
             road_model.RoadMark(
-                start + one.number("sOffset", 0.0),
-                one.value("type", "none"),
-                one.value("color", "standard"),
+                start + element.number("sOffset", 0.0),
+                element.value("type", "none"),
+                element.value("color", "standard"),
                 width,
                 tuple(lines or ()),
             )
@@ -58,16 +60,16 @@ def _read_mark_lines(
     A line without a plausible width has the usual width [m]. The result is None
     if a line has impossible lengths.
     """
-    found = []
-    for one in mark.all("type", "line"):
-        dash, gap = one.number("length", 0.0), one.number("space", 0.0)
+    lines = []
+    for line in mark.all("type", "line"):
+        dash, gap = line.number("length", 0.0), line.number("space", 0.0)
         # Programs write 0 for both in a line without gaps.
         if min(dash, gap) < 0.0 or (gap > 0.0 and dash == 0.0):
             return None
         if gap > 0.0 and dash + gap < _CLOSEST_DASHES:
             return None
-        stated = one.number("width", 0.0)
-        aside, start = one.number("tOffset", 0.0), one.number("sOffset", 0.0)
+        stated = line.number("width", 0.0)
+        aside, start = line.number("tOffset", 0.0), line.number("sOffset", 0.0)
         width = stated if 0.0 < stated <= _WIDEST_MARK else usual
-        found.append(road_model.MarkLine(aside, start, dash, gap, width))
-    return found
+        lines.append(road_model.MarkLine(aside, start, dash, gap, width))
+    return lines

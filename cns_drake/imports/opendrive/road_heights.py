@@ -63,11 +63,13 @@ class RoadHeights:
         """Returns the heights (N,) at places (N, 2) [m]."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
         blocks = [
-            self._block(xy[k : k + _BLOCK]) for k in range(0, len(xy), _BLOCK)
+            self._heights_of_block(xy[first : first + _BLOCK])
+            for first in range(0, len(xy), _BLOCK)
         ]
         return np.concatenate([np.zeros(0), *blocks])
 
-    def _block(self, xy: np.ndarray) -> np.ndarray:
+    def _heights_of_block(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the heights (N,) at places (N, 2), all at a time [m]."""
         count = min(_NEIGHBOURS, len(self._p))
         distance, index = self._tree.query(xy, k=count)
         distance, index = distance.reshape(-1, count), index.reshape(-1, count)
@@ -100,9 +102,9 @@ class KerbHeights:
             if is_raised(band.kind, band.lane.height):
                 rise = np.nan_to_num(band.rise, nan=usual)
                 edges = [band.inner[:, :2], band.outer[:, :2], rise]
-                own = _interpolated(band, np.column_stack(edges))
-                wide = np.linalg.norm(own[:, :2] - own[:, 2:4], axis=1)
-                rows.append(own[wide > LEAST_WIDTH])
+                places = _interpolated(band, np.column_stack(edges))
+                widths = np.linalg.norm(places[:, :2] - places[:, 2:4], axis=1)
+                rows.append(places[widths > LEAST_WIDTH])
         places = np.concatenate(rows)
         self._inner, self._outer, self._rise = np.split(places, 3, axis=1)
         self._tree = cKDTree((self._inner + self._outer) / 2.0)
@@ -110,14 +112,15 @@ class KerbHeights:
 
     def __call__(self, xy: np.ndarray) -> np.ndarray:
         """Returns the heights (N,) at places (N, 2) [m]."""
-        distance, k = self._tree.query(xy)
-        across = self._outer[k] - self._inner[k]
+        distance, nearest = self._tree.query(xy)
+        inner = self._inner[nearest]
+        across = self._outer[nearest] - inner
         width2 = (across**2).sum(axis=1)
-        part = ((xy - self._inner[k]) * across).sum(axis=1) / width2
-        low, high = self._rise[k].T
-        own = low + np.clip(part, 0.0, 1.0) * (high - low)
-        near = distance < np.sqrt(width2) / 2.0 + _BESIDE
-        return np.where(near, own, self.usual)
+        share = ((xy - inner) * across).sum(axis=1) / width2
+        at_inner, at_outer = self._rise[nearest].T
+        own = at_inner + np.clip(share, 0.0, 1.0) * (at_outer - at_inner)
+        is_beside = distance < np.sqrt(width2) / 2.0 + _BESIDE
+        return np.where(is_beside, own, self.usual)
 
 
 def _middle_places(band: LaneBand) -> np.ndarray:
@@ -129,7 +132,10 @@ def _middle_places(band: LaneBand) -> np.ndarray:
 
 
 def _interpolated(band: LaneBand, rows: np.ndarray) -> np.ndarray:
-    """Returns values (N, K) of a lane, interpolated between its stations."""
+    """Returns values of a lane at places about 0.5 m apart, (N, K).
+
+    `rows` (M, K) contains the values at the lane's M stations.
+    """
     # Both sides of a joint stay, with a stretch of no length between them.
     steps = np.diff(band.s)
     counts = np.maximum(np.ceil(steps / _PLACE_SPACING).astype(int), 1)

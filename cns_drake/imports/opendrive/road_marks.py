@@ -24,6 +24,8 @@ from cns_drake.imports.imported_objects import make_object
 from cns_drake.imports.opendrive.lanes import LaneBand
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
 
+# The end moves inwards by at most this share of the border's last piece.
+_MOST_INWARDS = 0.5
 # The edges of carriageways and of lanes differ by less than this, which is also
 # the distance of lines from a kerb [m].
 _SLACK = 0.02
@@ -77,7 +79,8 @@ def _moved_off_kerbs(
     # A kerb may cross the border right at its end.
     for end, beside in ((0, 1), (-1, -2)):
         step = xy[beside] - xy[end]
-        xy[end] += step * min(0.5, _INWARDS / max(np.hypot(*step), _INWARDS))
+        share = _INWARDS / max(np.hypot(*step), _INWARDS)
+        xy[end] += step * min(_MOST_INWARDS, share)
     on_left, on_right = (
         shapely.contains_xy(carriageway, *(xy + out * left).T)
         for out in (reach[0] - _SLACK, _SLACK - reach[1])
@@ -108,21 +111,20 @@ def _on_carriageway(quads: np.ndarray, carriageway: BaseGeometry) -> np.ndarray:
     """
     outlines = np.asarray(shapely.polygons(quads[..., :2]))
     inside = shapely.contains_properly(carriageway, outlines)
-    found = [_as_triangles(quads[inside])]
-    rest = quads[~inside]
-    outlines = outlines[~inside]
-    squares = np.floor(rest[:, 0, :2] / _SQUARE).astype(int)
+    triangles = [_as_triangles(quads[inside])]
+    cut, outlines = quads[~inside], outlines[~inside]
+    squares = np.floor(cut[:, 0, :2] / _SQUARE).astype(int)
     for square in np.unique(squares, axis=0):
-        chosen = np.flatnonzero((squares == square).all(axis=1))
-        near = shapely.box(*shapely.total_bounds(outlines[chosen]))
-        ground = shapely.intersection(carriageway, near)
-        pieces = shapely.intersection(outlines[chosen], ground, grid_size=GRID)
-        for quad, piece in zip(rest[chosen], pieces, strict=True):
-            found += [
+        in_square = np.flatnonzero((squares == square).all(axis=1))
+        bounds = shapely.box(*shapely.total_bounds(outlines[in_square]))
+        near = shapely.intersection(carriageway, bounds)
+        pieces = shapely.intersection(outlines[in_square], near, grid_size=GRID)
+        for quad, piece in zip(cut[in_square], pieces, strict=True):
+            triangles += [
                 _at_quad_heights(np.array(triangulate(part)), quad)
                 for part in parts_of(piece)
             ]
-    return np.concatenate(found)
+    return np.concatenate(triangles)
 
 
 def _at_quad_heights(flat: np.ndarray, quad: np.ndarray) -> np.ndarray:
@@ -157,6 +159,32 @@ def road_marks(
     """
     if carriageway is not None:
         shapely.prepare(carriageway)
+    for road, colours in _quads_by_road(bands, carriageway).items():
+        surfaces = {
+            colour: triangles
+            for colour, quads in colours.items()
+            if len(triangles := _laid(quads, heights, carriageway))
+        }
+        if surfaces:
+            yield make_object(
+                f"{prefix}_{road}",
+                "road",
+                "Road mark",
+                surfaces,
+                {
+                    colour: Finish(_COLOURS[colour], "markings")
+                    for colour in surfaces
+                },
+            ).structure
+
+
+def _quads_by_road(
+    bands: Sequence[LaneBand], carriageway: BaseGeometry | None
+) -> dict[str, dict[str, np.ndarray]]:
+    """Returns the marks of each road, by colour, as quads (K, 4, 3) [m].
+
+    The arguments are as for `road_marks`.
+    """
     painted: dict[str, dict[str, list[np.ndarray]]] = defaultdict(
         lambda: defaultdict(list)
     )
@@ -177,33 +205,34 @@ def road_marks(
                 carriageway,
             ):
                 painted[band.road.name][colour].append(quads)
-    for road, colours in painted.items():
-        surfaces = {}
-        for colour, pieces in colours.items():
-            quads = np.concatenate(pieces)
-            if carriageway is None:
-                corners = _as_triangles(quads)
-            else:
-                corners = _on_carriageway(quads, carriageway)
-            z = corners[..., 2]
-            if heights is not None:
-                ground = heights(corners[..., :2].reshape(-1, 2))
-                z = np.maximum(z, ground.reshape(z.shape))
-            corners[..., 2] = z + _ABOVE
-            if len(corners):
-                surfaces[colour] = corners
-        if not surfaces:
-            continue
-        yield make_object(
-            f"{prefix}_{road}",
-            "road",
-            "Road mark",
-            surfaces,
-            {
-                colour: Finish(_COLOURS[colour], "markings")
-                for colour in surfaces
-            },
-        ).structure
+    return {
+        road: {
+            colour: np.concatenate(pieces) for colour, pieces in colours.items()
+        }
+        for road, colours in painted.items()
+    }
+
+
+def _laid(
+    quads: np.ndarray,
+    heights: Callable[[np.ndarray], np.ndarray] | None,
+    carriageway: BaseGeometry | None,
+) -> np.ndarray:
+    """Returns quads (K, 4, 3), laid on the road as triangles (M, 3, 3) [m].
+
+    The triangles are slightly above the road. The other arguments are as for
+    `road_marks`.
+    """
+    if carriageway is None:
+        triangles = _as_triangles(quads)
+    else:
+        triangles = _on_carriageway(quads, carriageway)
+    z = triangles[..., 2]
+    if heights is not None:
+        ground = heights(triangles[..., :2].reshape(-1, 2))
+        z = np.maximum(z, ground.reshape(z.shape))
+    triangles[..., 2] = z + _ABOVE
+    return triangles
 
 
 def _painted_quads(
@@ -227,7 +256,7 @@ def _painted_quads(
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
-    for mark, last in zip(marks, ends, strict=True):
+    for mark, end_of_mark in zip(marks, ends, strict=True):
         lines = _lines(mark, float(np.sign(side)))
         moved = np.zeros(len(s))
         if lines and carriageway is not None:
@@ -238,8 +267,8 @@ def _painted_quads(
             moved = _moved_off_kerbs(border, left, reach, carriageway)
         for line in lines:
             aside = left * (line.aside + moved)[:, None]
-            for a, b in _stretches(line, mark.start, last):
-                quads = _stripe(border, s, left, aside, (a, b), line.width)
+            for limits in _stretches(line, mark.start, end_of_mark):
+                quads = _stripe(border, s, left, aside, limits, line.width)
                 if len(quads):
                     known = mark.colour in _COLOURS
                     yield mark.colour if known else "standard", quads
@@ -285,14 +314,23 @@ def _stripe(
     limits: tuple[float, float],
     width: float,
 ) -> np.ndarray:
-    """Returns a stretch of a line as quads (K, 4, 3), seen from above [m]."""
+    """Returns a stretch of a line as quads (K, 4, 3), seen from above [m].
+
+    Args:
+        border: (N, 3) places on the border that the line follows [m].
+        s: (N,) distances of these places along the road [m].
+        left: (N, 2) unit vectors to the left of the border.
+        aside: (N, 2) vectors from the border to the middle of the line [m].
+        limits: distances along the road at both ends of the stretch [m].
+        width: width of the line [m].
+    """
     a, b = max(limits[0], s[0]), min(limits[1], s[-1])
     if b - a < _SHORTEST:
         return np.zeros((0, 4, 3))
     inside = s[(s > a + _SHORTEST) & (s < b - _SHORTEST)]
     at = np.concatenate([[a], np.unique(inside), [b]])
     values = np.column_stack([border, left, aside])
-    rows = np.stack([np.interp(at, s, some) for some in values.T], axis=1)
+    rows = np.stack([np.interp(at, s, value) for value in values.T], axis=1)
     middle = rows[:, :3].copy()
     middle[:, :2] += rows[:, 5:7]
     half = np.zeros_like(middle)

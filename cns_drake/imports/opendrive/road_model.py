@@ -40,19 +40,36 @@ class CoursePiece:
             s: (N,) distances along the road [m].
         """
         u, v, turn = self.shape.evaluate(s - self.s).T
-        c, sine = math.cos(self.heading), math.sin(self.heading)
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
         return np.stack(
             [
-                self.x + c * u - sine * v,
-                self.y + sine * u + c * v,
+                self.x + cosine * u - sine * v,
+                self.y + sine * u + cosine * v,
                 self.heading + turn,
             ],
             axis=1,
         )
 
 
+class _CubicPieces(NamedTuple):
+    """The cubic piece at each of N distances along a road.
+
+    Attributes:
+        is_there: (N,) bool: whether there is a piece.
+        ds: (N,) distance from the start of the piece [m].
+        coefficients: (N, 4) coefficients, beginning with that of ds^0.
+    """
+
+    is_there: np.ndarray
+    ds: np.ndarray
+    coefficients: np.ndarray
+
+
 class Cubics:
-    """A piecewise cubic function of the distance along a road."""
+    """A piecewise cubic function of the distance along a road.
+
+    An object is false if it has no pieces.
+    """
 
     def __init__(self, rows: Sequence[Sequence[float]] = ()):
         """Takes rows: a piece's start and four coefficients, of ds^0 first."""
@@ -77,11 +94,11 @@ class Cubics:
                 used [m]. This is usually `s`. At a joint, a point before or
                 after `s` selects the piece before or after the joint.
         """
-        is_there, ds, coefficients = self._pieces_at(s, inside)
+        pieces = self._pieces_at(s, inside)
         value = np.zeros(len(s))
         for power in range(4):
-            value += coefficients[:, power] * ds**power
-        return np.where(is_there, value, 0.0)
+            value += pieces.coefficients[:, power] * pieces.ds**power
+        return np.where(pieces.is_there, value, 0.0)
 
     def slopes(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns the function's first derivatives (N,).
@@ -89,25 +106,21 @@ class Cubics:
         The derivatives are 0 before all pieces. `s` and `inside` are as in
         `at`.
         """
-        is_there, ds, coefficients = self._pieces_at(s, inside)
+        pieces = self._pieces_at(s, inside)
         value = np.zeros(len(s))
         for power in range(1, 4):
-            value += power * coefficients[:, power] * ds ** (power - 1)
-        return np.where(is_there, value, 0.0)
+            factor = power * pieces.coefficients[:, power]
+            value += factor * pieces.ds ** (power - 1)
+        return np.where(pieces.is_there, value, 0.0)
 
-    def _pieces_at(
-        self, s: np.ndarray, inside: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns which distances have a piece (N,), and these pieces.
-
-        A piece is given by the distance from its start to `s` (N,) [m], and by
-        its coefficients (N, 4), beginning with the coefficient of ds^0.
-        """
+    def _pieces_at(self, s: np.ndarray, inside: np.ndarray) -> _CubicPieces:
+        """Returns the piece at each distance; `s` and `inside` as in `at`."""
         if not self:
-            return np.zeros(len(s), bool), s, np.zeros((len(s), 4))
+            none = np.zeros(len(s), bool)
+            return _CubicPieces(none, s, np.zeros((len(s), 4)))
         index = np.searchsorted(self.starts, inside, side="right") - 1
         rows = self._table[np.maximum(index, 0)]
-        return index >= 0, s - rows[:, 0], rows[:, 1:]
+        return _CubicPieces(index >= 0, s - rows[:, 0], rows[:, 1:])
 
     def bend(self, start: float, end: float) -> float:
         """Returns the greatest absolute second derivative of the function.
@@ -315,9 +328,9 @@ class ImportedRoad:
         index = np.searchsorted(starts, inside, side="right") - 1
         index = np.maximum(index, 0)
         line = np.zeros((len(s), 3))
-        for k in np.unique(index):
-            chosen = index == k
-            line[chosen] = self.pieces[k].evaluate(s[chosen])
+        for number in np.unique(index):
+            on_piece = index == number
+            line[on_piece] = self.pieces[number].evaluate(s[on_piece])
         x, y, heading = line.T
         z = self.elevation.at(s, inside)
         roll = self.superelevation.at(s, inside)

@@ -5,7 +5,8 @@ roads, lanes and junctions. The import only reports, as faults, links to things
 that are not in the file.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
 import contextlib
 from dataclasses import replace
 import math
@@ -32,11 +33,12 @@ from cns_drake.imports.opendrive.lane_reader import (
 from cns_drake.imports.opendrive.thing_reader import read_things
 from cns_drake.imports.opendrive.unread import count_unread
 
+# Unit of a speed limit -> its size [m/s].
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
 # Greatest speed limit [m/s].
 _FASTEST = 100.0
 # Greatest extent of a network along x or y; whole countries are refused [m].
-_LARGEST = 20_000.0
+_WIDEST = 20_000.0
 # Greatest length of all roads of a network together [m].
 _MOST_TOGETHER = 2_000_000.0
 # If any road is farther from the origin than this, all are moved to it [m].
@@ -59,7 +61,6 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
     top = read_elements(path, "OpenDRIVE")
     roads: list[road_model.ImportedRoad] = []
     names: set[str] = set()
-    together = 0.0
     for kind in ("road", "junction"):
         with value_errors(path):
             _check_ids(top.all(kind))
@@ -70,35 +71,51 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             road = _read_road(element, name, faults)
         if road is not None:
             roads.append(road)
-            together += road.length
     if not roads:
         raise InputError(f"{path}: the file has no roads")
     count_dangling_links(top, faults)
     count_unread(top, faults, "the file")
-    if together > _MOST_TOGETHER:
-        raise InputError(
-            f"{path}: {together / 1000:.0f} km of roads; at most "
-            f"{_MOST_TOGETHER / 1000:.0f} km can be read"
-        )
-    ends = np.array([(p.x, p.y) for road in roads for p in road.pieces])
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    size = float((high - low).max())
-    if size > _LARGEST:
-        raise InputError(
-            f"{path}: {size / 1000:.0f} km across; cut out a piece of at most"
-            f" {_LARGEST / 1000:.0f} km"
-        )
-    x = y = 0.0
-    if np.abs(ends).max() > _FAR_AWAY:
-        x, y = np.round((low + high) / 2.0).tolist()
+    x, y = _origin_of(path, roads)
     reference = top.first("header", "geoReference")
+    system = "" if reference is None else reference.text or ""
     return road_model.RoadMap(
         tuple(_moved(road, x, y) for road in roads),
-        " ".join((reference.text or "").split())
-        if reference is not None
-        else "",
+        " ".join(system.split()),
         (x, y, 0.0),
     )
+
+
+def _origin_of(
+    path: Path, roads: Sequence[road_model.ImportedRoad]
+) -> tuple[float, float]:
+    """Returns the origin of W in coordinates of the file, x and y [m].
+
+    The origin is that of the file, or the middle of the network if the network
+    is far from the origin of the file.
+
+    Raises:
+        InputError: the network is too large; the message names the file `path`.
+    """
+    length = sum(road.length for road in roads)
+    if length > _MOST_TOGETHER:
+        raise InputError(
+            f"{path}: {length / 1000:.0f} km of roads; at most "
+            f"{_MOST_TOGETHER / 1000:.0f} km can be read"
+        )
+    starts = np.array(
+        [(piece.x, piece.y) for road in roads for piece in road.pieces]
+    )
+    low, high = starts.min(axis=0), starts.max(axis=0)
+    width = float((high - low).max())
+    if width > _WIDEST:
+        raise InputError(
+            f"{path}: {width / 1000:.0f} km across; cut out a piece of at most"
+            f" {_WIDEST / 1000:.0f} km"
+        )
+    if np.abs(starts).max() <= _FAR_AWAY:
+        return 0.0, 0.0
+    x, y = np.round((low + high) / 2.0).tolist()
+    return x, y
 
 
 def _check_ids(elements: Iterable[Element]) -> None:
@@ -109,19 +126,22 @@ def _check_ids(elements: Iterable[Element]) -> None:
             the lines.
     """
     lines: dict[str, int] = {}
-    for one in elements:
-        own = one.value("id", "")
-        if own in lines:
+    for element in elements:
+        own_id = element.value("id", "")
+        if own_id in lines:
             raise ValueError(
-                f"{one.tag} {_plain_name(own)}: line {one.line}: duplicate id,"
-                f" that of line {lines[own]}"
+                f"{element.tag} {_plain_name(own_id)}: line {element.line}:"
+                f" duplicate id, that of line {lines[own_id]}"
             )
-        lines[own] = one.line
+        lines[own_id] = element.line
 
 
-def _unique_name(own: str, taken: set[str]) -> str:
-    """Returns a new, unique name of letters, digits, dots and dashes."""
-    stem = _plain_name(own)
+def _unique_name(own_id: str, taken: AbstractSet[str]) -> str:
+    """Returns a name of letters, digits, dots and dashes, made from an id.
+
+    `taken` contains names that the result must not be.
+    """
+    stem = _plain_name(own_id)
     name = stem
     number = 1
     while name in taken:
@@ -130,14 +150,16 @@ def _unique_name(own: str, taken: set[str]) -> str:
     return name
 
 
-def _plain_name(own: str) -> str:
+def _plain_name(own_id: str) -> str:
     """Returns an id reduced to letters, digits, dots and dashes."""
-    return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
+    plain = re.sub(r"[^0-9A-Za-z.-]+", "-", own_id)
+    return plain[:_LONGEST_NAME] or "unnamed"
 
 
 def _moved(
     road: road_model.ImportedRoad, x: float, y: float
 ) -> road_model.ImportedRoad:
+    """Returns a road in a frame whose origin is at x and y [m]."""
     pieces = [replace(p, x=p.x - x, y=p.y - y) for p in road.pieces]
     return replace(road, pieces=tuple(pieces))
 
@@ -145,6 +167,16 @@ def _moved(
 def _read_road(
     element: Element, name: str, faults: ImportFaults
 ) -> road_model.ImportedRoad | None:
+    """Returns a road of the file; None for a road without course or lanes.
+
+    Args:
+        element: the road in the file.
+        name: unique name of the road.
+        faults: counts what is changed or left out.
+
+    Raises:
+        ValueError: the road is impossible; the message names the line.
+    """
     pieces = read_course(element.all("planView", "geometry"), name, faults)
     if not pieces:
         faults.add("road without a course, left out", name)
@@ -186,9 +218,9 @@ def _read_road(
         limits=step_function(_speed_limits(element, name, faults)),
         things=tuple(read_things(element, name, faults)),
         spans=tuple(
-            one.tag
+            span.tag
             for tag in ("bridge", "tunnel")
-            for one in element.all("objects", tag)
+            for span in element.all("objects", tag)
         ),
     )
 
@@ -196,10 +228,13 @@ def _read_road(
 def _speed_limits(
     road: Element, name: str, faults: ImportFaults
 ) -> Iterator[tuple[float, float]]:
-    """Yields the start [m] and the value [m/s] of each speed limit."""
-    for one in road.all("type"):
+    """Yields the start [m] and the value [m/s] of each speed limit.
+
+    The value is 0 if there is no limit, or none that can be read.
+    """
+    for road_type in road.all("type"):
         limit = 0.0
-        speed = one.first("speed")
+        speed = road_type.first("speed")
         if speed is not None:
             with contextlib.suppress(ValueError):
                 limit = float(speed.value("max", ""))
@@ -208,4 +243,4 @@ def _speed_limits(
                 kind = "unlimited or unreadable speed, taken as 50 km/h"
                 faults.add(kind, name)
                 limit = 0.0
-        yield one.number("s", 0.0), limit
+        yield road_type.number("s", 0.0), limit

@@ -9,10 +9,14 @@ from cns_drake.base.xml_elements import Element
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.road_model import Thing
 
+# Greatest number of repetitions of an object.
 _MOST_REPEATS = 10_000
+# A last repetition may be beyond its stretch by this share of the distance.
+_ROUNDING = 1e-9
 # Distance of trees that are repeated without a distance [m].
 _TREE_SPACING = 4.0
-_LARGEST_SIZE = 1000.0  # [m]
+# Greatest length, width and height of an object [m].
+_LARGEST_SIZE = 1000.0
 
 
 def read_things(
@@ -27,53 +31,57 @@ def read_things(
         ValueError: there is text in place of a number; the error names the
             line.
     """
-    for k, one in enumerate(road.all("signals", "signal")):
-        yield Thing(
-            name=f"signal_{name}_{k}",
-            is_signal=True,
-            kind=one.value("type", "").lower(),
-            s=one.number("s"),
-            t=one.number("t"),
-            z=one.number("zOffset", 0.0),
-            heading=one.number("hOffset", 0.0),
-            size=(0.0, one.number("width", 0.0), one.number("height", 0.0)),
-            is_dynamic=one.value("dynamic", "no") == "yes",
-            faces_back=one.value("orientation", "none") == "-",
-        )
-    for k, one in enumerate(road.all("objects", "object")):
-        thing = _read_object(one, f"object_{name}_{k}")
-        for _ in list(one.all("outlines", "outline"))[1:]:
+    for number, signal in enumerate(road.all("signals", "signal")):
+        yield _read_signal(signal, f"signal_{name}_{number}")
+    for number, element in enumerate(road.all("objects", "object")):
+        thing = _read_object(element, f"object_{name}_{number}")
+        for _ in list(element.all("outlines", "outline"))[1:]:
             faults.add("further outline of an object, not read", thing.name)
-        repeats = list(one.all("repeat"))
+        repeats = list(element.all("repeat"))
         if not repeats:
             yield thing
-        for m, repeat in enumerate(repeats):
-            yield from _repetitions(thing, repeat, m, faults)
+        for number_of_repeat, repeat in enumerate(repeats):
+            yield from _repetitions(thing, repeat, number_of_repeat, faults)
 
 
-def _read_object(one: Element, name: str) -> Thing:
-    radius = one.number("radius", 0.0)
+def _read_signal(signal: Element, name: str) -> Thing:
+    return Thing(
+        name=name,
+        is_signal=True,
+        kind=signal.value("type", "").lower(),
+        s=signal.number("s"),
+        t=signal.number("t"),
+        z=signal.number("zOffset", 0.0),
+        heading=signal.number("hOffset", 0.0),
+        size=(0.0, signal.number("width", 0.0), signal.number("height", 0.0)),
+        is_dynamic=signal.value("dynamic", "no") == "yes",
+        faces_back=signal.value("orientation", "none") == "-",
+    )
+
+
+def _read_object(element: Element, name: str) -> Thing:
+    radius = element.number("radius", 0.0)
     size = (
-        one.number("length", 2.0 * radius),
-        one.number("width", 2.0 * radius),
-        one.number("height", 0.0),
+        element.number("length", 2.0 * radius),
+        element.number("width", 2.0 * radius),
+        element.number("height", 0.0),
     )
     if not all(0.0 <= side <= _LARGEST_SIZE for side in size):
         raise ValueError(
-            f"line {one.line}: object: a size of {size} m is not in 0 to "
+            f"line {element.line}: object: a size of {size} m is not in 0 to "
             f"{_LARGEST_SIZE:g} m"
         )
-    outline = next(one.all("outlines", "outline"), one.first("outline"))
+    outline = next(element.all("outlines", "outline"), element.first("outline"))
     corners = _read_corners(outline, "cornerLocal", "uvz")
     road_corners = _read_corners(outline, "cornerRoad", ("s", "t", "dz"))
     return Thing(
         name=name,
         is_signal=False,
-        kind=one.value("type", one.value("name", "none")).lower(),
-        s=one.number("s"),
-        t=one.number("t"),
-        z=one.number("zOffset", 0.0),
-        heading=one.number("hdg", 0.0),
+        kind=element.value("type", element.value("name", "none")).lower(),
+        s=element.number("s"),
+        t=element.number("t"),
+        z=element.number("zOffset", 0.0),
+        heading=element.number("hdg", 0.0),
         size=size,
         outline=corners,
         road_outline=road_corners,
@@ -84,17 +92,24 @@ def _read_object(one: Element, name: str) -> Thing:
 def _read_corners(
     outline: Element | None, tag: str, names: Sequence[str]
 ) -> np.ndarray | None:
+    """Returns the corners (N, 4) of an outline, as in `Thing`, if it has any.
+
+    Args:
+        outline: the outline in the file; None if there is none.
+        tag: tag of its corners.
+        names: attributes of a corner with its coordinates.
+    """
     if outline is None:
         return None
     x, y, z = names
     rows = [
         (
-            one.number(x),
-            one.number(y),
-            one.number(z, 0.0),
-            one.number("height", 0.0),
+            corner.number(x),
+            corner.number(y),
+            corner.number(z, 0.0),
+            corner.number("height", 0.0),
         )
-        for one in outline.all(tag)
+        for corner in outline.all(tag)
     ]
     return np.array(rows) if len(rows) >= 2 else None
 
@@ -120,16 +135,16 @@ def _repetitions(
         yield _stretched(thing, repeat, number)
         return
     step = distance if distance > 0.0 else _TREE_SPACING
-    count = max(math.floor(length / step + 1e-9), 0) + 1
+    count = max(math.floor(length / step + _ROUNDING), 0) + 1
     if count > _MOST_REPEATS:
         faults.add(
             f"object repeated more than {_MOST_REPEATS} times, left out",
             thing.name,
         )
         return
-    for k in range(count):
-        yield _repeated(thing, repeat, k * step)._replace(
-            name=f"{thing.name}_{number}_{k}"
+    for nth in range(count):
+        yield _repeated(thing, repeat, nth * step)._replace(
+            name=f"{thing.name}_{number}_{nth}"
         )
 
 
@@ -163,11 +178,11 @@ def _stretched(thing: Thing, repeat: Element, number: int) -> Thing:
 def _repeated(thing: Thing, repeat: Element, distance: float) -> Thing:
     """Returns the repetition of an object, `distance` after the first [m]."""
     length = repeat.number("length")
-    part = min(1.0, distance / length) if length > 0.0 else 0.0
+    share = min(1.0, distance / length) if length > 0.0 else 0.0
 
     def between_ends(name: str, default: float) -> float:
         first, last = _values_at_ends(repeat, name, default)
-        return first + part * (last - first)
+        return first + share * (last - first)
 
     own_length, width, height = thing.size
     return thing._replace(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 import math
+from typing import NamedTuple
 import zlib
 
 import numpy as np
@@ -32,7 +33,39 @@ _LEAST_SIDE = 0.05
 _LEAST_AREA = 1e-4
 # Places that are closer than this are one place [m].
 _SAME_PLACE = 1e-4
+# Objects may be this far beyond the end of their road [m].
+_BEYOND_ROAD = 1.0
+# Places at an end of a road are on the piece of the road this far inside [m].
+_INSIDE = 1e-6
 _HALF_TURN = math.pi
+
+
+class _Foot(NamedTuple):
+    """Where a thing stands.
+
+    Attributes:
+        x, y, z: the place in W [m].
+        heading: heading of the road there, in W [rad].
+    """
+
+    x: float
+    y: float
+    z: float
+    heading: float
+
+
+class _PlacedOutline(NamedTuple):
+    """The outline of an object, with N corners.
+
+    Attributes:
+        line: the outline in W [m].
+        low: (N,) z of the foot below each corner in W [m].
+        heights: (N,) heights of the corners above this foot [m].
+    """
+
+    line: LineString
+    low: np.ndarray
+    heights: np.ndarray
 
 
 def thing_structures(
@@ -46,15 +79,15 @@ def thing_structures(
         faults: counts what is left out.
     """
     for thing in road.things:
-        if not 0.0 <= thing.s <= road.length + 1.0:
+        if not 0.0 <= thing.s <= road.length + _BEYOND_ROAD:
             faults.add(
                 "object beyond the end of its road, left out", thing.name
             )
             continue
-        made: Structure | None
+        structure: Structure | None
         if thing.is_signal:
-            made = _signal(road, thing)
-            if made.footprint_W.intersects(lanes):
+            structure = _signal(road, thing)
+            if structure.footprint_W.intersects(lanes):
                 faults.add("signal over a lane, left out", thing.name)
                 continue
         elif thing.kind.startswith(_FLAT):
@@ -62,22 +95,22 @@ def thing_structures(
             faults.add(kind, thing.name)
             continue
         elif thing.kind.startswith("tree"):
-            made = _tree(road, thing)
+            structure = _tree(road, thing)
         elif thing.swept is not None:
-            made = _swept_object(road, thing, thing.swept, faults)
+            structure = _swept_object(road, thing, thing.swept, faults)
         else:
-            made = _extruded_object(road, thing, faults)
-        if made is not None:
-            yield made
+            structure = _extruded_object(road, thing, faults)
+        if structure is not None:
+            yield structure
 
 
 def _signal(road: ImportedRoad, thing: Thing) -> Structure:
-    x, y, z, heading = _foot_of(road, thing)
+    foot = _foot_of(road, thing)
     key = _name_by_type(thing.kind, "signs", "sign_rectangular")
     if thing.is_dynamic:
         key = "traffic_light_post"
     builder = OBJECTS[key]
-    facing = heading + thing.heading
+    facing = foot.heading + thing.heading
     facing += 0.0 if thing.faces_back else _HALF_TURN
     if thing.is_dynamic:
         # The front of traffic lights in the file is their left side here.
@@ -86,7 +119,7 @@ def _signal(road: ImportedRoad, thing: Thing) -> Structure:
         thing.name,
         builder.semantic_class,
         builder.build(_generator_of(thing.name)),
-        (x, y, z),
+        (foot.x, foot.y, foot.z),
         round(math.remainder(facing, 2.0 * math.pi), 5),
         ("signal",),
         name_stem(key),
@@ -94,31 +127,42 @@ def _signal(road: ImportedRoad, thing: Thing) -> Structure:
 
 
 def _tree(road: ImportedRoad, thing: Thing) -> Structure:
-    x, y, z, _ = _foot_of(road, thing)
+    foot = _foot_of(road, thing)
     model = tree(
         _generator_of(thing.name),
         species="lime_tree",
         height=thing.size[2] or None,
     )
     return Structure(
-        thing.name, "vegetation", model, (x, y, z), 0.0, ("object",), "tree"
+        thing.name,
+        "vegetation",
+        model,
+        (foot.x, foot.y, foot.z),
+        0.0,
+        ("object",),
+        "tree",
     )
 
 
-def _foot_of(
-    road: ImportedRoad, thing: Thing
-) -> tuple[float, float, float, float]:
-    """Returns x, y, z [m] of a thing's foot, and the heading of the road."""
+def _foot_of(road: ImportedRoad, thing: Thing) -> _Foot:
+    """Returns where a thing stands, in whole millimetres.
+
+    A signal stands on the road; its own height is that of its plate.
+    """
     s = np.array([min(thing.s, road.length)])
-    inside = np.clip(s, 1e-6, road.length - 1e-6)
+    inside = np.clip(s, _INSIDE, road.length - _INSIDE)
     x, y, z = road.points(s, inside, np.array([thing.t]))[0].tolist()
     heading = float(road.reference(s, inside)[0, 3])
     low = 0.0 if thing.is_signal else thing.z
-    return round(x, 3), round(y, 3), round(z + low, 3), heading
+    return _Foot(round(x, 3), round(y, 3), round(z + low, 3), heading)
 
 
 def _name_by_type(kind: str, table: str, otherwise: str) -> str:
-    """Returns the name in a table whose beginnings match a type."""
+    """Returns the first name in a table whose beginnings match a type.
+
+    `table` is the name of a table of `types.yaml`. The result is `otherwise` if
+    no beginning matches.
+    """
     for name, beginnings in TYPES[table].items():
         if kind.startswith(tuple(beginnings)):
             return str(name)
@@ -133,22 +177,17 @@ def _extruded_object(
     The result is None if the object has no size, height or area.
     """
     name = thing.name
-    found = _placed_outline(road, thing)
-    if found is None:
+    outline = _placed_outline(road, thing)
+    if outline is None:
         faults.add("object without a size, left out", name)
         return None
-    line, low, heights = found
+    heights = outline.heights
     if not heights.any():
-        heights = np.full(len(low), thing.size[2])
+        heights = np.full(len(heights), thing.size[2])
     if heights.max() < _LEAST_HEIGHT:
         faults.add("object without a height, left out", name)
         return None
-    places = shapely.get_coordinates(line)
-    has_outline = thing.outline is not None or thing.road_outline is not None
-    if (thing.is_open and has_outline) or len(places) == 2:
-        polygon = line.buffer(_LEAST_SIDE, cap_style="flat", join_style="mitre")
-    else:
-        polygon = Polygon(places)
+    polygon = _area_of_outline(thing, outline.line)
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)
     pieces = [
@@ -161,7 +200,9 @@ def _extruded_object(
     if not pieces:
         faults.add("object without an area, left out", name)
         return None
+    low = outline.low
     foot = float(low.min())
+    # Any height will do, because each vertex gets that of the nearest corner.
     triangles = np.concatenate(
         [
             part
@@ -169,30 +210,38 @@ def _extruded_object(
             for part in extruded(piece, foot, foot + 1.0, name, faults)
         ]
     )
-    # Each vertex has the heights of the nearest corner.
-    _, nearest = cKDTree(places).query(triangles[..., :2])
+    corners = shapely.get_coordinates(outline.line)
+    _, nearest = cKDTree(corners).query(triangles[..., :2])
     is_top = triangles[..., 2] > foot
     triangles[..., 2] = low[nearest] + is_top * heights[nearest]
     return _object_structure(thing, triangles, shapely.union_all(pieces))
 
 
-def _placed_outline(
-    road: ImportedRoad, thing: Thing
-) -> tuple[LineString, np.ndarray, np.ndarray] | None:
-    """Returns the outline of an object in W, and the heights of its corners.
+def _area_of_outline(thing: Thing, line: LineString) -> BaseGeometry:
+    """Returns the area of an object with an outline [m], perhaps invalid.
 
-    Returns:
-        The outline with N corners, z of the foot below each corner (N,), and
-        the heights of the corners above this foot (N,) [m]. Without an outline
-        in the file, the outline is the box of the object. None if the object
-        has no size.
+    An object whose outline is open, or has just two corners, is narrow.
+    """
+    has_outline = thing.outline is not None or thing.road_outline is not None
+    corners = shapely.get_coordinates(line)
+    if (thing.is_open and has_outline) or len(corners) == 2:
+        return line.buffer(_LEAST_SIDE, cap_style="flat", join_style="mitre")
+    return Polygon(corners)
+
+
+def _placed_outline(road: ImportedRoad, thing: Thing) -> _PlacedOutline | None:
+    """Returns the outline of an object in W; None if the object has no size.
+
+    Without an outline in the file, the outline is the box of the object, and
+    the heights of its corners are 0.
     """
     if thing.road_outline is not None:
         s, t, rise, heights = thing.road_outline.T
         s = np.clip(s, 0.0, road.length)
-        inside = np.clip(s, 1e-6, road.length - 1e-6)
+        inside = np.clip(s, _INSIDE, road.length - _INSIDE)
         corners = road.points(s, inside, t)
-        return LineString(corners[:, :2]), corners[:, 2] + rise, heights
+        line = LineString(corners[:, :2])
+        return _PlacedOutline(line, corners[:, 2] + rise, heights)
     length, width, _ = thing.size
     if thing.outline is not None:
         footprint = LineString(thing.outline[:, :2])
@@ -203,9 +252,9 @@ def _placed_outline(
         half = max(length, _LEAST_SIDE) / 2, max(width, _LEAST_SIDE) / 2
         footprint = box(-half[0], -half[1], *half).exterior
         heights = rise = np.zeros(len(footprint.coords))
-    x, y, z, heading = _foot_of(road, thing)
-    line = placed(footprint, (x, y), heading + thing.heading)
-    return line, z + rise, heights
+    foot = _foot_of(road, thing)
+    line = placed(footprint, (foot.x, foot.y), foot.heading + thing.heading)
+    return _PlacedOutline(line, foot.z + rise, heights)
 
 
 def _swept_object(
@@ -218,7 +267,7 @@ def _swept_object(
     thing's `swept`. The result is None if the object has no height or no area.
     """
     start, end = ends[:, 0]
-    if end > road.length + 1.0 or start < 0.0:
+    if end > road.length + _BEYOND_ROAD or start < 0.0:
         faults.add("object beyond the end of its road, cut", thing.name)
     s, inside = stations(road, max(start, 0.0), min(end, road.length))
     t, rise, width, height = (
@@ -234,35 +283,52 @@ def _swept_object(
     )
     kept = np.append(True, is_new)
     middle, rise, width, height = (
-        one[kept] for one in (middle, rise, width, height)
+        values[kept] for values in (middle, rise, width, height)
     )
     if len(middle) < 2:
         faults.add("object without an area, left out", thing.name)
         return None
     half = np.maximum(width, _LEAST_SIDE)[:, None] / 2.0
     to_left = half * _to_left(middle[:, :2])
-    edges = [middle[:, :2] - to_left, middle[:, :2] + to_left]
+    right, left = middle[:, :2] - to_left, middle[:, :2] + to_left
     low = middle[:, 2] + rise
     high = low + np.maximum(height, 0.0)
     # Corners around a cross-section, seen along the road.
-    corners = np.stack(
+    sections = np.stack(
         [
-            np.c_[np.round(edges[side], 3), z]
-            for side, z in ((0, low), (0, high), (1, high), (1, low))
+            np.c_[np.round(edge, 3), z]
+            for edge, z in (
+                (right, low),
+                (right, high),
+                (left, high),
+                (left, low),
+            )
         ],
         axis=1,
     )
-    before, after = corners[:-1], corners[1:]
-    quads = [
-        np.stack([before[:, k], after[:, k], after[:, m], before[:, m]], axis=1)
-        for k, m in ((0, 1), (1, 2), (2, 3), (3, 0))
-    ]
-    quads += [corners[:1], corners[-1:, ::-1]]
-    around = np.concatenate(quads)
-    triangles = np.concatenate([around[:, [0, 1, 2]], around[:, [0, 2, 3]]])
+    before, after = sections[:-1], sections[1:]
     below = np.concatenate([before[:, [0, 3]], after[:, [3, 0]]], axis=1)
     area = shapely.make_valid(shapely.polygons(below[..., :2]))
-    return _object_structure(thing, triangles, shapely.union_all(area))
+    return _object_structure(
+        thing, _swept_surface(sections), shapely.union_all(area)
+    )
+
+
+def _swept_surface(sections: np.ndarray) -> np.ndarray:
+    """Returns the surface through cross-sections, as triangles (M, 3, 3) [m].
+
+    `sections` (N, 4, 3) are the corners of each cross-section [m], counted
+    counter-clockwise as seen along the object. The surface is closed at both
+    ends.
+    """
+    before, after = sections[:-1], sections[1:]
+    quads = [
+        np.stack([before[:, a], after[:, a], after[:, b], before[:, b]], axis=1)
+        for a, b in ((0, 1), (1, 2), (2, 3), (3, 0))
+    ]
+    quads += [sections[:1], sections[-1:, ::-1]]
+    around = np.concatenate(quads)
+    return np.concatenate([around[:, [0, 1, 2]], around[:, [0, 2, 3]]])
 
 
 def _to_left(places: np.ndarray) -> np.ndarray:
@@ -284,7 +350,7 @@ def _to_left(places: np.ndarray) -> np.ndarray:
 def _object_structure(
     thing: Thing, triangles: np.ndarray, footprint: BaseGeometry
 ) -> Structure:
-    one = make_object(
+    structure = make_object(
         thing.name,
         _name_by_type(thing.kind, "objects", "other-object"),
         "Object",
@@ -292,9 +358,10 @@ def _object_structure(
         {},
         kind=thing.kind,
     ).structure
-    model = replace(one.model, footprint=footprint)
-    return replace(one, model=model, tags=("object",))
+    model = replace(structure.model, footprint=footprint)
+    return replace(structure, model=model, tags=("object",))
 
 
 def _generator_of(name: str) -> np.random.Generator:
+    """Returns a random generator that depends only on a name."""
     return np.random.default_rng(zlib.crc32(name.encode()))

@@ -84,6 +84,7 @@ def write_town(
 
 
 def _write_drives(draft: Path, town: Town) -> None:
+    """Writes the drives of a town, at the speed limit of their roads."""
     stages = list(town.stages.stages)
     map_files.write_drives(
         draft,
@@ -122,7 +123,6 @@ def _seen_from_above(
             continue
         area = one.footprint_W
         if one.semantic_class == "vegetation":
-            # About the radius of the crown.
             area = area.buffer(_CROWN_RADIUS)
         pieces = polygons_of(area)
         cut = shapely.constrained_delaunay_triangles(
