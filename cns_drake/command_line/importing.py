@@ -133,7 +133,7 @@ def import_city(
         "stages": report.stages,
         "undated": report.undated,
         "drives": list(report.drives),
-        "faults": {kind: count for kind, count, _ in report.faults},
+        "faults": {fault.kind: fault.number for fault in report.faults},
     }
     show(values, _report_rows(report, output, options.years), json=json)
 
@@ -178,7 +178,7 @@ def _report_rows(
     for letter, length in zip("ab", report.drives, strict=False):
         yield f"drive {letter}", f"{length:.0f} m"
     if report.faults:
-        parts = [f"{kind} ({number})" for kind, number, _ in report.faults]
+        parts = [f"{fault.kind} ({fault.number})" for fault in report.faults]
         yield "left out or repaired", _shortened(parts)
     yield "written", f"{output}, with all counts in {REPORT_NAME}"
     if not report.drives:

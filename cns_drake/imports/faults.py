@@ -1,8 +1,24 @@
 """Counts of the faults that an import finds in a file."""
 
 from collections import Counter
+from typing import NamedTuple
 
+# Longer texts are cut [characters].
 _LONGEST_TEXT = 100
+
+
+class FaultCount(NamedTuple):
+    """How often an import found a kind of fault.
+
+    Attributes:
+        kind: the fault and its remedy, in words.
+        number: number of faults.
+        example: name of one object that has the fault.
+    """
+
+    kind: str
+    number: int
+    example: str
 
 
 class ImportFaults:
@@ -36,10 +52,10 @@ class ImportFaults:
         if not self._counts[kind]:
             del self._counts[kind], self._examples[kind]
 
-    def rows(self) -> list[tuple[str, int, str]]:
-        """Returns kind, count and example of faults, most frequent first."""
+    def rows(self) -> list[FaultCount]:
+        """Returns the counts of all kinds of faults, most frequent first."""
         return [
-            (kind, number, self._examples[kind])
+            FaultCount(kind, number, self._examples[kind])
             for kind, number in sorted(
                 self._counts.items(), key=lambda item: (-item[1], item[0])
             )

@@ -182,7 +182,7 @@ def write_facts(
             "# Places of the source are brought to metres east, north and up"
             " first.\n"
         )
-    counts = {kind: number for kind, number, _ in faults.rows()}
+    counts = {fault.kind: fault.number for fault in faults.rows()}
     text = yaml.safe_dump(
         {"source": source.name, **facts, "left_out_or_repaired": counts},
         sort_keys=False,
@@ -195,8 +195,8 @@ def write_report(draft: Path, report: ImportReport) -> None:
     """Writes all counts of an import to `import.txt` in the map's folder."""
     lines = [f"{kind}: {number}" for kind, number in report.kinds.items()]
     lines += [
-        f"{kind}: {number}, such as {example}"
-        for kind, number, example in report.faults
+        f"{fault.kind}: {fault.number}, such as {fault.example}"
+        for fault in report.faults
     ]
     (draft / REPORT_NAME).write_text("\n".join([*lines, ""]), "utf-8")
 

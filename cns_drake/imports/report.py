@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from cns_drake.imports.faults import FaultCount
+
 # File in the map's folder that lists all counts of an import.
 REPORT_NAME = "import.txt"
 
@@ -17,7 +19,8 @@ class ImportReport:
         undated: number of buildings without a year.
         dated: number of buildings with a year.
         drives: lengths of the proposed drives [m].
-        faults: kind, count and example of each fault.
+        faults: counts of the repaired and omitted parts of the file, most
+            frequent first.
     """
 
     kinds: dict[str, int]
@@ -26,4 +29,4 @@ class ImportReport:
     undated: int
     dated: int
     drives: tuple[float, ...]
-    faults: list[tuple[str, int, str]]
+    faults: list[FaultCount]

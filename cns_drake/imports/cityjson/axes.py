@@ -84,7 +84,7 @@ def exchange_mirrored_axes(city: CityFile) -> None:
     elif sum(outwards) < _MIRRORED_SHARE * len(outwards):
         if city.order_is_open:
             _exchange_axes(city)
-            if any(kind == _BEYOND for kind, _, _ in city.faults.rows()):
+            if any(fault.kind == _BEYOND for fault in city.faults.rows()):
                 city.faults.take_back(_BEYOND)
         elif len(outwards) > 1:
             city.faults.add(

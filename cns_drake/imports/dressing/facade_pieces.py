@@ -7,6 +7,7 @@ generated buildings.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -104,6 +105,29 @@ _LEAST_SIGN = 0.15
 _AWNINGS_SHARE = 0.4
 
 
+class _Rectangle(NamedTuple):
+    """A rectangle in a wall, in the wall's panel coordinates [m]."""
+
+    x0: float
+    z0: float
+    x1: float
+    z1: float
+
+
+class _FittedPlan(NamedTuple):
+    """The plan of a wall, whose openings are all inside the wall's outline.
+
+    Attributes:
+        plan: the plan.
+        reliefs: reliefs of the openings, and the materials of their fronts.
+        area: area that contains the reliefs.
+    """
+
+    plan: FacadePlan
+    reliefs: list[tuple[Relief, str]]
+    area: _Rectangle
+
+
 def add_facade(
     out: Assembly, plan: FacadePlan, rng: np.random.Generator
 ) -> Counter[str]:
@@ -122,11 +146,12 @@ def add_facade(
     has_balconies = style.balconies and bool(rng.random() < _BALCONIES_SHARE)
     if has_balconies:
         plan = _with_balcony_doors(plan)
-    plan, reliefs, area = _within_outline(plan)
+    fitted = _within_outline(plan)
+    plan, reliefs = fitted.plan, fitted.reliefs
     if not reliefs:
         out.add_to("body", to_mesh(panel.triangles))
     else:
-        _add_wall(out, panel, reliefs, area, plan.to_drive < _RECESSES_WITHIN)
+        _add_wall(out, fitted, plan.to_drive < _RECESSES_WITHIN)
         counts["windows"] = sum(o.kind == "window" for o in plan.openings)
         counts["doors"] = sum(o.kind in ("door", "gate") for o in plan.openings)
         if has_balconies:
@@ -166,30 +191,23 @@ def _add_in_wall(
     out.add_to(material, *(panel.frame.place(mesh, z) for mesh in meshes))
 
 
-def _within_outline(
-    plan: FacadePlan,
-) -> tuple[FacadePlan, list[tuple[Relief, str]], tuple[float, ...]]:
-    """Returns a plan without rows of openings outside the panel's outline.
-
-    Returns:
-        The plan, its reliefs with their materials, and the rectangle x0, z0,
-        x1, z1 that contains them [m].
-    """
+def _within_outline(plan: FacadePlan) -> _FittedPlan:
+    """Returns a plan without rows of openings outside the panel's outline."""
     panel = plan.panel
-    area = (0.0, 0.0, panel.length, panel.height)
+    whole = _Rectangle(0.0, 0.0, panel.length, panel.height)
     outline = panel.outline
     if outline is not None:
         outline = shapely.buffer(outline, GRID, join_style="mitre")
     while True:
         reliefs = [r for o in plan.openings for r in _reliefs(o, plan)]
         if outline is None or not reliefs:
-            return plan, reliefs, area
+            return _FittedPlan(plan, reliefs, whole)
         sides = np.array([(r.x0, r.z0, r.x1, r.z1) for r, _ in reliefs])
-        low = np.maximum(sides.min(axis=0)[:2] - _FROM_EDGE, area[:2])
-        high = np.minimum(sides.max(axis=0)[2:] + _FROM_EDGE, area[2:])
-        inner = tuple(np.round([*low, *high], 3).tolist())
+        low = np.maximum(sides.min(axis=0)[:2] - _FROM_EDGE, whole[:2])
+        high = np.minimum(sides.max(axis=0)[2:] + _FROM_EDGE, whole[2:])
+        inner = _Rectangle(*np.round([*low, *high], 3).tolist())
         if outline.contains(box(*inner)):
-            return plan, reliefs, inner
+            return _FittedPlan(plan, reliefs, inner)
         last = max(o.row for o in plan.openings)
         kept = [o for o in plan.openings if o.row < last]
         plan = replace(plan, openings=kept)
@@ -248,27 +266,22 @@ def _reliefs(opening: Opening, plan: FacadePlan) -> list[tuple[Relief, str]]:
     ][:1]
 
 
-def _add_wall(
-    out: Assembly,
-    panel: Panel,
-    reliefs: Sequence[tuple[Relief, str]],
-    area: tuple[float, ...],
-    has_recesses: bool,
-) -> None:
+def _add_wall(out: Assembly, fitted: _FittedPlan, has_recesses: bool) -> None:
     """Adds a wall with its openings.
 
-    The `area` (see `_within_outline`) is cut out and filled with the openings.
+    The area of the openings is cut out of the wall and filled with them.
     Without recesses, panes and doors lie on the wall. This needs far fewer
     triangles than recesses.
     """
-    x0, z0, x1, z1 = area
+    panel = fitted.plan.panel
+    x0, z0, x1, z1 = fitted.area
     fronts = [
-        {relief.depth for relief, name in reliefs if name == material}
+        {relief.depth for relief, name in fitted.reliefs if name == material}
         for material in _ON_WALL
     ]
     moved = [
         lifted(relief._replace(x0=relief.x0 - x0, x1=relief.x1 - x0), -z0)
-        for relief, _ in reliefs
+        for relief, _ in fitted.reliefs
     ]
     wall, *others = single_wall(x1 - x0, z1 - z0, moved, fronts)
     for material, mesh in zip(_ON_WALL, others, strict=True):

@@ -72,14 +72,13 @@ def dress_streets(
         streets: the streets along which objects are added.
         drives: the drives of the map.
         ground: heights of the ground on which objects stand.
-        guessed_ground: ground that was made for a file without a terrain, as
-            objects; empty if the file has a terrain.
+        guessed_ground: structures of the ground that was guessed; empty if the
+            file has a terrain.
         seed: seed of all random draws.
     """
-    placed = PlacedObjects()
     if not drives:
-        return placed
-    room = StreetRoom(objects, drives, ground, guessed_ground, placed)
+        return PlacedObjects()
+    room = StreetRoom(objects, drives, ground, guessed_ground)
     near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
@@ -99,7 +98,7 @@ def dress_streets(
             _place_lamps(room, row, rng)
             if not small_objects:
                 _place_small_objects(room, row, rng)
-    return placed
+    return room.placed
 
 
 def _streets_to_dress(

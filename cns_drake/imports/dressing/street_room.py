@@ -85,7 +85,6 @@ class StreetRoom:
         drives: Sequence[WaypointRoute],
         ground: Ground,
         guessed_ground: Sequence[Structure],
-        placed_objects: PlacedObjects,
     ):
         """Takes what already stands, and the drives whose paths stay free.
 
@@ -95,9 +94,8 @@ class StreetRoom:
             ground: the ground on which objects stand.
             guessed_ground: structures of the ground that was guessed; none if
                 the file has terrain.
-            placed_objects: gets the objects that are placed.
         """
-        self.placed = placed_objects
+        self.placed = PlacedObjects()
         self._ground = ground
         self.paths = MultiLineString([drive.path for drive in drives])
         shapely.prepare(self.paths)

@@ -10,6 +10,7 @@ a way.
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -24,10 +25,6 @@ LONGEST = 1500.0
 _SHORTEST_ARM = 40.0
 # Greatest length of the second drive's own arms [m].
 _LONGEST_ARM = LONGEST / 3
-# For each of two trials, three shares of the first drive's length: low, middle
-# and high. The second drive joins the first drive between low and middle, and
-# leaves it between 1 - middle and high.
-_JOINING_SHARES = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
 # Least share of the first drive's length that both drives have in common.
 _LEAST_SHARED = 0.15
 # Greatest number of places at which joining is tried, and also leaving.
@@ -46,6 +43,22 @@ _MOST_STARTS = 200
 # In large graphs, ways are searched from fewer pieces, so that this number of
 # pieces is reached at most.
 _MOST_REACHED = 400_000
+
+
+class _JoiningShares(NamedTuple):
+    """Where the second drive joins and leaves the first drive.
+
+    The drive joins between low and middle, and leaves between 1 - middle and
+    high. All three are shares of the first drive's length.
+    """
+
+    low: float
+    middle: float
+    high: float
+
+
+# The shares of each of two trials.
+_TRIALS = (_JoiningShares(0.25, 0.5, 0.75), _JoiningShares(0.0, 0.7, 1.0))
 
 
 def find_drives(graph: WayGraph) -> list[WaypointRoute]:
@@ -127,13 +140,13 @@ def _longest_way_from(
 def _second_ways(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
     """Yields ways that share the middle of the first way.
 
-    In each trial of `_JOINING_SHARES`, ways that join the first way early and
+    In each of the `_TRIALS`, ways that join the first way early and
     leave it late come first.
     """
     along = np.concatenate([[0.0], graph.along(first)])
     part = along / along[-1]
     every = np.arange(len(first))
-    for low, middle, high in _JOINING_SHARES:
+    for low, middle, high in _TRIALS:
         begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
         ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
         for begin in (*_spaced_places(begins, along), None):

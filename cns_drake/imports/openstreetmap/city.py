@@ -208,9 +208,9 @@ def _without_outers(
 def _no_buildings(faults: ImportFaults) -> str:
     """Returns why a file has no buildings to use."""
     unfit = [
-        f"{kind}: {number}, such as {example}"
-        for kind, number, example in faults.rows()
-        if "building" in kind
+        f"{fault.kind}: {fault.number}, such as {fault.example}"
+        for fault in faults.rows()
+        if "building" in fault.kind
     ]
     if not unfit:
         return "the file has no buildings"
