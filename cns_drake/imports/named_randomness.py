@@ -4,13 +4,16 @@ import hashlib
 
 import numpy as np
 
+# Size of a hashed number [bytes].
+_HASH_SIZE = 8
+
 
 def random_share(seed: int, purpose: str, name: str) -> float:
     """Returns a random number from 0 to 1 that depends only on the arguments.
 
     `purpose` says what the number is used for, and `name` for which object.
     """
-    return _hashed_number(seed, purpose, name) / 2.0**64
+    return _hashed_number(seed, purpose, name) / 2.0 ** (8 * _HASH_SIZE)
 
 
 def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
@@ -22,6 +25,7 @@ def random_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
 
 
 def _hashed_number(seed: int, purpose: str, name: str) -> int:
+    """Returns a whole number of 64 bits that depends only on the arguments."""
     text = f"{seed}/{purpose}/{name}".encode()
-    digest = hashlib.blake2b(text, digest_size=8).digest()
+    digest = hashlib.blake2b(text, digest_size=_HASH_SIZE).digest()
     return int.from_bytes(digest, "big")

@@ -54,7 +54,7 @@ def draw_overview(
         space: the free space; None to draw none.
         drives: the drives, at most two.
     """
-    corners = joined_triangles(one.triangles for one in objects)
+    corners = joined_triangles(imported.triangles for imported in objects)
     xy = corners.reshape(-1, 3)[:, :2]
     low, high = xy.min(axis=0), xy.max(axis=0)
     if space is not None:
@@ -96,11 +96,14 @@ def _draw_objects(
     legend: dict[str, Artist] = {}
     for is_ground in (True, False):
         by_colour: dict[tuple[float, float, float], list[np.ndarray]] = {}
-        for one in objects:
-            if one.is_ground == is_ground and one.object_type != "TINRelief":
-                colour = _colour_of(one)
-                by_colour.setdefault(colour, []).append(one.triangles)
-                name = one.structure.semantic_class
+        for imported in objects:
+            if (
+                imported.is_ground == is_ground
+                and imported.object_type != "TINRelief"
+            ):
+                colour = _colour_of(imported)
+                by_colour.setdefault(colour, []).append(imported.triangles)
+                name = imported.structure.semantic_class
                 if name == "building":
                     name = "building, any colour"
                 elif colour == WATER:
@@ -167,12 +170,12 @@ def _draw_drives(
     return legend
 
 
-def _colour_of(one: ImportedObject) -> tuple[float, float, float]:
+def _colour_of(imported: ImportedObject) -> tuple[float, float, float]:
     """Returns the colour of a structure in the picture.
 
     Plants have the colour of their class, all others that of their first part.
     """
-    part = one.structure.model.parts[0]
-    if one.structure.semantic_class == "vegetation":
+    part = imported.structure.model.parts[0]
+    if imported.structure.semantic_class == "vegetation":
         return CLASS_RGB["vegetation"]
-    return part.rgb or CLASS_RGB[one.structure.semantic_class]
+    return part.rgb or CLASS_RGB[imported.structure.semantic_class]

@@ -11,6 +11,8 @@ from cns_drake.imports.faults import ImportFaults
 # The ends of a hipped roof's ridge are inset by at most this share of its
 # length.
 _MOST_INSET_SHARE = 0.45
+# Shorter ridges count as this long [m].
+_SHORTEST_RIDGE = 1e-6
 # Triangles (M, 3, 3) of a pitched roof [m]: its slopes, and its gables.
 _Roof = tuple[list[np.ndarray], list[np.ndarray]]
 
@@ -105,7 +107,7 @@ def _slopes_and_gables(
     start[2] = end[2] = high
     if roof == "hipped":
         across = float(np.linalg.norm(d - a))
-        along = max(float(np.linalg.norm(end - start)), 1e-6)
+        along = max(float(np.linalg.norm(end - start)), _SHORTEST_RIDGE)
         # Slopes on all sides have the same pitch, if the ridge is long enough.
         share = min(_MOST_INSET_SHARE, 0.5 * across / along)
         inset = (end - start) * share

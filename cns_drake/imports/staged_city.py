@@ -50,7 +50,7 @@ class StagedCity:
         def with_changes(
             objects: Iterable[ImportedObject],
         ) -> list[ImportedObject]:
-            others = (changed.get(one, one) for one in objects)
+            others = (changed.get(imported, imported) for imported in objects)
             return [other for other in others if other is not None]
 
         standing = {
@@ -88,30 +88,31 @@ def stage_city(
         raise InputError(f"{source}: no object has a surface")
     standing = {
         stage: [
-            one
-            for one in objects
-            if not _may_be_missing(one) or _stands_at(one, number, options)
+            imported
+            for imported in objects
+            if not _may_be_missing(imported)
+            or _stands_at(imported, number, options)
         ]
         for number, stage in enumerate(stage_names(options.years))
     }
     gone: list[ImportedObject] = []
     if options.grow is not None:
         (today,) = map(set, standing.values())
-        gone = [one for one in objects if one not in today]
+        gone = [imported for imported in objects if imported not in today]
     elif options.dressed:
         standing = {
             stage: with_former_buildings(
-                [one for one in of_stage if not _is_here(one)],
-                [one for one in of_stage if _is_here(one)],
+                [imported for imported in of_stage if not _is_here(imported)],
+                [imported for imported in of_stage if _is_here(imported)],
             )
             for stage, of_stage in standing.items()
         }
-    ever = {one for of_stage in standing.values() for one in of_stage}
-    for one in objects:
-        if one not in ever and one not in gone:
-            kind = f"building {_why_never(one, options)}, left out"
-            city.faults.add(kind, one.structure.name)
-    kept = [one for one in objects if one in ever]
+    ever = {imported for of_stage in standing.values() for imported in of_stage}
+    for imported in objects:
+        if imported not in ever and imported not in gone:
+            kind = f"building {_why_never(imported, options)}, left out"
+            city.faults.add(kind, imported.structure.name)
+    kept = [imported for imported in objects if imported in ever]
     if len(kept) >= MAX_INSTANCE:
         raise InputError(
             f"{source}: {len(kept)} objects are more than instance ids can"
@@ -122,17 +123,19 @@ def stage_city(
             f"{source}: no structure stands at any stage; check --years and "
             "--undated"
         )
-    years = [one.year for one in objects if _may_be_missing(one)]
+    years = [imported.year for imported in objects if _may_be_missing(imported)]
     undated = years.count(None)
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
 
 
-def _is_here(one: ImportedObject) -> bool:
+def _is_here(imported: ImportedObject) -> bool:
     """Returns whether a structure, once built, still stands today."""
-    return not one.is_gone and stands_today(one.until)
+    return not imported.is_gone and stands_today(imported.until)
 
 
-def _stands_at(one: ImportedObject, stage: int, options: ImportOptions) -> bool:
+def _stands_at(
+    imported: ImportedObject, stage: int, options: ImportOptions
+) -> bool:
     """Returns whether a structure stands in the stage of number `stage`.
 
     A structure that was demolished at an unknown date stands in all stages
@@ -140,8 +143,8 @@ def _stands_at(one: ImportedObject, stage: int, options: ImportOptions) -> bool:
     construction is unknown, `options.undated` decides.
     """
     years = options.years
-    until = one.until
-    if one.is_gone:
+    until = imported.until
+    if imported.is_gone:
         years = years[:-1]
         until = None
         if stage >= len(years):
@@ -150,8 +153,8 @@ def _stands_at(one: ImportedObject, stage: int, options: ImportOptions) -> bool:
         return stands_today(until)
     if until is not None and years[stage] >= until:
         return False
-    if one.year is not None:
-        return one.year <= years[stage]
+    if imported.year is not None:
+        return imported.year <= years[stage]
     if options.undated == "first":
         return True
     return options.undated == "last" and stage == len(years) - 1
@@ -183,35 +186,37 @@ def _without_outliers(city: ForeignCity) -> list[ImportedObject]:
     boxes = boxes_of(city.objects)
     middle = np.median(boxes.mean(axis=1), axis=0)
     kept = []
-    for one, reach in zip(
+    for imported, reach in zip(
         city.objects, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
     ):
         if reach <= _FARTHEST:
-            kept.append(one)
+            kept.append(imported)
         else:
             kind = f"object more than {_FARTHEST / 1000:g} km away, left out"
-            city.faults.add(kind, one.structure.name)
+            city.faults.add(kind, imported.structure.name)
     return kept
 
 
-def _why_never(one: ImportedObject, options: ImportOptions) -> str:
+def _why_never(imported: ImportedObject, options: ImportOptions) -> str:
     """Returns why a building stands at no stage, in words."""
     first = options.years[0] if options.years else None
-    if one.until is not None and (first is None or one.until <= first):
+    if imported.until is not None and (
+        first is None or imported.until <= first
+    ):
         return "demolished before the first stage" if first else "demolished"
-    if one.is_gone and len(options.years) < 2:
+    if imported.is_gone and len(options.years) < 2:
         return "demolished"
-    if one.year is None:
+    if imported.year is None:
         return "without a year"
-    if options.years and one.year > options.years[-1]:
+    if options.years and imported.year > options.years[-1]:
         return "built after the last stage"
     return "that stood between stages"
 
 
-def _may_be_missing(one: ImportedObject) -> bool:
+def _may_be_missing(imported: ImportedObject) -> bool:
     """Returns whether a structure may be missing at some stages.
 
     Among the structures without a year, only buildings may be missing.
     """
-    is_dated = one.year is not None or one.until is not None
-    return not one.is_ground and (is_dated or one.is_building)
+    is_dated = imported.year is not None or imported.until is not None
+    return not imported.is_ground and (is_dated or imported.is_building)

@@ -141,6 +141,11 @@ def _documents(path: Path) -> Iterator[tuple[int, dict]]:
 
 
 def _json_object(text: bytes, where: str) -> dict:
+    """Returns the JSON object in a text.
+
+    Raises:
+        InputError: there is no such object; the message begins with `where`.
+    """
     try:
         value = parse_json(text)
     except UnicodeDecodeError as error:
@@ -155,6 +160,7 @@ def _json_object(text: bytes, where: str) -> dict:
 
 
 def _reference_system(document: dict, where: str) -> ReferenceSystem:
+    """Returns the reference system that the metadata of a document names."""
     metadata = document.get("metadata")
     if not isinstance(metadata, dict):
         return ReferenceSystem()
@@ -230,6 +236,10 @@ def _count_assumptions(city: CityFile) -> None:
 def _read_object(
     name: str, value: dict, source: GeometrySource, faults: ImportFaults
 ) -> CityObject:
+    """Returns an object of the file; what is not read is counted in `faults`.
+
+    `source` is what the object's geometries refer to.
+    """
     for key in value.keys() - _KNOWN_MEMBERS:
         faults.add(f"{key} of an object, not read", name)
     listed = value.get("geometry") or []

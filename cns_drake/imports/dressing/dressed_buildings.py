@@ -223,20 +223,29 @@ def _plan_facades(
         )
     ]
     solids = [building.imported.triangles for building in bare]
-    upper = UpperSides(np.concatenate(solids))
+    plans = _without_occluded(plans, np.concatenate(solids))
+    lines = [street.line for street in streets]
+    ways = MultiLineString([*lines, *(drive.path for drive in drives)])
+    to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    return _with_fronts(plans, to_way, paving)
+
+
+def _without_occluded(
+    plans: Sequence[FacadePlan], solids: np.ndarray
+) -> list[FacadePlan]:
+    """Returns plans without openings that buildings occlude.
+
+    `solids` (M, 3, 3) are the triangles of all buildings in W [m].
+    """
     probes = [plan.probes() for plan in plans]
-    are_hidden = upper.hides(np.concatenate(probes))
+    are_hidden = UpperSides(solids).hides(np.concatenate(probes))
     ends = np.cumsum([len(of_plan) for of_plan in probes])[:-1]
-    plans = [
+    return [
         plan.without(is_hidden)
         for plan, is_hidden in zip(
             plans, np.split(are_hidden, ends), strict=True
         )
     ]
-    lines = [street.line for street in streets]
-    ways = MultiLineString([*lines, *(drive.path for drive in drives)])
-    to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
-    return _with_fronts(plans, to_way, paving)
 
 
 def _with_fronts(

@@ -1,7 +1,7 @@
 """Dresses a city: adds details to its buildings and along its streets."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +10,10 @@ import shapely
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry import Structure
 from cns_drake.imports.colours import Rgb
-from cns_drake.imports.dressing.dressed_buildings import dress_buildings
+from cns_drake.imports.dressing.dressed_buildings import (
+    DressedBuildings,
+    dress_buildings,
+)
 from cns_drake.imports.dressing.guessed_streets import guessed_streets
 from cns_drake.imports.dressing.kerbs import with_kerb
 from cns_drake.imports.dressing.lane_marks import lane_marks
@@ -96,9 +99,8 @@ def dress_city(
     if drives:
         added += lane_marks(streets, drives)
     guessed_ground = ground_structures(kept, ground)
-    everything = [*kept, *added]
     placed = dress_streets(
-        everything,
+        [*kept, *added],
         city.small_objects,
         streets,
         drives,
@@ -106,30 +108,45 @@ def dress_city(
         guessed_ground,
         seed,
     )
+    _take_back_placed(city, placed)
+    facts = {"seed": seed, **_facts(buildings, added, placed)}
     changed = dict(buildings.buildings)
-    at_random = buildings.at_random + Counter(one.object_type for one in added)
     if is_paved:
         changed |= _paved_terrain(kept)
     if drives:
         walks = [one for one in kept if one.object_type == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
     added += placed.objects
-    _take_back_placed(city, placed)
     origins = {one.structure.name: "dressed" for one in changed.values()}
     names = {one.structure.name for one in added} - placed.from_file
     origins |= dict.fromkeys(names, "lot")
-    facts = {
-        "seed": seed,
-        "buildings": len(buildings.buildings),
-        "by_file": dict(sorted((buildings.by_file + placed.by_file).items())),
-        "at_random": dict(sorted((at_random + placed.at_random).items())),
-        "without_room": placed.no_room,
-    }
     dressed = staged.replaced({**changed, **placed.moved}).with_objects(added)
     _check_number(len(dressed.kept))
     if is_paved:
         guessed_ground = list(map(in_paving_colour, guessed_ground))
     return Dressing(dressed, origins, facts, guessed_ground)
+
+
+def _facts(
+    buildings: DressedBuildings,
+    added: Iterable[ImportedObject],
+    placed: PlacedObjects,
+) -> dict[str, Any]:
+    """Returns counts of details: from the file, random, and without room.
+
+    Args:
+        buildings: the dressed buildings.
+        added: random objects, except small objects along streets.
+        placed: the small objects along streets.
+    """
+    by_file = buildings.by_file + placed.by_file
+    at_random = buildings.at_random + Counter(one.object_type for one in added)
+    return {
+        "buildings": len(buildings.buildings),
+        "by_file": dict(sorted(by_file.items())),
+        "at_random": dict(sorted((at_random + placed.at_random).items())),
+        "without_room": placed.no_room,
+    }
 
 
 def _paved_terrain(
@@ -142,7 +159,7 @@ def _paved_terrain(
     is taken as paved.
 
     Args:
-        kept: structures of the city.
+        kept: objects of the city.
     """
     terrain = [one for one in kept if one.object_type == "TINRelief"]
     if sum(one.is_ground for one in kept) != len(terrain):

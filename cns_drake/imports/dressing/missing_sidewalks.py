@@ -1,6 +1,6 @@
 """Sidewalks for streets whose tags do not mention sidewalks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -63,16 +63,11 @@ def missing_sidewalks(
     ]
     if not lacking:
         return
-    obstacles = [
-        one
-        for one in near_drives(objects, drives)
-        if one.structure.semantic_class in ("building", "road", "sidewalk")
-        or one.object_type.startswith("Water")
-    ]
     carriageways = [
         line.buffer(street.width / 2.0, quad_segs=4) for street, line in near
     ]
-    taken = np.concatenate([triangles_from_above(obstacles), carriageways])
+    obstacles = _obstacles(near_drives(objects, drives))
+    taken = np.concatenate([obstacles, carriageways])
     # The union of a whole city takes long, so only polygons near each street
     # are used.
     tree = STRtree(taken)
@@ -95,3 +90,15 @@ def missing_sidewalks(
         if surface:
             laid = np.concatenate(surface)
             yield paved_structure(f"sidewalk_{street.name}", "sidewalk", laid)
+
+
+def _obstacles(objects: Iterable[ImportedObject]) -> np.ndarray:
+    """Returns the areas (N,) that no sidewalk may cover, in W [m]."""
+    return triangles_from_above(
+        [
+            one
+            for one in objects
+            if one.structure.semantic_class in ("building", "road", "sidewalk")
+            or one.object_type.startswith("Water")
+        ]
+    )

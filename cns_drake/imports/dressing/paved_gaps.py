@@ -43,10 +43,13 @@ def paved_gaps(
     must be level.
     """
     near = near_drives(
-        [one for one in objects if one.object_type != "Tree"], drives
+        [imported for imported in objects if imported.object_type != "Tree"],
+        drives,
     )
     walks = [
-        _flat_outline(one) for one in near if one.object_type == "Sidewalk"
+        _flat_outline(imported)
+        for imported in near
+        if imported.object_type == "Sidewalk"
     ]
     if not walks:
         return
@@ -54,10 +57,10 @@ def paved_gaps(
     gaps = _gaps_beside(walks, walks_tree, near)
     obstacles = triangles_from_above(
         [
-            one
-            for one in near
-            if one.object_type not in ("Sidewalk", "Road", "Crossing")
-            and one.structure.semantic_class != "building"
+            imported
+            for imported in near
+            if imported.object_type not in ("Sidewalk", "Road", "Crossing")
+            and imported.structure.semantic_class != "building"
         ]
     )
     obstacles_tree = STRtree(obstacles)
@@ -97,7 +100,11 @@ def _gaps_beside(
         walks_tree: search tree of these areas.
         objects: objects of the city, which include roads and buildings.
     """
-    roads = [_flat_outline(one) for one in objects if one.object_type == "Road"]
+    roads = [
+        _flat_outline(imported)
+        for imported in objects
+        if imported.object_type == "Road"
+    ]
     houses = [o for o in objects if o.structure.semantic_class == "building"]
     roofs = triangles_from_above(houses)
     beside = walks_tree.query(roofs, "dwithin", _WIDEST_GAP)[0]
@@ -115,6 +122,6 @@ def _wide_parts(area: BaseGeometry) -> BaseGeometry:
     return shapely.intersection(wide, area, grid_size=GRID)
 
 
-def _flat_outline(one: ImportedObject) -> BaseGeometry:
+def _flat_outline(imported: ImportedObject) -> BaseGeometry:
     """Returns the area of a level structure, seen from above."""
-    return shapely.coverage_union_all(triangles_from_above([one]))
+    return shapely.coverage_union_all(triangles_from_above([imported]))

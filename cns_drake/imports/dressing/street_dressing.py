@@ -82,15 +82,15 @@ def dress_streets(
     near = [s for s in streets if room.is_near(s.line, _OBJECTS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
-    for one in objects:
-        if one.object_type == "Tree":
-            room.keep_tree(_off_carriageway(room, one, near, courses))
+    for imported in objects:
+        if imported.object_type == "Tree":
+            room.keep_tree(_off_carriageway(room, imported, near, courses))
     for number, small in enumerate(small_objects):
         if room.is_near(np.array([small.xy] * 2), _OBJECTS_WITHIN):
             _place_from_file(room, small, number, near, courses, seed)
-    for one in objects:
-        if one.object_type == "Parking":
-            fill_car_park(room, one, seed)
+    for imported in objects:
+        if imported.object_type == "Parking":
+            fill_car_park(room, imported, seed)
     for row in _streets_to_dress(near, drives):
         if room.is_near(np.array(row.line.coords), ROWS_WITHIN):
             rng = random_generator(seed, "row", row.name)

@@ -127,7 +127,7 @@ class StreetRoom:
     def keep_tree(self, tree: ImportedObject) -> None:
         """Marks the place of a tree's trunk as occupied."""
         x, y, _ = tree.structure.xyz
-        self._taken.add(Point(x, y).buffer(_TRUNK_RADIUS, 4))
+        self._taken.add(Point(x, y).buffer(_TRUNK_RADIUS, quad_segs=4))
 
     def has_tree_pit(self, xy: np.ndarray) -> bool:
         """Returns whether a tree could stand at a place.
@@ -135,7 +135,7 @@ class StreetRoom:
         There is no room for a trunk on a road, in a structure, or close to the
         path of one of the map's drives. `xy` (2,) is the place in W [m].
         """
-        pit = Point(xy).buffer(_TRUNK_RADIUS, 2)
+        pit = Point(xy).buffer(_TRUNK_RADIUS, quad_segs=2)
         around = shapely.get_coordinates(pit)
         return not (
             np.isfinite(self._roads.heights(around)).any()

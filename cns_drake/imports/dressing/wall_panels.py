@@ -204,12 +204,14 @@ def _panel_numbers(
     edges = np.sort(edges.reshape(-1, 2), axis=1)
     _, edge = np.unique(edges, axis=0, return_inverse=True)
     order = np.argsort(edge.reshape(-1), kind="stable")
-    one, other = order[:-1] // 3, order[1:] // 3
-    shared = edge.reshape(-1)[order[:-1]] == edge.reshape(-1)[order[1:]]
-    same = np.einsum("ij,ij->i", normals[one], normals[other]) >= least
-    one, other = one[shared & same], other[shared & same]
+    # Edges that are the same follow each other in this order.
+    first, second = order[:-1] // 3, order[1:] // 3
+    share_edge = edge.reshape(-1)[order[:-1]] == edge.reshape(-1)[order[1:]]
+    cosines = np.einsum("ij,ij->i", normals[first], normals[second])
+    joined = share_edge & (cosines >= least)
+    first, second = first[joined], second[joined]
     count = len(triangles)
-    links = coo_array((np.ones(len(one)), (one, other)), (count, count))
+    links = coo_array((np.ones(len(first)), (first, second)), (count, count))
     _, component = connected_components(links, directed=False)
     return np.asarray(component)
 

@@ -110,9 +110,9 @@ def find_free_space(
     in_water = _area_of([o for o in objects if _is_water(o)], window, shape)
     blocked = np.zeros(shape, dtype=bool)
     walls = []
-    for one in objects:
-        if not (one.is_ground or _is_water(one)):
-            cells, triangles = _blocked_by(one, ground, window)
+    for imported in objects:
+        if not (imported.is_ground or _is_water(imported)):
+            cells, triangles = _blocked_by(imported, ground, window)
             blocked[cells] = True
             walls.append(triangles)
     free = ~(blocked | (in_water & ~on_road))
@@ -146,14 +146,14 @@ def _area_of(
     """
     covered = np.zeros(shape, dtype=bool)
     # In one call: thousands of small groups would take far longer.
-    surfaces = joined_triangles(one.triangles for one in objects)
+    surfaces = joined_triangles(imported.triangles for imported in objects)
     for row, column in _covered_cells(surfaces, window):
         covered[row, column] = True
     return covered
 
 
-def _is_water(one: ImportedObject) -> bool:
-    return one.object_type.startswith("Water")
+def _is_water(imported: ImportedObject) -> bool:
+    return imported.object_type.startswith("Water")
 
 
 def _covered_cells(
@@ -172,7 +172,7 @@ def _covered_cells(
 
 
 def _blocked_by(
-    one: ImportedObject, ground: Ground, window: _Window
+    imported: ImportedObject, ground: Ground, window: _Window
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Returns the cells that a structure blocks, and the triangles that block.
 
@@ -180,17 +180,17 @@ def _blocked_by(
     building. The triangles are (M, 3, 3) [m]. `window` contains the limits of
     the grid.
     """
-    corners = one.triangles.reshape(-1, 3)
+    corners = imported.triangles.reshape(-1, 3)
     above = corners[:, 2] - ground.height(corners[:, :2])
     lowest = above.reshape(-1, 3).min(axis=1)
     highest = above.reshape(-1, 3).max(axis=1)
     is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
     cells = [np.zeros((2, 0), dtype=int)]
-    cells += _covered_cells(one.triangles[is_low], window, ground)
+    cells += _covered_cells(imported.triangles[is_low], window, ground)
     row, column = np.concatenate(cells, axis=1)
-    if one.structure.semantic_class == "building" and len(row):
+    if imported.structure.semantic_class == "building" and len(row):
         row, column = _with_enclosed(row, column)
-    return (row, column), one.triangles[is_low & (highest > _KERB)]
+    return (row, column), imported.triangles[is_low & (highest > _KERB)]
 
 
 def _with_enclosed(

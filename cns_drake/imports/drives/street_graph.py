@@ -33,6 +33,8 @@ _SHARP_DEG_PER_M = 4.0
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
 # Places on a line that are closer than this are one place [m].
 _SAME_PLACE = 1e-6
+# Directions shorter than this have no direction.
+_LEAST_LENGTH = 1e-9
 # Number of places in the running mean that smooths corners.
 _CORNER_WINDOW = 7
 # Number of places in the running mean that smooths lateral offsets.
@@ -172,7 +174,9 @@ class StreetGraph(WayGraph):
             rows[:, :2], _CORNER_WINDOW, axis=0, mode="nearest"
         )
         along = np.gradient(middle, axis=0)
-        along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+        # Where a line turns back, its direction may be (0, 0).
+        lengths = np.linalg.norm(along, axis=1)
+        along /= np.maximum(lengths, _LEAST_LENGTH)[:, None]
         heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
         bends = np.abs(np.gradient(heading)) > np.radians(_SHARP_DEG_PER_M)
         reach = int(_TURN_REACH / _LANE_SPACING)

@@ -142,9 +142,8 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                     beyond = t + side * width
                 else:
                     border = np.abs(lane.border.at(s, inside))
-                    beyond = offset + side * np.maximum(
-                        border, side * (t - offset)
-                    )
+                    inner_border = side * (t - offset)
+                    beyond = offset + side * np.maximum(border, inner_border)
                 is_level = lane.is_level and bool(road.superelevation)
                 own_roll = np.zeros(len(s)) if is_level else roll
                 beside_level |= is_level

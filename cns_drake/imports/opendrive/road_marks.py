@@ -331,10 +331,10 @@ def _stripe(
     at = np.concatenate([[a], np.unique(inside), [b]])
     values = np.column_stack([border, left, aside])
     rows = np.stack([np.interp(at, s, value) for value in values.T], axis=1)
-    middle = rows[:, :3].copy()
-    middle[:, :2] += rows[:, 5:7]
+    middle, to_left, from_border = np.split(rows, [3, 5], axis=1)
+    middle[:, :2] += from_border
     half = np.zeros_like(middle)
-    half[:, :2] = rows[:, 3:5] * width / 2.0
+    half[:, :2] = to_left * width / 2.0
     right_edge, left_edge = middle - half, middle + half
     return np.stack(
         [right_edge[:-1], right_edge[1:], left_edge[1:], left_edge[:-1]], axis=1

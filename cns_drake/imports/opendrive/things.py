@@ -105,6 +105,7 @@ def thing_structures(
 
 
 def _signal(road: ImportedRoad, thing: Thing) -> Structure:
+    """Returns a traffic light or a sign, which faces its traffic."""
     foot = _foot_of(road, thing)
     key = _name_by_type(thing.kind, "signs", "sign_rectangular")
     if thing.is_dynamic:
@@ -127,6 +128,7 @@ def _signal(road: ImportedRoad, thing: Thing) -> Structure:
 
 
 def _tree(road: ImportedRoad, thing: Thing) -> Structure:
+    """Returns a tree of the height in the file or, without one, any height."""
     foot = _foot_of(road, thing)
     model = tree(
         _generator_of(thing.name),
@@ -350,6 +352,10 @@ def _to_left(places: np.ndarray) -> np.ndarray:
 def _object_structure(
     thing: Thing, triangles: np.ndarray, footprint: BaseGeometry
 ) -> Structure:
+    """Returns the structure of an object made of triangles (M, 3, 3) [m].
+
+    `footprint` is its area in W [m].
+    """
     structure = make_object(
         thing.name,
         _name_by_type(thing.kind, "objects", "other-object"),

@@ -105,7 +105,9 @@ def _report_of(
 ) -> ImportReport:
     return ImportReport(
         kinds=town.kinds,
-        triangles=sum(one.model.num_triangles for one in town.city.structures),
+        triangles=sum(
+            structure.model.num_triangles for structure in town.city.structures
+        ),
         stages={stage: size[0] for stage, size in sizes.items()},
         undated=0,
         dated=0,
@@ -118,11 +120,11 @@ def _seen_from_above(
     structures: Iterable[Structure],
 ) -> Iterable[ImportedObject]:
     """Yields the footprints of structures as flat triangles."""
-    for one in structures:
-        if one.semantic_class not in _SHOWN_CLASSES:
+    for structure in structures:
+        if structure.semantic_class not in _SHOWN_CLASSES:
             continue
-        area = one.footprint_W
-        if one.semantic_class == "vegetation":
+        area = structure.footprint_W
+        if structure.semantic_class == "vegetation":
             area = area.buffer(_CROWN_RADIUS)
         pieces = polygons_of(area)
         cut = shapely.constrained_delaunay_triangles(
@@ -135,4 +137,6 @@ def _seen_from_above(
         if corners:
             xy = np.array(corners)
             z = np.zeros((*xy.shape[:2], 1))
-            yield ImportedObject(one, "", None, np.concatenate([xy, z], axis=2))
+            yield ImportedObject(
+                structure, "", None, np.concatenate([xy, z], axis=2)
+            )

@@ -62,6 +62,7 @@ def ground_areas(
 
 
 def _plain_look(tags: Tags) -> AreaLook | None:
+    """Returns the look of ground in a plain city; None for other areas."""
     type_and_class = area_kind(tags)
     if type_and_class is None:
         return None
@@ -78,6 +79,7 @@ def _plain_look(tags: Tags) -> AreaLook | None:
 
 
 def _detailed_look(tags: Tags) -> AreaLook | None:
+    """Returns the look of ground in a dressed city; None for other areas."""
     if is_tunnel(tags) or tags.get("layer", "").startswith("-"):
         return None
     if tags.get("leisure") == "pitch":
@@ -97,6 +99,7 @@ def _detailed_look(tags: Tags) -> AreaLook | None:
 
 
 def _pitch_look(tags: Tags) -> AreaLook:
+    """Returns the look of a sports pitch: grass, or another surface."""
     surface = tags.get("surface")
     sports = tags.get("sport", "").split(";")
     is_grass = surface in _GRASS_SURFACES or (

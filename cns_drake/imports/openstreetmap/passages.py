@@ -42,6 +42,8 @@ _HIGHEST_CLEARANCE = 30.0
 # A passage reaches this far beyond the walls, because ways and outlines meet
 # only nearly [m].
 _BEYOND_WALLS = 0.3
+# A step of a way that is shorter than this has no direction [m].
+_LEAST_LENGTH = 1e-9
 # On each side, a passage is this much wider than its way [m].
 _BESIDE_WAY = 0.25
 # A way leads through a building if more than this is inside [m].
@@ -116,7 +118,8 @@ def _extended_line(course: LineString) -> LineString:
     ends = []
     for end, before in ((0, 1), (-1, -2)):
         out = places[end] - places[before]
-        out /= max(float(np.hypot(*out)), 1e-9)
+        # Two places of a way may be the same.
+        out /= max(float(np.hypot(*out)), _LEAST_LENGTH)
         ends.append(places[end] + _BEYOND_WALLS * out)
     return LineString([ends[0], *places, ends[1]])
 

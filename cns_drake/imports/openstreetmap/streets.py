@@ -97,6 +97,7 @@ def _count_faults_of_street(
 
 
 def _count_left_out(bridges: Bridges, faults: ImportFaults) -> None:
+    """Counts the bridges over other ways, and the tunnels."""
     for kind, ids in (
         ("bridge over a street or railway, left out", bridges.over_streets),
         ("tunnel, left out", bridges.tunnels),

@@ -63,6 +63,7 @@ def _greatest_value(
 
 
 def _parsed_length(text: str) -> float | None:
+    """Returns one length, in feet and inches or with a unit [m]."""
     feet_and_inches = _FEET_AND_INCHES.fullmatch(text)
     if feet_and_inches:
         feet, inches = map(_decimal, feet_and_inches.groups())

@@ -220,6 +220,7 @@ class _Strips:
     def _walkway(
         self, line: np.ndarray, a: _Place, b: _Place, crossing: int = -1
     ) -> lane_graph.Walkway:
+        """Returns the walkway along a line (N, 2) from place a to place b."""
         height = np.full(len(line), KERB_HEIGHT)
         return lane_graph.Walkway(
             resampled(np.column_stack([line, height])),
