@@ -38,7 +38,7 @@ class WayGraph(ABC):
         self.lengths = lengths
         if costs is None:
             costs = (lengths[before] + lengths[after]) / 2.0
-        self._links = (before, after, costs)
+        self._before, self._after, self._costs = before, after, costs
         self.is_open = np.ones(len(lengths), dtype=bool)
 
     @abstractmethod
@@ -103,8 +103,7 @@ class WayGraph(ABC):
         have no edges.
         """
         is_open = self.is_open if closed is None else self.is_open & ~closed
-        before, after, costs = self._links
-        kept = is_open[before] & is_open[after]
+        kept = is_open[self._before] & is_open[self._after]
         size = (len(self.lengths), len(self.lengths))
-        pairs = (before[kept], after[kept])
-        return coo_array((costs[kept], pairs), size).tocsr()
+        pairs = (self._before[kept], self._after[kept])
+        return coo_array((self._costs[kept], pairs), size).tocsr()
