@@ -146,6 +146,42 @@ def read_lanes(path: Path) -> LaneFile:
     """
     with value_errors(f"{path}: not JSON"):
         found = validated(_File, parse_json(read_bytes(path)), path)
+    _check_numbers(found, path)
+    pieces = tuple(
+        Piece(
+            resampled(np.array(lane.points)),
+            is_way=lane.way,
+            after=tuple(lane.after),
+            **lane.model_dump(exclude={"points", "way", "after"}),
+        )
+        for lane in found.lanes
+    )
+    walkways = [
+        Walkway(
+            resampled(np.array(way.points)),
+            **way.model_dump(exclude={"points"}),
+        )
+        for way in found.walkways
+    ]
+    crossings = tuple(
+        lane_graph.make_crossing(np.array(crossing.line), crossing.width)
+        for crossing in found.crossings
+    )
+    return LaneFile(
+        LaneGraph(pieces, crossings), walkways, tuple(found.in_the_way)
+    )
+
+
+def _check_numbers(found: _File, path: Path) -> None:
+    """Checks that lanes, walkways and junctions have possible numbers.
+
+    Args:
+        found: content of a lane file.
+        path: the file, for error messages.
+
+    Raises:
+        InputError: a number is impossible.
+    """
     count = len(found.lanes)
     for k, lane in enumerate(found.lanes):
         wrong = [following for following in lane.after if following >= count]
@@ -165,31 +201,8 @@ def read_lanes(path: Path) -> LaneFile:
             raise InputError(
                 f"{path}: walkways: {k}: crossing: {walkway.crossing} is none"
             )
-    pieces = tuple(
-        Piece(
-            resampled(np.array(lane.points)),
-            is_way=lane.way,
-            after=tuple(lane.after),
-            **lane.model_dump(exclude={"points", "way", "after"}),
-        )
-        for lane in found.lanes
-    )
-    if max(piece.junction for piece in pieces) >= _MOST:
+    if max(lane.junction for lane in found.lanes) >= _MOST:
         raise InputError(f"{path}: lanes: junction: at most {_MOST - 1}")
-    walkways = [
-        Walkway(
-            resampled(np.array(way.points)),
-            **way.model_dump(exclude={"points"}),
-        )
-        for way in found.walkways
-    ]
-    crossings = tuple(
-        lane_graph.make_crossing(np.array(crossing.line), crossing.width)
-        for crossing in found.crossings
-    )
-    return LaneFile(
-        LaneGraph(pieces, crossings), walkways, tuple(found.in_the_way)
-    )
 
 
 def _thinned(points: np.ndarray) -> list[list[float]]:
