@@ -122,6 +122,7 @@ def _junctions(long: Sequence[int], ways: Iterable[_Way]) -> dict[int, int]:
     parents: dict[tuple[int, str], tuple[int, str]] = {}
 
     def root(place: tuple[int, str]) -> tuple[int, str]:
+        """Returns the place that stands for the junction of a place."""
         while (parent := parents.get(place, place)) != place:
             place = parent
         return place
@@ -148,37 +149,24 @@ def _merged_lanes(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int],
 ) -> tuple[list[DirectedLane], list[list[int]], dict[int, int]]:
-    """Returns joined lanes, their successors, and the lanes on their right."""
+    """Joins lanes of which each leads only to the next.
+
+    Args:
+        lanes: the lanes.
+        links: pairs of lane numbers; the second lane follows the first.
+        right_of: number of a lane -> number of the next lane on its right.
+
+    Returns:
+        The joined lanes; the numbers of the lanes that follow each; and number
+        of a joined lane -> number of the one on its right.
+    """
     after: list[list[int]] = [[] for _ in lanes]
     before: list[list[int]] = [[] for _ in lanes]
     for first, second in links:
         after[first].append(second)
         before[second].append(first)
 
-    def goes_on(k: int) -> bool:
-        if len(after[k]) != 1:
-            return False
-        (other,) = after[k]
-        connects = lanes[k].connects or lanes[other].connects
-        return len(before[other]) == 1 and other != k and not connects
-
-    chains: list[list[int]] = []
-    placed: set[int] = set()
-    heads = [
-        k
-        for k in range(len(lanes))
-        if len(before[k]) != 1 or not goes_on(before[k][0])
-    ]
-    # After the heads, only rings are left, which may begin anywhere.
-    for head in (*heads, *range(len(lanes))):
-        if head in placed:
-            continue
-        chain = [head]
-        placed.add(head)
-        while goes_on(chain[-1]) and after[chain[-1]][0] not in placed:
-            chain.append(after[chain[-1]][0])
-            placed.add(chain[-1])
-        chains.append(chain)
+    chains = _chains(lanes, after, before)
     number = {chain[0]: row for row, chain in enumerate(chains)}
     merged = [
         DirectedLane(
@@ -223,3 +211,46 @@ def _ways_from(
                 yield _Way(lane, short, k)
             elif len(short) < _MOST_SHORT:
                 waiting.append((*short, k))
+
+
+def _chains(
+    lanes: Sequence[DirectedLane],
+    after: Sequence[Sequence[int]],
+    before: Sequence[Sequence[int]],
+) -> list[list[int]]:
+    """Returns chains of lanes of which each leads only to the next.
+
+    Each lane is in one chain. Lanes that connect others stay by themselves.
+
+    Args:
+        lanes: the lanes.
+        after: the lanes that follow each lane.
+        before: the lanes that lead to each lane.
+    """
+
+    def goes_on(k: int) -> bool:
+        """Returns whether a lane and the next one are in one chain."""
+        if len(after[k]) != 1:
+            return False
+        (other,) = after[k]
+        connects = lanes[k].connects or lanes[other].connects
+        return len(before[other]) == 1 and other != k and not connects
+
+    chains: list[list[int]] = []
+    placed: set[int] = set()
+    heads = [
+        k
+        for k in range(len(lanes))
+        if len(before[k]) != 1 or not goes_on(before[k][0])
+    ]
+    # After the heads, only rings are left, which may begin anywhere.
+    for head in (*heads, *range(len(lanes))):
+        if head in placed:
+            continue
+        chain = [head]
+        placed.add(head)
+        while goes_on(chain[-1]) and after[chain[-1]][0] not in placed:
+            chain.append(after[chain[-1]][0])
+            placed.add(chain[-1])
+        chains.append(chain)
+    return chains
