@@ -103,17 +103,7 @@ def make_triangles(
             np.empty((0, 3), dtype=np.int64),
         )
     positions = keypoints.positions
-    _, nearest = cKDTree(positions).query(positions, k=num_neighbours)
-    # The keypoint itself, then two of its neighbours, in order of distance.
-    one, other = np.triu_indices(num_neighbours - 1, k=1)
-    corners = np.stack(
-        [
-            np.repeat(nearest[:, 0], len(one)),
-            nearest[:, one + 1].ravel(),
-            nearest[:, other + 1].ravel(),
-        ],
-        axis=1,
-    )
+    corners = _corner_triples(positions, num_neighbours)
     ends = np.array([[0, 1], [0, 2], [1, 2]])
     difference = positions[corners[:, ends[:, 0]]]
     difference -= positions[corners[:, ends[:, 1]]]
@@ -125,11 +115,7 @@ def make_triangles(
     kept = (sides[:, 0] >= low) & (sides[:, 2] <= high)
     kept &= detour >= _MIN_DETOUR
     sides, order, corners = sides[kept], order[kept], corners[kept]
-    # Each triangle is seen from up to three corners; the first one counts.
-    lengths = (sides / _SAME).astype(np.int64)
-    by_length = np.lexsort(lengths.T)
-    differs = np.diff(lengths[by_length], axis=0, prepend=-1).any(axis=1)
-    first = np.sort(by_length[differs])
+    first = _first_of_each(sides)
     sides, order, corners = sides[first], order[first], corners[first]
     # Sides 0, 1 and 2 lie between corners 0-1, 0-2 and 1-2.
     meeting = np.stack(
@@ -142,6 +128,41 @@ def make_triangles(
     )
     vertices = np.take_along_axis(corners, meeting, axis=1)
     return Triangles(sides, positions[vertices], keypoints.heights[vertices])
+
+
+def _corner_triples(positions: np.ndarray, num_neighbours: int) -> np.ndarray:
+    """Returns each keypoint with any two of its neighbours, (T, 3) indices.
+
+    Args:
+        positions: (K, 3) positions of the keypoints [m].
+        num_neighbours: number of nearest keypoints, including the keypoint
+            itself; at most K.
+    """
+    _, nearest = cKDTree(positions).query(positions, k=num_neighbours)
+    # The keypoint itself, then two of its neighbours, in order of distance.
+    one, other = np.triu_indices(num_neighbours - 1, k=1)
+    return np.stack(
+        [
+            np.repeat(nearest[:, 0], len(one)),
+            nearest[:, one + 1].ravel(),
+            nearest[:, other + 1].ravel(),
+        ],
+        axis=1,
+    )
+
+
+def _first_of_each(sides: np.ndarray) -> np.ndarray:
+    """Returns the first of all triangles with the same sides, as indices.
+
+    Each triangle is found from up to three corners.
+
+    Args:
+        sides: (T, 3) sides of the triangles, shortest first [m].
+    """
+    lengths = (sides / _SAME).astype(np.int64)
+    by_length = np.lexsort(lengths.T)
+    differs = np.diff(lengths[by_length], axis=0, prepend=-1).any(axis=1)
+    return np.sort(by_length[differs])
 
 
 def make_table(clouds: Sequence[Triangles], resolution: float) -> TriangleTable:
