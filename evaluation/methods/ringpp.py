@@ -248,27 +248,12 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """Returns the map from above, (n, n, 6): rows along x, columns along y.
 
         A cell holds the greatest value of each feature over its points.
+
+        Args:
+            points: (N, 3) points of a scan [m].
         """
         config = self.config
-        ground = -config.sensor_height
-        # One column at a time: NumPy reduces slowly along a short axis.
-        z = points[:, 2]
-        within = points.compress(
-            (z > ground + config.min_height) & (z < ground + config.max_height),
-            axis=0,
-        )
-        x, y, z = within.T
-        within = within.compress(
-            (np.abs(x) < config.half_width)
-            & (np.abs(y) < config.half_width)
-            # Some drivers report (0, 0, 0) for beams without a return.
-            & ((x != 0.0) | (y != 0.0) | (z != 0.0)),
-            axis=0,
-        )
-        if config.crop == "round":
-            x, y, _ = within.T
-            within = within[x * x + y * y < config.half_width**2]
-        within = _without_duplicates(within)
+        within = _without_duplicates(self._cropped(points))
         image = np.zeros((config.cells, config.cells, _NUM_FEATURES))
         if len(within) < 2:
             return image
@@ -290,6 +275,29 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         greatest = np.maximum.reduceat(features[order], first)
         image.reshape(-1, _NUM_FEATURES)[cell[order[first]]] = greatest
         return image
+
+    def _cropped(self, points: np.ndarray) -> np.ndarray:
+        """Returns the points of a scan (N, 3) that the map contains."""
+        config = self.config
+        ground = -config.sensor_height
+        # One column at a time: NumPy reduces slowly along a short axis.
+        z = points[:, 2]
+        within = points.compress(
+            (z > ground + config.min_height) & (z < ground + config.max_height),
+            axis=0,
+        )
+        x, y, z = within.T
+        within = within.compress(
+            (np.abs(x) < config.half_width)
+            & (np.abs(y) < config.half_width)
+            # Some drivers report (0, 0, 0) for beams without a return.
+            & ((x != 0.0) | (y != 0.0) | (z != 0.0)),
+            axis=0,
+        )
+        if config.crop == "round":
+            x, y, _ = within.T
+            within = within[x * x + y * y < config.half_width**2]
+        return within
 
     def _weighted_spectrum(self, query: Ring) -> np.ndarray:
         """Returns a query's spectrum (6 F, F), weighted for the correlation.
