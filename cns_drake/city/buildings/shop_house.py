@@ -21,6 +21,31 @@ _ROOFS = ("flat", "gable", "gambrel")
 # A narrow house can also have a roof with a gable to the street.
 _NARROW_ROOFS = (*_ROOFS, "front", "stepped")
 
+# Deeper houses have a flat roof [m].
+_MOST_ROOF_DEPTH_M = 14.0
+# A house narrower than this can have a gable to the street [m].
+_NARROW_M = 10.0
+# Greatest number of windows of the front and one side together.
+_MOST_BAYS = 22
+# Strip in front of the house, for awnings and signs [m].
+_STOOP_M = 0.35
+# Strip behind the house, for eaves [m].
+_BACK_M = 0.35
+# Lower houses contain nothing but shops: height above the shops [m].
+_LEAST_FLATS_M = 3.2
+# Least height of the walls above the shops for a storey of flats [m].
+_LEAST_STOREY_M = 2.4
+# Height of the wall above the ceiling of the topmost storey [m].
+_WALL_ABOVE_M = 0.25
+# Distance between the windows of a free side [m].
+_SIDE_PITCH_M = 4.0
+# Width of the stretch of the front for the door to the flats [m].
+_DOOR_BAY_M = 1.7
+# Distance of this door's middle from the end of the front [m].
+_DOOR_END_M = 0.9
+# Least and greatest width of a bay window [m].
+_ORIEL_WIDTH_M = (1.5, 2.4)
+
 
 class ShopHouse(HouseInRow):
     """The shop house: shops on the ground floor, flats above them."""
@@ -28,13 +53,15 @@ class ShopHouse(HouseInRow):
     def draw(self) -> None:
         """Samples sizes and style."""
         width, depth = self.site.width, self.site.depth
-        roofs = _NARROW_ROOFS if width < min(10.0, depth) else _ROOFS
-        self.draw_house(width, roofs if depth <= 14.0 else ("flat",))
-        self.window_pitch = max(self.window_pitch, (width + depth) / 22)
-        self.stoop = 0.35
+        roofs = _NARROW_ROOFS if width < min(_NARROW_M, depth) else _ROOFS
+        self.draw_house(
+            width, roofs if depth <= _MOST_ROOF_DEPTH_M else ("flat",)
+        )
+        self.window_pitch = max(self.window_pitch, (width + depth) / _MOST_BAYS)
+        self.stoop = _STOOP_M
         # Height of the shops. A low house contains nothing but shops.
         self.floor = self.uniform(3.5, 4.2, digits=2)
-        if self.height - self.floor < 3.2:
+        if self.height - self.floor < _LEAST_FLATS_M:
             self.roof = "flat"
             self.floor = round(min(3.4, self.height - 1.6), 2)
         self.shop_width = self.uniform(4.5, 7.5)
@@ -55,17 +82,18 @@ class ShopHouse(HouseInRow):
         """
         _, y0, _, y1 = self.site.bounds
         left, right, blind = front_of_site(self)
-        area = (left, y0 + self.stoop, right, y1 - 0.35)
+        area = (left, y0 + self.stoop, right, y1 - _BACK_M)
         wing, storeys = wing_and_storeys(self, area, blind)
         openings = Openings(self, wing)
         ground = self.floor
-        room = wing.wall_top - 0.25 - ground
-        upper = storeys if room > 2.4 else 0
+        room = wing.wall_top - _WALL_ABOVE_M - ground
+        upper = storeys if room > _LEAST_STOREY_M else 0
         step = room / max(upper, 1)
         sides = [k for k in (1, 3) if k not in blind]
-        head = min(2.25, step - 0.4)
-        width = self.window_width
-        for edges, pitch in (((0, 2), self.window_pitch), (sides, 4.0)):
+        for edges, pitch in (
+            ((0, 2), self.window_pitch),
+            (sides, _SIDE_PITCH_M),
+        ):
             wing_openings.add_window_storeys(
                 openings,
                 edges,
@@ -73,8 +101,8 @@ class ShopHouse(HouseInRow):
                 storey=step,
                 count=upper,
                 pitch=pitch,
-                width=width,
-                head=head,
+                width=self.window_width,
+                head=min(2.25, step - 0.4),
             )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
@@ -94,11 +122,13 @@ class ShopHouse(HouseInRow):
 
 def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
     """Adds the shops, the door to the flats, service doors at the back."""
-    wall = wing.wall(0)
-    door = 1.7 * (house.floor < house.height - 3.0)
-    length = wall.length
-    left = house.door_left
-    start, end = (door, length) if left else (0.0, length - door)
+    length = wing.wall(0).length
+    start, end = 0.0, length
+    has_flats = house.floor < house.height - 3.0
+    if has_flats and house.door_left:
+        start = _DOOR_BAY_M
+    elif has_flats:
+        end = length - _DOOR_BAY_M
     wing_openings.add_shops(
         openings,
         0,
@@ -108,8 +138,8 @@ def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
         width=house.shop_width,
         awnings=house.awnings,
     )
-    if door:
-        x = 0.9 if left else length - 0.9
+    if has_flats:
+        x = _DOOR_END_M if house.door_left else length - _DOOR_END_M
         wing_openings.add_door(openings, 0, x=x, floor=0.0, height=2.3)
     back = [
         wing_openings.sash(width=1.2, z=0.0, sill=1.4, head=2.3),
@@ -121,19 +151,31 @@ def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
 def _add_oriels(
     house: ShopHouse, wing: Wing, openings: Openings, upper: int, step: float
 ) -> None:
+    """Adds bay windows above the shops, in place of the windows there.
+
+    Args:
+        house: the building.
+        wing: its wing.
+        openings: openings of the wing.
+        upper: number of storeys above the shops.
+        step: height of such a storey [m].
+    """
     if upper < 1 or step < 2.5 or house.oriels == 0:
         return
     wall = wing.wall(0)
+    storeys = max(1, upper - 1)
     low = round(house.floor + 0.15, 2)
-    high = round(house.floor + max(1, upper - 1) * step - 0.15, 2)
+    high = round(house.floor + storeys * step - 0.15, 2)
     high = min(high, wing.wall_top - 0.7)
-    for a, b in bays.stretches(
+    least, most = _ORIEL_WIDTH_M
+    cells = bays.stretches(
         wall.length, pitch=wall.length / house.oriels, margin=0.4
-    ):
-        width = min(2.4, b - a - 1.2)
-        if width < 1.5:
+    )
+    for start, end in cells:
+        width = min(most, end - start - 1.2)
+        if width < least:
             continue
-        x = (a + b) / 2
+        x = (start + end) / 2
         openings.clear(
             0,
             x0=x - width / 2 - 0.15,
@@ -149,6 +191,6 @@ def _add_oriels(
             reach=0.6,
             z0=low,
             z1=high,
-            storeys=max(1, upper - 1),
+            storeys=storeys,
             canted=house.bay != "box",
         )

@@ -20,6 +20,18 @@ _FRONT_M = 0.4
 _BACK_M = 0.1
 # Least height above the shops for an upper floor [m].
 _UPPER_M = 3.4
+# Height of an upper floor, approximately [m].
+_FLOOR_M = 3.0
+# Distance of the top of the walls below the parapet's top [m].
+_RIM_M = 0.1
+# Greatest width of a shop [m].
+_MOST_SHOP_M = 9.0
+# Share of the shops with an awning, if there is no canopy.
+_AWNING_SHARE = 0.7
+# Half the width of a pier at the ends of a parapet [m].
+_PIER_HALF_M = 0.22
+# Every unit of this many has equipment on its roof.
+_EQUIPPED_EVERY = 3
 
 
 class ShopStrip(Building):
@@ -52,24 +64,28 @@ class ShopStrip(Building):
         shares = self.rng.uniform(0.8, 1.2, count)
         bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
         highest = self.whole(0, count)
+        has_upper_floors = self.height > self.ground + _UPPER_M
         for k in range(count):
-            blind = self.site.blind_edges_of_unit(k, count)
-            tall = self.height > self.ground + _UPPER_M and (
-                k == highest or self.chance(self.upper)
-            )
-            top = self.height if k == highest else _parapet_top(self, tall)
+            is_highest = k == highest
+            tall = has_upper_floors and (is_highest or self.chance(self.upper))
+            top = self.height if is_highest else _parapet_top(self, tall)
             back = y1 - _BACK_M - self.uniform(0.0, 0.12) * (y1 - y0)
-            area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
             roof = Roof("flat", parapet=min(0.5, top - self.ground - 0.1))
             wing = Wing.at(
-                area, wall_top=top - 0.1, top=top, roof=roof, blind=blind
+                (bounds[k], y0 + _FRONT_M, bounds[k + 1], back),
+                wall_top=top - _RIM_M,
+                top=top,
+                roof=roof,
+                blind=site.blind_edges_of_unit(k, count),
             )
             _add_unit(self, wing, tall)
-            # Only every third unit has equipment on its roof.
-            if k % 3 == 0:
-                part = f"unit_{k}_"
+            if k % _EQUIPPED_EVERY == 0:
                 equip_roof(
-                    self, wing.outline, wing.floor, self.roof_items, prefix=part
+                    self,
+                    wing.outline,
+                    wing.floor,
+                    self.roof_items,
+                    prefix=f"unit_{k}_",
                 )
 
 
@@ -82,10 +98,13 @@ def _parapet_top(strip: ShopStrip, tall: bool) -> float:
 
 
 def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
+    """Adds one unit: shops, upper floors if it is tall, and its parapet."""
     openings = Openings(strip, wing)
     wall = wing.wall(0)
     cladding = "walls" if strip.chance(0.5) else "facing"
-    upper_floors = round((wing.top - strip.ground - 0.6) / 3.0) if tall else 0
+    upper_floors = 0
+    if tall:
+        upper_floors = round((wing.top - strip.ground - 0.6) / _FLOOR_M)
     storey = (wing.top - 0.5 - strip.ground) / max(upper_floors, 1)
     width = strip.uniform(1.1, 2.2, digits=2)
     wing_openings.add_window_storeys(
@@ -104,8 +123,8 @@ def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
         start=0.2,
         end=wall.length - 0.2,
         height=strip.ground,
-        width=9.0,
-        awnings=0.0 if strip.canopy else 0.7,
+        width=_MOST_SHOP_M,
+        awnings=0.0 if strip.canopy else _AWNING_SHARE,
         reach=strip.canopy_reach,
     )
     back = [
@@ -119,45 +138,38 @@ def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
     )
     if strip.canopy:
         z = strip.ground - 0.95
-        reach = strip.canopy_reach
-        strip.add_to(
-            "awning",
-            wall.box(
-                x=(0.05, wall.length - 0.05), y=(-0.02, reach), z=(z, z + 0.22)
-            ),
+        canopy = wall.box(
+            x=(0.05, wall.length - 0.05),
+            y=(-0.02, strip.canopy_reach),
+            z=(z, z + 0.22),
         )
+        strip.add_to("awning", canopy)
     _add_parapet(strip, wing, cladding)
 
 
 def _add_parapet(strip: ShopStrip, wing: Wing, cladding: str) -> None:
-    """Adds a coping along the parapet's front, or piers at its ends."""
+    """Adds a coping along the parapet's front, or piers at its ends.
+
+    Some parapets that stand out above the shops also get a sign.
+    """
     wall = wing.wall(0)
-    top = wing.top
-    length = wall.length
+    top, length = wing.top, wall.length
     if strip.chance(0.5):
-        strip.add_to(
-            "trim",
-            wall.box(
-                x=(0.02, length - 0.02),
-                y=(-0.05, 0.12),
-                z=(top - 0.2, top - 0.02),
-            ),
+        coping = wall.box(
+            x=(0.02, length - 0.02), y=(-0.05, 0.12), z=(top - 0.2, top - 0.02)
         )
+        strip.add_to("trim", coping)
     else:
         for x in (0.25, length - 0.25):
-            strip.add_to(
-                cladding,
-                wall.box(
-                    x=around(x, 0.22), y=(-0.05, 0.15), z=(0.0, top - 0.03)
-                ),
+            pier = wall.box(
+                x=around(x, _PIER_HALF_M), y=(-0.05, 0.15), z=(0.0, top - 0.03)
             )
-    visible = top - strip.ground - 0.1 > 0.6 and top < strip.height - 3.0
-    if strip.chance(0.4) and visible:
-        strip.add_to(
-            "sign",
-            wall.box(
-                x=(0.25 * length, 0.75 * length),
-                y=(-0.15, 0.1),
-                z=(top - 0.3, top + 0.7),
-            ),
+            strip.add_to(cladding, pier)
+    is_visible = top - strip.ground - 0.1 > 0.6 and top < strip.height - 3.0
+    if strip.chance(0.4) and is_visible:
+        sign = wall.box(
+            x=(0.25 * length, 0.75 * length),
+            y=(-0.15, 0.1),
+            z=(top - 0.3, top + 0.7),
         )
+        strip.add_to("sign", sign)
