@@ -8,6 +8,18 @@ from cns_drake.city.buildings.house_in_row import HouseInRow, add_house
 
 # Materials of the doors in a terrace.
 _DOORS = ("accent", "trim", "roof")
+# Depth of the stoops in front of the houses [m].
+_STOOP_M = 1.6
+# Greatest height of the ground floors [m].
+_MOST_FLOOR_M = 0.5
+# Roofs of a terrace are lower by this factor than roofs of row houses.
+_LOWER_ROOF = 0.8
+# Greatest depth of a house [m].
+_MOST_DEPTH_M = 10.5
+# Strip between the houses and the back of the site, for eaves [m].
+_BACK_M = 0.35
+# Houses of less than this depth do not stand back [m].
+_LEAST_DEPTH_M = 6.0
 
 
 class Terrace(HouseInRow):
@@ -22,9 +34,9 @@ class Terrace(HouseInRow):
             ("gable", "gable", "gambrel"),
             ("sill", "sill", "sill", "shutters"),
         )
-        self.rise *= 0.8
-        self.stoop = 1.6
-        self.floor = min(self.plinth, 0.5)
+        self.rise *= _LOWER_ROOF
+        self.stoop = _STOOP_M
+        self.floor = min(self.plinth, _MOST_FLOOR_M)
         # Kind of bay window of the houses that have one.
         self.house_bay = self.bay
         if self.bay == "none":
@@ -48,22 +60,22 @@ class Terrace(HouseInRow):
         """
         x0, y0, x1, y1 = self.site.bounds
         front = y0 + self.stoop
-        back = min(y1 - 0.35, front + 10.5)
+        back = min(y1 - _BACK_M, front + _MOST_DEPTH_M)
         count = max(1, round((x1 - x0) / self.unit_width))
         bounds = np.round(np.linspace(x0, x1, count + 1), 2).tolist()
-        deep = back - front - self.setback > 6.0
+        can_stand_back = back - front - self.setback > _LEAST_DEPTH_M
         for k in range(count):
-            low = (k // 2) % 2 == 1
-            y = front + self.setback * (low and deep)
+            is_lower = (k // 2) % 2 == 1
+            y = front + self.setback if is_lower and can_stand_back else front
             area = (bounds[k], round(y, 2), bounds[k + 1], round(back, 2))
             house = self._varied(k)
-            house.height = self.height - self.step * low
+            house.height = self.height - self.step if is_lower else self.height
             add_house(
                 house,
                 area,
                 self.site.blind_edges_of_unit(k, count),
-                f"house_{k:02d}_",
-                self.pick(_DOORS),
+                part=f"house_{k:02d}_",
+                door_material=self.pick(_DOORS),
             )
 
     def _varied(self, k: int) -> HouseInRow:
