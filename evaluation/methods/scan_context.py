@@ -43,6 +43,10 @@ from evaluation.methods.registry import register
 # Number of contexts compared at a time; it limits the memory of an exhaustive
 # comparison.
 _CONTEXTS_AT_ONCE = 512
+# Variants whose contexts are polar; those of the others are Cartesian.
+_POLAR_VARIANTS = ("polar", "augmented-polar")
+# Augmented variant -> number of contexts of a place; others have one.
+_NUM_CONTEXTS = {"augmented-polar": 3, "augmented-cart": 2}
 
 Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
 
@@ -205,8 +209,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
 
     @property
     def num_shortlisted(self) -> int:
-        contexts = {"augmented-polar": 3, "augmented-cart": 2}
-        return self.config.candidates * contexts.get(self.config.variant, 1)
+        number = _NUM_CONTEXTS.get(self.config.variant, 1)
+        return self.config.candidates * number
 
     def shortlist(
         self, query: Contexts, database: ContextDatabase
@@ -238,7 +242,13 @@ class ScanContext(Method[Contexts, ContextDatabase]):
     def _score(
         self, query: Contexts, database: ContextDatabase, chosen: np.ndarray
     ) -> np.ndarray:
-        """Returns the scores (D,) by some contexts only."""
+        """Returns the scores (D,) by some contexts only.
+
+        Args:
+            query: the context of the query.
+            database: contexts of the places.
+            chosen: (C,) indices of the contexts that are compared.
+        """
         chosen = np.sort(chosen)
         scores = np.full(database.num_places, np.nan)
         for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
@@ -266,7 +276,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         best = int(np.nanargmax(similarities))
         num_columns = query.images.shape[2]
         shift = int(shifts[best])
-        if self.config.variant in ("polar", "augmented-polar"):
+        if self.config.variant in _POLAR_VARIANTS:
             # Shift s maps the place's context to the query's: what the place
             # sees at azimuth a, the query sees at a + s cells.
             side = (0.0, -1.0, 1.0)[best]
@@ -288,7 +298,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         return downsample(points, self.config.voxel_size) + lift
 
     def _context(self, points: np.ndarray) -> np.ndarray:
-        if self.config.variant in ("polar", "augmented-polar"):
+        """Returns the context (rows, columns) of points (N, 3)."""
+        if self.config.variant in _POLAR_VARIANTS:
             return _polar_context(points, self.config)
         return _cart_context(points, self.config)
 
@@ -303,6 +314,8 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         aligning keys fit best are tried.
 
         Args:
+            query: the context of the query.
+            database: contexts of the places.
             chosen: (C,) indices of contexts.
 
         Returns:
@@ -311,13 +324,9 @@ class ScanContext(Method[Contexts, ContextDatabase]):
         """
         num_columns = query.images.shape[2]
         columns, filled = _unit_columns(query.images)
-        first = _key_shift(
+        shifts = self._tried_shifts(
             query.aligning_keys[0], database.aligning_keys[chosen]
         )
-        # A half is rounded up.
-        half = math.floor(0.5 * self.config.search_ratio * num_columns + 0.5)
-        window = np.arange(-half, half + 1)
-        shifts = (first[:, None] + window) % num_columns
         cosines = columns[0].T @ database.columns[chosen]
         column = np.arange(num_columns)
         partner = (column - shifts[:, :, None]) % num_columns
@@ -335,6 +344,19 @@ class ScanContext(Method[Contexts, ContextDatabase]):
             np.where(np.isfinite(highest), highest, np.nan),
             shifts[context, best],
         )
+
+    def _tried_shifts(self, key: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Returns the shifts (C, S) that are tried for some contexts.
+
+        Args:
+            key: (columns,) aligning key of the query.
+            others: (C, columns) aligning keys of the contexts.
+        """
+        first = _key_shift(key, others)
+        # A half is rounded up.
+        half = math.floor(0.5 * self.config.search_ratio * len(key) + 0.5)
+        window = np.arange(-half, half + 1)
+        return (first[:, None] + window) % len(key)
 
 
 def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
@@ -394,10 +416,15 @@ def _highest(
     min_points: int,
     floor: float,
 ) -> np.ndarray:
-    """Returns the greatest of heights (N,) in each cell [m].
+    """Returns the greatest height in each cell [m].
 
-    The result is 0 in cells with too few points, and at least `floor` in all
-    other cells.
+    Args:
+        heights: (N,) heights of points [m].
+        cells: (N,) number of each point's cell, row by row.
+        shape: numbers of rows and of columns.
+        min_points: least number of points in a cell; with fewer, the result is
+            0.
+        floor: least result in all other cells [m].
     """
     size = shape[0] * shape[1]
     highest = np.full(size, floor)
