@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
@@ -48,6 +49,10 @@ _FIRST_TURNS = turns(24)
 _FIRST_REACH = 2
 _FIRST_MOVES = _moves(0, _FIRST_REACH)
 _FIRST_MOVES = _FIRST_MOVES[np.abs(_FIRST_MOVES).sum(axis=1) < 2 * _FIRST_REACH]
+# A large overlap at all headings is no sign of a match, because all scans have
+# many points near their sensors. This share of the mean over headings is
+# subtracted; trials led to it.
+_MEAN_SHARE = 0.5
 # The second and the third: cells of 2 m; steps of 5 deg, then of 2.5 deg.
 _SECOND_HALVINGS = 2
 _SECOND_WEIGHTS = np.array([1, 1, 4, 2])
@@ -116,6 +121,22 @@ class LayeredScan:
 
     cells: np.ndarray
     starts: np.ndarray
+
+
+class _FinePose(NamedTuple):
+    """The best pose of two scans on fine maps; see `climb`.
+
+    Attributes:
+        heading: index of the heading in `_LAST_TURNS`.
+        rows: shift along x, in half cells.
+        columns: shift along y, in half cells.
+        common: (5,) number of common cells in each layer.
+    """
+
+    heading: int
+    rows: int
+    columns: int
+    common: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -240,20 +261,24 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
                 poses[start[0]] = self._to_pose(found)
         return poses
 
-    def _to_pose(self, found: np.ndarray) -> np.ndarray:
-        """Returns X_PQ (4, 4) for the pose in a result of `climb`."""
-        c, s = _LAST_TURNS[found[0]] / _LAST_TURNS[0, 0]
+    def _to_pose(self, found: _FinePose) -> np.ndarray:
+        """Returns X_PQ (4, 4) for a pose on fine maps."""
+        c, s = _LAST_TURNS[found.heading] / _LAST_TURNS[0, 0]
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
-        return make_pose(
-            R_PQ, np.array([found[1] * half_cell, found[2] * half_cell, 0.0])
-        )
+        x, y = found.rows * half_cell, found.columns * half_cell
+        return make_pose(R_PQ, np.array([x, y, 0.0]))
 
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray
-    ) -> np.ndarray:
-        """Returns the best pose of two scans and their overlap; see `climb`."""
-        return climb(
+    ) -> _FinePose:
+        """Returns the best pose of two scans, found by hill climbing.
+
+        Args:
+            query, place: the two scans.
+            start: (3,) heading and shifts at which the search starts.
+        """
+        heading, rows, columns, *common = climb(
             query.cells,
             query.starts,
             place.cells,
@@ -262,15 +287,21 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             _LAST_TURNS,
             start,
             _LAST_STEPS,
-        )
+        ).tolist()
+        return _FinePose(heading, rows, columns, np.array(common))
 
     def _score(
-        self, query: LayeredScan, place: LayeredScan, found: np.ndarray
+        self, query: LayeredScan, place: LayeredScan, found: _FinePose
     ) -> float:
-        """Returns the score of two scans, from a result of `climb`."""
+        """Returns the score of two scans.
+
+        Args:
+            query, place: the two scans.
+            found: their best pose.
+        """
         config = self.config
         weights = np.array(config.weights)
-        common = int(weights @ found[3:])
+        common = int(weights @ found.common)
         of_query = int(weights @ np.diff(query.starts)) + config.least_cells
         of_place = int(weights @ np.diff(place.starts)) + config.least_cells
         if of_query == 0 or of_place == 0:
@@ -291,28 +322,21 @@ def _search(
     third search compares `refined` of these pairs. An exhaustive search keeps
     each place at its best heading.
 
+    Args:
+        query: the query's scan.
+        database: the places.
+        number: number of pairs that the second search compares.
+        refined: number of pairs that the third search compares.
+        exhaustive: whether each place is kept.
+
     Returns:
         (N, 4) int64: place, heading and shifts from which `climb` starts. The
         pairs with the greatest overlap, compared with chance, come first.
     """
-    # The first search: every place at every heading.
-    shape = len(database.places), len(_FIRST_TURNS)
-    starts = np.zeros((math.prod(shape), 4), np.int64)
-    starts[:, 0], starts[:, 1] = np.divmod(np.arange(len(starts)), shape[1])
-    surprise, poses = _overlaps_beyond_chance(
-        _maps_of_scan(query, _FIRST_TURNS, _FIRST_HALVINGS),
-        database.first,
-        _FIRST_WEIGHTS,
-        starts,
-        _FIRST_MOVES,
-    )
-    # A large overlap at all headings is no sign of a match, because all scans
-    # have many points near their sensors. Half of the mean over headings is
-    # subtracted; trials led to this factor.
-    surprise = surprise.reshape(shape)
-    surprise -= 0.5 * surprise.mean(axis=1, keepdims=True)
+    surprise, poses = _first_search(query, database)
+    num_places, num_headings = surprise.shape
     if exhaustive:
-        best = surprise.argmax(axis=1) + np.arange(shape[0]) * shape[1]
+        best = surprise.argmax(axis=1) + np.arange(num_places) * num_headings
         refined = len(best)
     else:
         best = _indices_of_greatest(surprise.ravel(), number)
@@ -328,6 +352,31 @@ def _search(
     return poses[np.sort(first)] * _TO_LAST
 
 
+def _first_search(
+    query: LayeredScan, database: LayeredDatabase
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compares a query with every place at every heading.
+
+    Returns:
+        (D, H) by how many standard deviations the overlap exceeds chance, less
+        a share of the mean over the headings; (D H, 4) the best poses, place by
+        place.
+    """
+    shape = len(database.places), len(_FIRST_TURNS)
+    starts = np.zeros((math.prod(shape), 4), np.int64)
+    starts[:, 0], starts[:, 1] = np.divmod(np.arange(len(starts)), shape[1])
+    surprise, poses = _overlaps_beyond_chance(
+        _maps_of_scan(query, _FIRST_TURNS, _FIRST_HALVINGS),
+        database.first,
+        _FIRST_WEIGHTS,
+        starts,
+        _FIRST_MOVES,
+    )
+    surprise = surprise.reshape(shape)
+    surprise -= _MEAN_SHARE * surprise.mean(axis=1, keepdims=True)
+    return surprise, poses
+
+
 def _overlaps_beyond_chance(
     query: CoarseMaps,
     places: CoarseMaps,
@@ -337,7 +386,12 @@ def _overlaps_beyond_chance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the best overlaps near some poses, compared with chance.
 
-    `starts` are (N, 4) poses: place, heading and shifts.
+    Args:
+        query: maps of the query, one for each heading.
+        places: maps of the places.
+        weights: (4,) weight of each of the four maps.
+        starts: (N, 4) poses: place, heading and shifts.
+        moves: moves of these poses that are tried, see `best_overlaps`.
 
     Returns:
         (N,) by how many standard deviations the overlap exceeds the overlap
