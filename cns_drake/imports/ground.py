@@ -161,7 +161,8 @@ def ground_of(
 ) -> Ground:
     """Returns the ground of a city: its terrain or, without one, a guess.
 
-    The guess is a smooth ground through the lowest points of the structures.
+    The guess is a smooth ground through the lowest points of structures, and
+    through streets and other ground.
 
     Args:
         objects: objects of the city.

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 import numpy as np
 
-from cns_drake.imports.colours import WATER
+from cns_drake.imports.colours import WATER, Rgb
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
@@ -95,7 +95,7 @@ def _draw_objects(
     """Draws objects except terrain, the ground first; returns the legend."""
     legend: dict[str, Artist] = {}
     for is_ground in (True, False):
-        by_colour: dict[tuple[float, float, float], list[np.ndarray]] = {}
+        by_colour: dict[Rgb, list[np.ndarray]] = {}
         for imported in objects:
             if (
                 imported.is_ground == is_ground
@@ -170,7 +170,7 @@ def _draw_drives(
     return legend
 
 
-def _colour_of(imported: ImportedObject) -> tuple[float, float, float]:
+def _colour_of(imported: ImportedObject) -> Rgb:
     """Returns the colour of a structure in the picture.
 
     Plants have the colour of their class, all others that of their first part.

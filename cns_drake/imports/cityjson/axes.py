@@ -71,8 +71,10 @@ def exchange_mirrored_axes(city: CityFile) -> None:
     """Exchanges the first two coordinates if the city is mirrored otherwise.
 
     The corners of a face are counter-clockwise as seen from outside; in a
-    mirrored city, faces are inside out. Coordinates are exchanged only if both
-    orders are possible; otherwise, a mirrored city is counted as a fault.
+    mirrored city, faces are inside out. Coordinates are exchanged only if
+    `settle_axes` has left their order open. Without a reference system, a
+    mirrored city is counted as a fault. An order that is open is counted as
+    well, if no face can be judged and north is first.
     """
     if city.system.name and not city.order_is_open:
         return

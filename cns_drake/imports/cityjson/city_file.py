@@ -55,9 +55,8 @@ class CityFile:
         objects: id -> object.
         system: reference system of the coordinates.
         faults: counts of faulty parts.
-        order_is_open: whether the order of east and north in the file is
-            unknown, because both orders lead to places in the system's area of
-            use.
+        order_is_open: whether the places of the vertices leave open which of
+            the first two coordinates is east (see `axes.settle_axes`).
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)

@@ -95,8 +95,9 @@ def find_free_space(
 ) -> FreeSpace:
     """Returns the space for a car that is free in all stages of a city.
 
-    `objects` contains the objects of all stages. If the city has roads,
-    only space on roads counts as free.
+    `objects` contains the objects of all stages. If the city has connected
+    roads on which a car has at least 800 m^2, only space on roads counts as
+    free. Otherwise, only space between buildings does, if there are any.
     """
     low, high = _search_bounds(objects)
     size = np.ceil((high - low) / CELL).astype(int) + 1

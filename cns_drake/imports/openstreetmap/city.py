@@ -67,10 +67,11 @@ _TALLEST = 150.0
 # A car can hit this part of a tree: radius and height of the trunk [m].
 _TRUNK_RADIUS = 0.3
 _TRUNK_HEIGHT = 2.0
-# Width and usual height of a hedge [m].
-_HEDGE = (0.8, 1.2)
-# Width and usual height of a wall [m].
-_WALL = (0.2, 1.6)
+_HEDGE_WIDTH = 0.8  # [m]
+_WALL_WIDTH = 0.2  # [m]
+# Heights of hedges and walls without a tag for their height [m].
+_HEDGE_HEIGHT = 1.2
+_WALL_HEIGHT = 1.6
 # How far the sea extends beyond the buildings [m].
 _SEA_MARGIN = 60.0
 # Wider areas, such as whole countries, are refused [m].
@@ -280,10 +281,10 @@ def _barriers(
         name, tags, line, _ = way
         kind = tags.get("barrier")
         if kind == "hedge":
-            width, usual = _HEDGE
+            width, usual = _HEDGE_WIDTH, _HEDGE_HEIGHT
             semantic_class = "vegetation"
         elif kind in ("wall", "fence", "city_wall"):
-            width, usual = _WALL
+            width, usual = _WALL_WIDTH, _WALL_HEIGHT
             semantic_class = "fence"
         else:
             continue

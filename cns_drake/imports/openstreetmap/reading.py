@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.city.geometry.polygons import hull_of
+from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.openstreetmap.element_kinds import (
     element_kind,
     is_building,
@@ -73,7 +74,9 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
             if isinstance(element, osmium.osm.Way) and tags:
                 if is_building(tags):
                     buildings.append(name)
-                _add_way(element, name, tags, features)
+                way = _way_of(element, name, tags, features.faults)
+                if way is not None:
+                    features.ways.append(way)
             elif isinstance(element, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
                     buildings.append(name)
@@ -116,8 +119,10 @@ def _area_of(area: Any, tags: Tags) -> OsmArea:
     return OsmArea(name, tags, _polygons_of(area))
 
 
-def _add_way(way: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
-    """Adds an osmium way to the features, if two or more nodes have places.
+def _way_of(
+    way: Any, name: str, tags: Tags, faults: ImportFaults
+) -> OsmWay | None:
+    """Returns a way of osmium; None unless two or more nodes have places.
 
     Nodes without a place are left out, and counted unless the way is a
     building.
@@ -126,11 +131,11 @@ def _add_way(way: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
     missing = len(way.nodes) - len(nodes)
     if missing and not is_building(tags):
         gap = "place of a way that is not in the file, left out"
-        features.faults.add(gap, name, missing)
-    if len(nodes) > 1:
-        line = np.array([(node.lon, node.lat) for node in nodes])
-        numbers = tuple(node.ref for node in nodes)
-        features.ways.append(OsmWay(name, tags, line, numbers))
+        faults.add(gap, name, missing)
+    if len(nodes) < 2:
+        return None
+    line = np.array([(node.lon, node.lat) for node in nodes])
+    return OsmWay(name, tags, line, tuple(node.ref for node in nodes))
 
 
 def _add_node(node: Any, name: str, tags: Tags, features: OsmFeatures) -> None:
