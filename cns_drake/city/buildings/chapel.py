@@ -51,8 +51,10 @@ _CROSS_M = 1.3
 _BUTTRESS_HALF_M = 0.22
 # How far a buttress stands out of the wall [m].
 _BUTTRESS_REACH_M = 0.42
-# Least and greatest width of a vestry [m].
-_VESTRY_WIDTH_M = (1.5, 3.2)
+# Least width of a vestry [m].
+_LEAST_VESTRY_M = 1.5
+# Greatest width of a vestry [m].
+_MOST_VESTRY_M = 3.2
 
 
 class _Wings(NamedTuple):
@@ -388,10 +390,9 @@ def _vestry(nave: Wing, width: float) -> Wing | None:
     room_right = width - _MARGIN_M - nave.x1
     on_left = room_left > room_right
     room = room_left if on_left else room_right
-    least, most = _VESTRY_WIDTH_M
-    if room < least:
+    if room < _LEAST_VESTRY_M:
         return None
-    reach = min(room, most)
+    reach = min(room, _MOST_VESTRY_M)
     high = min(nave.wall_top - 0.2, 3.6)
     low = max(high - 0.45 * reach, 1.9)
     y0 = nave.y1 - 4.2

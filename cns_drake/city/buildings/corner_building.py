@@ -34,8 +34,9 @@ _MOST_BAYS = 36
 _CHORD_M = 2.8
 # Shorter walls are chords of the round corner [m].
 _CHORD_WALL_M = 3.0
-# Distance of the bays from the ends of a wall: storeys and ground floor [m].
+# Distance of the bays of a storey from the ends of a wall [m].
 _END_M = 0.3
+# Distance of the shops from the ends of a wall [m].
 _SHOP_END_M = 0.35
 # Depth of the windows of the ground floor [m].
 _SHOP_RECESS_M = 0.4

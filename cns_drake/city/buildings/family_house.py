@@ -24,8 +24,9 @@ _GARAGE_WALL_M = 2.65
 _GARAGE_DEPTH_M = 6.5
 # Greatest width of the door of a garage [m].
 _GARAGE_DOOR_M = 4.9
-# Edges of a wing in front and behind, and at its sides.
+# Numbers of a wing's edges in front and behind.
 _FRONT_AND_BACK = (0, 2)
+# Numbers of a wing's edges at the sides.
 _SIDES = (1, 3)
 
 

@@ -40,8 +40,9 @@ _WASH_SITE_M = 26.0
 _MOST_SHOP_M = 18.0
 # Distance of the islands from the ends of the canopy [m].
 _ISLAND_END_M = 1.5
-# Height of the islands, and of the pumps' feet on them [m].
+# Height of the islands [m].
 _KERB_M = 0.18
+# Height of the feet of pumps and bollards, just inside the islands [m].
 _ISLAND_M = 0.15
 # Distance from one board of the price sign to the next [m].
 _BOARD_PITCH_M = 0.75

@@ -24,19 +24,21 @@ _FORECOURT_M = 7.0
 _MOST_ROOMS = 11
 # Greatest number of windows of the other walls.
 _MOST_SIDE_BAYS = 34
-# Greatest lengths of the chords of round ends, and of round corners [m].
+# Greatest length of the chords of round ends [m].
 _END_CHORD_M = 3.2
+# Greatest length of the chords of round corners [m].
 _CORNER_CHORD_M = 2.8
 # Height of the walls above the rooms [m].
 _RIM_M = 1.2
-# Depths of the glass of the lobby, and of the bar on the roof [m].
+# Depth of the glass of the lobby [m].
 _LOBBY_RECESS_M = 0.4
+# Depth of the glass of the bar on the roof [m].
 _BAR_RECESS_M = 0.3
 # Half the width of the canopy over the drive [m].
 _CANOPY_HALF_M = 6.0
 # Height of the canopy's underside [m].
 _CANOPY_M = 4.2
-# Side of the square pillars of the canopy, and thickness of the canopy [m].
+# Side of the square pillars of the canopy [m].
 _PILLAR_M = 0.7
 # Greatest number of parts of which the storeys of rooms consist.
 _MOST_GROUPS = 15
@@ -44,6 +46,7 @@ _MOST_GROUPS = 15
 _END_M = 0.4
 # Finish of the sign.
 _SIGN = Finish((0.55, 0.16, 0.14))
+# Equipment on the roof of the bar.
 _ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 
 

@@ -42,13 +42,12 @@ _SIDE_PITCH_M = 4.2
 _DOOR_END_M = 0.95
 # Half the width of the landing in front of the door [m].
 _LANDING_HALF_M = 0.65
-# Height and depth of a step of the stoop, approximately [m].
-_RISER_M = 0.17
-_TREAD_M = 0.29
 # Strip beside the walls for the cornice of a flat roof [m].
 _CORNICE_ROOM_M = 0.3
-# Least and greatest width of a bay window [m].
-_BAY_WIDTH_M = (1.7, 2.6)
+# Least width of a bay window [m].
+_LEAST_BAY_M = 1.7
+# Greatest width of a bay window [m].
+_MOST_BAY_M = 2.6
 
 
 class HouseInRow(Building):
@@ -219,8 +218,10 @@ def _add_entrance(
     wing_openings.add_door(
         openings, 0, x=x, floor=floor, height=2.25, material=material
     )
-    count = max(1, round(floor / _RISER_M))
-    run = min(_TREAD_M * count, max(house.stoop - 0.5, 0.3 * house.stoop))
+    count = max(1, round(floor / porches.RISER_M))
+    run = min(
+        porches.TREAD_M * count, max(house.stoop - 0.5, 0.3 * house.stoop)
+    )
     landing = house.stoop - run
     if floor > 0.05:
         x0, x1 = around(x, _LANDING_HALF_M)
@@ -260,10 +261,9 @@ def _add_bay(
     start, end = 0.0, door - 0.8
     if house.door_left:
         start, end = door + 0.8, wall.length
-    least, most = _BAY_WIDTH_M
-    width = min(end - start - 0.7, most)
+    width = min(end - start - 0.7, _MOST_BAY_M)
     lacks_storey = house.bay == "oriel" and storeys < 2
-    if house.bay == "none" or width < least or lacks_storey:
+    if house.bay == "none" or width < _LEAST_BAY_M or lacks_storey:
         return
     count = min(house.bay_storeys, storeys)
     x = (start + end) / 2

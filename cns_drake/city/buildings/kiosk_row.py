@@ -44,8 +44,9 @@ _ROOF_M = 0.15
 _STEP_M = 0.25
 # Height of the beam on the posts of an arcade [m].
 _ARCADE_M = 2.35
-# Side of the square posts of an arcade, and distance between them [m].
+# Side of the square posts of an arcade [m].
 _POST_M = 0.16
+# Distance between the posts of an arcade, approximately [m].
 _POST_PITCH_M = 3.2
 
 

@@ -22,8 +22,9 @@ _MOST_BAYS = 42
 _PENTHOUSE_OFFICE_M = 18.0
 # Height of the topmost walls below the parapet [m].
 _FRIEZE_M = 0.5
-# Depths of the glass of the ground floor, and of the penthouse [m].
+# Depth of the glass of the ground floor [m].
 _GROUND_RECESS_M = 0.5
+# Depth of the glass of the penthouse [m].
 _PENTHOUSE_RECESS_M = 0.3
 # Distance of the shops from the ends of a wall [m].
 _SHOP_END_M = 0.7

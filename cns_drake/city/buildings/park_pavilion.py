@@ -26,8 +26,7 @@ from cns_drake.city.geometry.mesh import Mesh
 _TABLE_PITCH_M = 3.0
 # Overhang of the roof [m].
 _EAVES_M = 0.6
-# Height of a step of the stairs, approximately, and its depth [m].
-_RISER_M = 0.17
+# Depth of a step [m].
 _TREAD_M = 0.26
 # Greatest radius of a round pavilion [m].
 _MOST_RADIUS_M = 7.0
@@ -103,7 +102,7 @@ def _add_round(
         reach: greatest distance of deck and steps from the middle [m].
     """
     floor = pavilion.floor
-    steps = max(2, round(floor / _RISER_M))
+    steps = max(2, round(floor / porches.RISER_M))
     plan = _deck(pavilion, center, reach, steps)
     deck = solids.prism(plan, z0=-solids.FOUNDATION_M, z1=floor)
     pavilion.add_to("stone", deck)

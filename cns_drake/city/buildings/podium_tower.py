@@ -35,8 +35,9 @@ _PODIUM_STOREY_M = 4.2
 _TERRACE_WALL_M = 1.6
 # Height of everything above the topmost storey [m].
 _TOP_M = 3.0
-# Depths of the shop windows, and of the windows of the podium [m].
+# Depth of the shop windows [m].
 _SHOP_RECESS_M = 0.45
+# Depth of the windows of the podium [m].
 _PODIUM_RECESS_M = 0.3
 # Distance of the shops from the ends of a wall [m].
 _SHOP_END_M = 0.8

@@ -23,8 +23,9 @@ from cns_drake.city.facades import (
 _MARGIN_M = 0.6
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.16
-# Room above the walls for a flat roof, and above a single storey [m].
+# Height above the walls under a flat roof, including the entrance hall [m].
 _FLAT_ROOF_M = 2.4
+# Height above the walls of a low school [m].
 _SINGLE_ROOF_M = 1.0
 # Least height of a storey under a hipped roof [m].
 _LEAST_STOREY_M = 3.6
@@ -34,12 +35,19 @@ _STOREY_M = 3.5
 _FORECOURT_M = 3.2
 # Distance between classrooms and gymnasium, which the link bridges [m].
 _LINK_M = 1.5
-# Least size of a site with a gymnasium: width and depth [m].
-_GYM_SITE_M = (34.0, 16.0)
-# Greatest width, depth and height of a gymnasium [m].
-_MOST_GYM_M = (28.0, 24.0, 9.5)
-# Least depth of a site with a wing behind, and of the wing [m].
+# Least width of a site with a gymnasium [m].
+_GYM_SITE_WIDTH_M = 34.0
+# Least depth of a site with a gymnasium [m].
+_GYM_SITE_DEPTH_M = 16.0
+# Greatest width of a gymnasium [m].
+_MOST_GYM_WIDTH_M = 28.0
+# Greatest depth of a gymnasium [m].
+_MOST_GYM_DEPTH_M = 24.0
+# Greatest height of a gymnasium [m].
+_MOST_GYM_HEIGHT_M = 9.5
+# Least depth of a site with a wing behind the classrooms [m].
 _WING_SITE_M = 22.0
+# Least depth of this wing [m].
 _LEAST_WING_M = 6.0
 # Height of a storey of the wing behind [m].
 _WING_STOREY_M = 3.4
@@ -71,10 +79,10 @@ class School(Building):
             body = self.height - _SINGLE_ROOF_M
         # Width of the gymnasium; 0 for none.
         self.gym = 0.0
-        least_width, least_depth = _GYM_SITE_M
-        if site.width > least_width and site.depth > least_depth:
+        is_wide = site.width > _GYM_SITE_WIDTH_M
+        if is_wide and site.depth > _GYM_SITE_DEPTH_M:
             gym = round(self.uniform(0.3, 0.38) * site.width, 1)
-            self.gym = min(gym, _MOST_GYM_M[0])
+            self.gym = min(gym, _MOST_GYM_WIDTH_M)
         self.storeys = min(max(round(body / _STOREY_M), 1), 4)
         # Depth of the classroom wing.
         self.depth = round(deep, 1)
@@ -248,14 +256,13 @@ def _add_gym(
         ys: y of the front of the school, and greatest y of the gymnasium [m].
         bar: (4, 2) outline of the classroom wing [m].
     """
-    _, most_depth, _ = _MOST_GYM_M
     x0, x1 = xs
     if school.mirrored:
         x1 -= _LINK_M
     else:
         x0 += _LINK_M
     y0 = ys[0] + 1.0
-    y1 = min(ys[1], y0 + most_depth)
+    y1 = min(ys[1], y0 + _MOST_GYM_DEPTH_M)
     # The link begins inside the classroom wing, and ends inside the gymnasium.
     link_start, link_end = bar[1, 0] - 0.1, x0 + 0.1
     if school.mirrored:
@@ -291,7 +298,7 @@ def _add_gym(
 
 def _gym_eaves(school: School, width: float) -> float:
     """Returns the height of the walls of a gymnasium of a width [m]."""
-    top = min(school.height, _MOST_GYM_M[2])
+    top = min(school.height, _MOST_GYM_HEIGHT_M)
     rises = {"barrel": 0.16 * width, "shed": 1.2}
     return max(top - rises.get(school.gym_roof, 0.3), 0.55 * top)
 
@@ -309,7 +316,7 @@ def _gym_wing(school: School, area: outlines.Area, eaves: float) -> Wing:
         thickness=0.25,
         parapet=0.5,
     )
-    top = min(school.height, _MOST_GYM_M[2])
+    top = min(school.height, _MOST_GYM_HEIGHT_M)
     return Wing.at(area, wall_top=eaves, top=top, roof=roof)
 
 

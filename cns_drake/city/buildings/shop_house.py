@@ -43,8 +43,10 @@ _SIDE_PITCH_M = 4.0
 _DOOR_BAY_M = 1.7
 # Distance of this door's middle from the end of the front [m].
 _DOOR_END_M = 0.9
-# Least and greatest width of a bay window [m].
-_ORIEL_WIDTH_M = (1.5, 2.4)
+# Least width of a bay window [m].
+_LEAST_ORIEL_M = 1.5
+# Greatest width of a bay window [m].
+_MOST_ORIEL_M = 2.4
 
 
 class ShopHouse(HouseInRow):
@@ -167,13 +169,12 @@ def _add_oriels(
     low = round(house.floor + 0.15, 2)
     high = round(house.floor + storeys * step - 0.15, 2)
     high = min(high, wing.wall_top - 0.7)
-    least, most = _ORIEL_WIDTH_M
     cells = bays.stretches(
         wall.length, pitch=wall.length / house.oriels, margin=0.4
     )
     for start, end in cells:
-        width = min(most, end - start - 1.2)
-        if width < least:
+        width = min(_MOST_ORIEL_M, end - start - 1.2)
+        if width < _LEAST_ORIEL_M:
             continue
         x = (start + end) / 2
         openings.clear(

@@ -28,11 +28,12 @@ _STAIR_SETBACK_M = 1.2
 _MOST_FLATS = 11
 # Greatest number of parts of which the storeys consist.
 _MOST_GROUPS = 7
-# Distance of the hall's walls from the slab's edges: front and back, and sides
-# [m].
+# Distance of the hall's walls from each edge of the slab, from the front counter-
+# clockwise [m].
 _HALL_INSET_M = (2.4, 0.4, 2.4, 0.4)
-# Depths of the glass of the hall, and of the pavilion [m].
+# Depth of the glass of the hall [m].
 _HALL_RECESS_M = 0.25
+# Depth of the glass of the pavilion [m].
 _PAVILION_RECESS_M = 0.5
 # Half the width of a pillar [m].
 _PILLAR_HALF_M = 0.3
@@ -46,6 +47,7 @@ _PAVILION_DEPTH_M = 14.0
 _PAVILION_GAP_M = 1.0
 # Height of the edge of a pavilion's roof [m].
 _PAVILION_RIM_M = 0.4
+# Equipment on the roof.
 _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 
 

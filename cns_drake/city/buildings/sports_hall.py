@@ -24,8 +24,9 @@ _RECESS_M = 0.2
 _MARGIN_M = 0.6
 # Greatest number of bays around half of the hall.
 _MOST_BAYS = 18
-# Free ground in front of the low front part, or of the hall without one [m].
+# Depth of the free ground in front of the low front part [m].
 _FORECOURT_M = 1.6
+# Depth of the free ground in front of a hall without a low front part [m].
 _PORCH_M = 1.8
 # Height of the frames above the roof [m].
 _RIB_ABOVE_M = 0.15
@@ -35,8 +36,9 @@ _ROOF_M = 0.3
 _OVERHANG_M = 0.4
 # Overlap of the two halves of a butterfly roof [m].
 _JOINT_M = 0.02
-# Half the width of a post, and of a rib, of a frame [m].
+# Half the width of a post of a frame [m].
 _POST_HALF_M = 0.2
+# Half the width of a rib of a frame [m].
 _RIB_HALF_M = 0.18
 # Distance of the outermost frames from the ends of a wall [m].
 _END_M = 0.5

@@ -26,8 +26,9 @@ _MOST_BAYS = 9
 _MARGIN_M = 0.3
 # Free ground in front of the canopy [m].
 _FORECOURT_M = 1.2
-# Depth of a dock beside the hall, and least width of a site with a dock [m].
+# Depth of a dock beside the hall [m].
 _DOCK_M = 4.5
+# Least width of a site with a dock [m].
 _DOCK_SITE_M = 32.0
 # Length of a dock [m].
 _DOCK_LENGTH_M = 10.0
@@ -37,9 +38,9 @@ _PLATFORM_M = 1.1
 _CANOPY_M = 3.45
 # Half the width of a post [m].
 _POST_HALF_M = 0.12
-# Distance of a shelter's middle from the end of the front, and half its length
-# [m].
+# Distance of a shelter's middle from the end of the front [m].
 _SHELTER_END_M = 3.2
+# Half the length of a shelter [m].
 _SHELTER_HALF_M = 2.2
 
 

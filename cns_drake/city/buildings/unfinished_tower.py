@@ -18,7 +18,9 @@ from cns_drake.city.facades import (
 )
 from cns_drake.city.geometry import Finish, Mesh, merge_meshes
 
+# Finish of scaffolds and props.
 _STEEL = Finish((0.52, 0.53, 0.55))
+# Finish of the formwork.
 _TIMBER = Finish((0.72, 0.58, 0.38))
 # Thickness of the slabs [m].
 _SLAB_M = 0.28
@@ -28,8 +30,9 @@ _SCAFFOLD_M = 1.7
 _CLADDING_M = 0.35
 # Height of a storey of a scaffold, a lift [m].
 _SCAFFOLD_LIFT_M = 2.0
-# Greatest numbers of parts of which the frame, and a scaffold, consist.
+# Greatest number of parts of which the frame consists, approximately.
 _MOST_GROUPS = 8
+# Greatest number of parts of which a scaffold consists.
 _MOST_SCAFFOLD_GROUPS = 6
 # Greatest number of storeys that a scaffold covers.
 _MOST_SCAFFOLD_STOREYS = 8
@@ -43,8 +46,9 @@ _COLUMN_HALF_M = 0.25
 _RAILS_M = (0.5, 1.0)
 # Number of posts of the guard rail along an edge of the topmost slab.
 _RAIL_POSTS = 6
-# Height of the formwork on the core, and how far it surrounds the core [m].
+# Height of the formwork on the core [m].
 _FORM_M = 2.6
+# Distance of the formwork's outer side from the core [m].
 _FORM_REACH_M = 0.3
 # Depth of the windows of the cladding [m].
 _RECESS_M = 0.2
@@ -54,8 +58,9 @@ _PROP_PITCH_M = 3.0
 _UPRIGHTS_M = (0.6, 1.45)
 # Distance of the outermost uprights from the ends of an edge [m].
 _SCAFFOLD_END_M = 0.2
-# Least length of a scaffold's bay, and greatest number of bays along an edge.
+# Least length of a scaffold's bay [m].
 _SCAFFOLD_BAY_M = 2.8
+# Greatest number of a scaffold's bays along an edge.
 _MOST_SCAFFOLD_BAYS = 11
 # Distance between the ties of the hoist's mast [m].
 _TIE_PITCH_M = 4.5

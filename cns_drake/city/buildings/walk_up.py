@@ -29,9 +29,9 @@ _FRONT_M = 1.5
 _BACK_M = 0.5
 # Strip beside a free side wall, for eaves [m].
 _SIDE_M = 0.5
-# Greatest depth of flats with a hipped roof, and least height of their walls
-# [m].
+# Greatest depth of flats with a hipped roof [m].
 _HIP_DEPTH_M = 16.0
+# Least height of the walls below a hipped roof [m].
 _HIP_WALL_M = 7.0
 # Rise of a hipped roof, as a share of its span.
 _HIP_RISE = 0.3
@@ -47,8 +47,7 @@ _END_M = 0.45
 _BAYS_SECTION_M = 9.0
 # Distance of the bays in front from the ends of a section [m].
 _BAY_END_M = 0.9
-# Height and depth of a step, approximately [m].
-_RISER_M = 0.17
+# Depth of a step [m].
 _TREAD_M = 0.28
 # Least height of the ground floor for windows of the cellar [m].
 _CELLAR_FLOOR_M = 0.7
@@ -251,7 +250,7 @@ def _entrance_steps(flats: WalkUp, wall: WallFrame, room: float) -> list[Mesh]:
     `room` is the depth of the free ground in front of the wall [m].
     """
     middle, floor = wall.length / 2, flats.floor
-    count = max(2, round(floor / _RISER_M))
+    count = max(2, round(floor / porches.RISER_M))
     run = min(_TREAD_M * count, room - 0.3)
     x0, x1 = around(middle, 0.8)
     flight = porches.steps(x0=x0, x1=x1, reach=run, rise=floor, count=count)

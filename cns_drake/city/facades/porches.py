@@ -9,6 +9,10 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # Side of the square posts of a porch [m].
 _POST_M = 0.16
+# Height of a step, approximately [m].
+RISER_M = 0.17
+# Depth of a step [m].
+TREAD_M = 0.29
 
 
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
@@ -108,8 +112,8 @@ def add_steps(
         rise: height of the top step [m].
         room: greatest length of the steps away from the wall [m].
     """
-    count = max(1, round(rise / 0.17))
-    run = min(0.29 * count, room)
+    count = max(1, round(rise / RISER_M))
+    run = min(TREAD_M * count, room)
     if run > 0.05 and rise > 0.05:
         flight = steps(x0, x1, run, rise, count)
         out.add_to("base", wall.place(flight.moved((0.0, start, 0.0))))
