@@ -232,15 +232,20 @@ def load_weights(path: Path) -> Mapping[str, np.ndarray]:
 def _load_checked(
     path: Path, mtime_ns: int, size: int
 ) -> Mapping[str, np.ndarray]:
+    """Returns the weights in a file; see `load_weights`.
+
+    Args:
+        path: the file.
+        mtime_ns: time of its last change [ns]; a file that has changed is read
+            again.
+        size: its size [bytes].
+    """
     if size > _MOST_BYTES:
         raise InputError(
             f"{path}: {size} bytes are too many for weights (at most "
             f"{_MOST_BYTES})"
         )
-    shapes: dict[str, tuple[int, ...]] = {SEEN_SHARES: (2,)}
-    for number, (before, after, _, _) in enumerate(LAYERS):
-        shapes[f"kernel_{number}"] = (9 * before, after)
-        shapes[f"bias_{number}"] = (after,)
+    shapes = _shapes_of_weights()
     try:
         values = read_npz(path, ("version", *shapes), _MOST_BYTES)
     except ValueError as error:
@@ -254,24 +259,52 @@ def _load_checked(
     for name, shape in shapes.items():
         if name not in values:
             raise InputError(f"{path}: {name} is missing")
-        found = values[name]
-        if found.shape != shape:
-            raise InputError(
-                f"{path}: {name}: size {found.shape} instead of {shape}"
-            )
-        if found.dtype.kind == "f":
-            # Numbers of double precision may be too large for single.
-            with np.errstate(over="ignore"):
-                values[name] = found.astype(np.float32)
-        if found.dtype.kind != "f" or not np.isfinite(values[name]).all():
-            raise InputError(f"{path}: {name}: not all are finite numbers")
+        values[name] = _checked_weights(values[name], shape, f"{path}: {name}")
     return values
+
+
+def _shapes_of_weights() -> dict[str, tuple[int, ...]]:
+    """Returns the shape of each array of weights, by its name."""
+    shapes: dict[str, tuple[int, ...]] = {SEEN_SHARES: (2,)}
+    for number, (before, after, _, _) in enumerate(LAYERS):
+        shapes[f"kernel_{number}"] = (9 * before, after)
+        shapes[f"bias_{number}"] = (after,)
+    return shapes
+
+
+def _checked_weights(
+    found: np.ndarray, shape: tuple[int, ...], where: str
+) -> np.ndarray:
+    """Returns an array of weights as float32.
+
+    Args:
+        found: the array in the file.
+        shape: the shape that it must have.
+        where: file and name of the array, for error messages.
+
+    Raises:
+        InputError: the array has another shape, or not only finite numbers.
+    """
+    if found.shape != shape:
+        raise InputError(f"{where}: size {found.shape} instead of {shape}")
+    if found.dtype.kind == "f":
+        # Numbers of double precision may be too large for single.
+        with np.errstate(over="ignore"):
+            values = found.astype(np.float32)
+        if np.isfinite(values).all():
+            return values
+    raise InputError(f"{where}: not all are finite numbers")
 
 
 def _feature_map(
     weights: Mapping[str, np.ndarray], image: np.ndarray
 ) -> np.ndarray:
-    """Returns the map of features (TURNS, FEATURES) of a polar image."""
+    """Returns the map of features (TURNS, FEATURES) of a polar image.
+
+    Args:
+        weights: the weights, see `load_weights`.
+        image: (RINGS, SECTORS, CHANNELS) uint8.
+    """
     cells = image.astype(np.float32) * np.float32(1.0 / 255.0)
     last = len(LAYERS) - 1
     for number, (before, after, down, along) in enumerate(LAYERS):
@@ -295,7 +328,12 @@ def _spectrum(scan: LearnedScan) -> np.ndarray:
 
 
 def _correlations(query: LearnedScan, spectra: np.ndarray) -> np.ndarray:
-    """Returns the correlations with D places at all headings, (HEADINGS, D)."""
+    """Returns the correlations with D places at all headings, (HEADINGS, D).
+
+    Args:
+        query: descriptor of the query.
+        spectra: (FREQUENCIES, FEATURES, D) spectra of the places.
+    """
     own = np.conj(_spectrum(query)).astype(np.complex64)
     products = np.matmul(own[:, None, :], spectra)[:, 0]
     scale = HEADINGS / TURNS
