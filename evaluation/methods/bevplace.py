@@ -44,6 +44,14 @@ _BORDER = 127.0
 # Mean and standard deviation of the three channels (ImageNet).
 _MEAN = (0.485, 0.456, 0.406)
 _DEVIATION = (0.229, 0.224, 0.225)
+# Greatest value of a pixel.
+_WHITE = 255.0
+# Half the range of the values of a turned image, which are scaled by it.
+_HALF_RANGE = 128.0
+# Factor of the sizes of two successive scales.
+_SHRINKING = 0.5
+# Standard deviation of the Gaussian filter between two scales [pixels].
+_SIGMA = 1.5
 # OpenCV's fixed-point numbers: positions in 1/1024, rounded to 1/32 pixel.
 _FINE = 1024
 _COARSE = 32
@@ -119,8 +127,9 @@ def _turned_images(
     The points (N, 2) are the columns and rows of the grid in the turned image.
     """
     size = len(image)
-    scaled = image[..., None] / np.float32(255.0) - np.array(_MEAN, np.float32)
-    scaled = scaled / np.array(_DEVIATION, np.float32) * np.float32(255.0)
+    white = np.float32(_WHITE)
+    scaled = image[..., None] / white - np.array(_MEAN, np.float32)
+    scaled = scaled / np.array(_DEVIATION, np.float32) * white
     steps = np.arange(_GRID, size - _GRID, _GRID)
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     corners = np.array([[0, 0], [0, size], [size, size], [size, 0]], np.float32)
@@ -131,19 +140,19 @@ def _turned_images(
         for turn in np.radians(_TURNS):
             cosine, sine = math.cos(turn), math.sin(turn)
             R = np.array([[cosine, -sine], [sine, cosine]], np.float32)
-            M = 0.5**number * R
+            M = _SHRINKING**number * R
             moved = (corners - centre) @ M.T
             least = moved.min(axis=0)
             extent = np.rint((moved - least).max(axis=0)).astype(int)
             offset = -M @ centre - least
             turned = _warped(scaled, M, offset, extent)
             points = (grid @ M.T + offset).astype(np.float32)
-            yield (turned - _BORDER) / np.float32(128.0), points
+            yield (turned - _BORDER) / np.float32(_HALF_RANGE), points
 
 
 def _blurred(image: np.ndarray) -> np.ndarray:
     """Returns an image after a Gaussian filter of 5 x 5, sigma 1.5 pixels."""
-    kernel = np.exp(-(np.arange(-2, 3) ** 2) / (2.0 * 1.5**2))
+    kernel = np.exp(-(np.arange(-2, 3) ** 2) / (2.0 * _SIGMA**2))
     for axis in (0, 1):
         image = correlate1d(image, kernel / kernel.sum(), axis, mode="mirror")
     return image

@@ -200,12 +200,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         base = base_plane(
             planes, config.merge_normal_limit, config.merge_distance_limit
         )
-        if base is None:
-            # As in the public program: a horizontal plane through the first
-            # point.
-            first = points[0] if len(points) > 0 else np.zeros(3)
-            base = first, np.array([0.0, 0.0, 1.0])
-        center, normal = base
+        center, normal = _horizontal_plane(points) if base is None else base
         axes = image_axes(normal, config.image_axes == "orthogonal")
         image = height_image(
             points,
@@ -264,7 +259,13 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def _score(
         self, query: BtcDescription, database: BtcDatabase, limit: int | None
     ) -> np.ndarray:
-        """Returns the scores (D,) of some candidates; see `_motions`."""
+        """Returns the scores (D,) of some candidates.
+
+        Args:
+            query: descriptor of the query.
+            database: the places.
+            limit: number of candidates; see `_motions`.
+        """
         scores = np.full(len(database.places), np.nan)
         for place, X_PQ in self._motions(query, database, limit):
             planes = database.places[place].planes
@@ -307,6 +308,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         """Yields candidate places, each with the motion X_PQ of its triangles.
 
         Args:
+            query: descriptor of the query.
+            database: the places.
             max_candidates: number of candidates: the places with the most
                 matches; None for all.
         """
@@ -331,10 +334,27 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def _matches(
         self, query: BtcDescription, database: BtcDatabase
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the similar triangles of a query and of all places."""
+        """Returns the similar triangles of a query and of all places.
+
+        Returns:
+            (M,) indices in the query's triangles; (M,) indices in the table.
+        """
         return match(
             query.triangles,
             database.table,
             self.config.side_tolerance,
             self.config.min_similarity,
         )
+
+
+def _horizontal_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a plane for clouds (N, 3) in which no plane is found.
+
+    As in the public program, the plane is horizontal and contains the first
+    point.
+
+    Returns:
+        (3,) a point of the plane [m]; (3,) its normal.
+    """
+    first = points[0] if len(points) > 0 else np.zeros(3)
+    return first, np.array([0.0, 0.0, 1.0])
