@@ -18,6 +18,9 @@ from evaluation.recognition.bootstrap import (
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 
+# Probability of a value below the upper limit of a 95 % interval.
+_UPPER_LIMIT = 0.975
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -79,6 +82,8 @@ def compared_by_auc(
     sets = list(zip(*answers.values(), strict=True))
     drives = range(len(sets)) if drives is None else drives
     blocks = [outcomes[0].own_blocks for outcomes in sets]
+    # Drive -> number of its blocks, and AUC (methods, B) of each bootstrap
+    # sample, summed over the sets of the drive.
     of_drive: dict[int, int] = {}
     sums: dict[int, Any] = {}
     drawn = weights_by_drive(blocks, drives)
@@ -96,6 +101,7 @@ def compared_by_auc(
     ]
 
     def difference(first: int, second: int) -> Difference:
+        """Returns the difference of two methods, by their numbers."""
         value = float(
             np.mean(
                 [by_method[first] - by_method[second] for by_method in areas]
@@ -109,7 +115,7 @@ def compared_by_auc(
         variances = np.var(samples, axis=1) * numbers / (numbers - 1)
         spread = math.sqrt(variances.sum()) / len(sets)
         freedom = (numbers - 1).sum()
-        margin = float(stdtrit(freedom, 0.975)) * spread
+        margin = float(stdtrit(freedom, _UPPER_LIMIT)) * spread
         p_value = 1.0
         if spread > 0.0:
             p_value = 2.0 * float(stdtr(freedom, -abs(value) / spread))
