@@ -74,7 +74,14 @@ def change_lanes(traffic: Traffic, k: int) -> None:
 
 @compiled
 def _is_better(traffic: Traffic, k: int, i: int, target: int) -> bool:
-    """Returns whether the i-th vehicle gains by a change to a lane."""
+    """Returns whether the i-th vehicle gains by a change to a lane.
+
+    Args:
+        traffic: vehicles and crossings.
+        k: number of the current time step.
+        i: number of the vehicle.
+        target: number of the lane.
+    """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]
     lane, v = car.path[CURRENT], car.v

@@ -375,6 +375,12 @@ def _serve_crossing(traffic: Traffic, c: int, k: int, last: int) -> int:
     """Opens a crossing for pedestrians once earlier vehicles have passed.
 
     `last` is the highest `order` so far; the result is the new highest `order`.
+
+    Args:
+        traffic: vehicles and crossings, changed in place.
+        c: number of the crossing.
+        k: number of the current time step.
+        last: highest `order` so far.
     """
     streets, cars = traffic.streets, traffic.cars
     crossing = traffic.crossings[c]
@@ -431,6 +437,11 @@ def _until_red(streets: Streets, place: int, t: float) -> float:
     """Returns how long a way or a crossing stays green [s].
 
     It is 0 or less during red, and inf without a signal.
+
+    Args:
+        streets: arrays of all lanes, with the signals.
+        place: number of the way, or of the crossing after all pieces.
+        t: present time [s].
     """
     cycle, green_from, green_for = streets.signals
     if green_for[place] == cycle:
@@ -452,6 +463,13 @@ def _mark_excluded(
 
     `taken` (2, P) says which pieces small vehicles (row 0) and large vehicles
     (row 1) must not enter.
+
+    Args:
+        streets: arrays of all lanes.
+        taken: (2, P) bool, changed in place.
+        place: number of the way on which the vehicle is.
+        is_large: whether the vehicle leaves its lane in turns.
+        rear: place of its rear on the way [m].
     """
     size = int(is_large)
     for other in range(taken.shape[1]):
@@ -461,7 +479,13 @@ def _mark_excluded(
 
 @compiled
 def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
-    """Marks the ways that pedestrians on the c-th crossing exclude."""
+    """Marks the ways that pedestrians on the c-th crossing exclude.
+
+    Args:
+        traffic: vehicles and crossings.
+        taken: (2, P) bool, changed in place; see `_mark_excluded`.
+        c: number of the crossing.
+    """
     begin = traffic.streets.begin
     num_pieces = taken.shape[1]
     for way in range(num_pieces):
@@ -472,7 +496,13 @@ def _take_crossing(traffic: Traffic, taken: np.ndarray, c: int) -> None:
 
 @compiled
 def _is_ready(streets: Streets, car: Any, k: int) -> bool:
-    """Returns whether a vehicle has waited at its signal or stop line."""
+    """Returns whether a vehicle has waited at its signal or stop line.
+
+    Args:
+        streets: arrays of all lanes, with the signals.
+        car: record of the vehicle.
+        k: number of the current time step.
+    """
     t = k * STEP
     way = car.path[CURRENT + 1]
     row = streets.pieces[way]
@@ -489,6 +519,11 @@ def _has_room(traffic: Traffic, i: int, k: int) -> bool:
 
     If there has been no room for some time, the vehicle samples another way;
     see `grant_ways`.
+
+    Args:
+        traffic: vehicles and crossings; the vehicle is changed in place.
+        i: number of the vehicle.
+        k: number of the current time step.
     """
     streets, cars = traffic.streets, traffic.cars
     car = cars[i]

@@ -173,7 +173,14 @@ def _corner_walkways(
     nodes: dict[tuple[str, End, int], int],
     places: dict[tuple[str, End, int], np.ndarray],
 ) -> list[Walkway]:
-    """Returns the walkways around the corners between neighbouring arms."""
+    """Returns the walkways around the corners between neighbouring arms.
+
+    Args:
+        network: the road network.
+        junction: the junction of the arms.
+        nodes: road, its end and a side -> number of the place there.
+        places: the same -> position of the place (3,) [m].
+    """
     found = []
     arms = junction.arms
     for k, arm in enumerate(arms):

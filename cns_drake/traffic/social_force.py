@@ -157,6 +157,11 @@ def _own_force(
 
     The pedestrian approaches its wanted speed, and keeps away from the edges. A
     waiting pedestrian only brakes.
+
+    Args:
+        paths: all walkways.
+        walker: record of the pedestrian.
+        is_waiting: whether it waits for a crossing.
     """
     path = paths.paths[walker.path]
     here = path.first + walker.at
@@ -267,7 +272,15 @@ def _stopping_place(
 
 @compiled
 def _nearest_row(paths: Paths, walker: Any, x: float, y: float) -> int:
-    """Returns the row of the point of a path that is nearest to a place."""
+    """Returns the row of the point of a path that is nearest to a place.
+
+    Only points near the one that the pedestrian has reached are compared.
+
+    Args:
+        paths: all walkways.
+        walker: record of a pedestrian on the path.
+        x, y: the place [m].
+    """
     path, points = paths.paths[walker.path], paths.points
     best = np.inf
     nearest = path.first
@@ -282,7 +295,13 @@ def _nearest_row(paths: Paths, walker: Any, x: float, y: float) -> int:
 
 @compiled
 def _distance_to_path(paths: Paths, walker: Any, x: float, y: float) -> float:
-    """Returns the distance from a place to a pedestrian's path [m]."""
+    """Returns the distance from a place to a pedestrian's path [m].
+
+    Args:
+        paths: all walkways.
+        walker: record of the pedestrian.
+        x, y: the place [m].
+    """
     path, points = paths.paths[walker.path], paths.points
     row = _nearest_row(paths, walker, x, y)
     nearest = row - path.first
@@ -311,6 +330,12 @@ def _is_free(
 
     The box would be at `place` with a heading and, if the pedestrian braked,
     then at `stop`.
+
+    Args:
+        walkers: (N,) records of all pedestrians.
+        i: number of the pedestrian.
+        place, stop: x and y of the middle of the box [m].
+        yaw: heading of the box [rad].
     """
     half = (WALKER_LENGTH / 2 + _BOX_GAP / 2, WALKER_WIDTH / 2 + _BOX_GAP / 2)
     for j in range(len(walkers)):

@@ -341,7 +341,14 @@ def connect_traffic(
 def _register(
     scene_graph: SceneGraph, source: SourceId, name: str, limbs: Sequence[Limb]
 ) -> tuple[FrameId, ...]:
-    """Registers a geometry frame for each limb, and returns these frames."""
+    """Registers a geometry frame for each limb, and returns these frames.
+
+    Args:
+        scene_graph: SceneGraph in which the frames are registered.
+        source: geometry source of the bodies.
+        name: name of the body, with which the names of its frames begin.
+        limbs: rigid parts of the body.
+    """
     frames = []
     for limb in limbs:
         frame = geometry.GeometryFrame(f"{name}_{limb.name}")

@@ -35,7 +35,13 @@ def vehicle_poses(streets: Streets, cars: np.ndarray) -> np.ndarray:
 def _points_behind(
     streets: Streets, cars: np.ndarray, back: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Returns x, y, z at a distance `back` behind each front bumper [m]."""
+    """Returns x, y, z at a distance `back` behind each front bumper [m].
+
+    Args:
+        streets: arrays of all lanes.
+        cars: (...) records of dtype `VEHICLE`.
+        back: (...) distances along the vehicles' paths [m].
+    """
     s = cars["s"] - back
     path = cars["path"]
     column = np.full(cars.shape, CURRENT)

@@ -191,7 +191,18 @@ def _write_entry(
     front: float,
     speed: float,
 ) -> int:
-    """Writes an entry with a number; returns the next number."""
+    """Writes an entry with a number; returns the next number.
+
+    The entry is put at the beginning of the list of its piece.
+
+    Args:
+        traffic: vehicles, whose lists are changed in place.
+        number: number of the entry.
+        piece: number of the piece.
+        who: number of a vehicle, or `EGO`.
+        rear, front: ends of the vehicle's part on the piece [m].
+        speed: speed of the vehicle along the piece [m/s].
+    """
     entry = traffic.entries[number]
     entry.after = traffic.head[piece]
     entry.who, entry.rear, entry.front, entry.speed = who, rear, front, speed
