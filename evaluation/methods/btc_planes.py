@@ -271,6 +271,12 @@ def _moments_of_voxels(
 def _planes_of_moments(
     centers: np.ndarray, covariances: np.ndarray, counts: np.ndarray
 ) -> tuple[Planes, np.ndarray]:
-    """Returns the least-squares planes, and the variances (P,) across them."""
+    """Returns the least-squares planes, and the variances (P,) across them.
+
+    Args:
+        centers: (P, 3) means of the points of each plane [m].
+        covariances: (P, 3, 3) their covariances [m^2].
+        counts: (P,) their numbers.
+    """
     variances, axes = np.linalg.eigh(covariances)
     return Planes(centers, axes[:, :, 0], covariances, counts), variances[:, 0]

@@ -89,6 +89,15 @@ def svt_net(weights: Weights, cloud: np.ndarray) -> np.ndarray:
 def _residual_block(
     weights: Weights, name: str, cells: np.ndarray, x: np.ndarray, step: int
 ) -> np.ndarray:
+    """Returns the features (N, channels) after two convolutions with a bypass.
+
+    Args:
+        weights: weights of the network.
+        name: name of the block.
+        cells: (N, 3) indices of the occupied cells.
+        x: (N, channels) features of these cells.
+        step: distance of neighbouring cells, as a number of cells.
+    """
     y = convolve(cells, x, weights[f"{name}.conv1.kernel"], step)
     y = relu(batch_norm(weights, f"{name}.norm1.bn", y))
     y = convolve(cells, y, weights[f"{name}.conv2.kernel"], step)

@@ -89,7 +89,13 @@ def read_weights(
 def _find_state(
     path: Path, found: Any, shapes: Mapping[str, tuple[int, ...]]
 ) -> dict[str, Any]:
-    """Returns the wanted objects of the best dictionary of tensors, by name."""
+    """Returns the wanted objects of the best dictionary of tensors, by name.
+
+    Args:
+        path: the file, for error messages.
+        found: the object in the file.
+        shapes: name of a wanted tensor -> its shape.
+    """
     best: list[tuple[str, dict[str, Any]]] = [("", {})]
     for place, inner in _dictionaries(found, "", _DEEPEST, set()):
         # All wanted names may have the same prefix.
@@ -122,6 +128,12 @@ def _dictionaries(
 
     The keys that lead to a dictionary are appended to `place`, separated by
     dots.
+
+    Args:
+        value: any object of the file.
+        place: the keys that lead to it.
+        levels: number of levels below it that are searched.
+        seen: ids of the objects that were searched, added to in place.
     """
     if not isinstance(value, dict | list | tuple) or hasattr(value, "_fields"):
         return
@@ -144,6 +156,13 @@ def _read_tensor(
     archive: zipfile.ZipFile,
 ) -> np.ndarray:
     """Returns a tensor as float32.
+
+    Args:
+        path: the file, for error messages.
+        name: name of the tensor.
+        tensor: what the file has under this name.
+        shape: the shape that the tensor must have.
+        archive: the opened file, with the tensor's numbers.
 
     Raises:
         InputError: there is no such tensor, or it has another shape or type, or
