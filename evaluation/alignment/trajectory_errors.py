@@ -219,6 +219,15 @@ def segment_errors(
 
 
 def _true_poses(drive: Drive, frame: Frame) -> StampedPoses:
+    """Returns the ground-truth poses of a drive, of the LiDAR or the car.
+
+    Args:
+        drive: the drive.
+        frame: `lidar`, or `base_link` for the car.
+
+    Raises:
+        InputError: the drive has no poses of the car.
+    """
     source = Path(drive.name)
     if frame == "lidar":
         return StampedPoses(source, drive.stamps_ns, drive.X_WS)

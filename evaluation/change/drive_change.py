@@ -164,7 +164,12 @@ def _change_on_grid(
     target: DriveMap,
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[TemporalChange, list[np.ndarray]]:
-    """Returns the change on a shifted grid, and the centroids of A and B."""
+    """Returns the change on a shifted grid, and the centroids of A and B.
+
+    Args:
+        source, target: the maps A and B.
+        shift: shift of the grid [m].
+    """
     clouds = [
         drive_map.voxels.merged(shift=shift).centroids_W
         for drive_map in (source, target)
@@ -178,6 +183,10 @@ def same_stage_partner(
     """Returns which of two drives is in the control's stage.
 
     This is the drive whose route the control does not follow.
+
+    Args:
+        source, target: the two drives.
+        control: a drive on the route of one of them, in the stage of the other.
 
     Raises:
         InputError: one of the three is not a drive, the drives are not in one

@@ -110,6 +110,12 @@ def open_source(
 ) -> Drive | Path:
     """Returns an opened drive, or the path of a point cloud.
 
+    Args:
+        path: path of a drive or of a cloud's file.
+        lidar: name of the LiDAR, for recordings with several LiDARs.
+        columns: number of columns of `.bin` files; by default guessed from the
+            values.
+
     Raises:
         InputError: if the path cannot be read as a drive or point cloud.
     """
@@ -120,6 +126,16 @@ def open_source(
 
 
 def _drive_map_of(source: Drive | Path, columns: int | None = None) -> DriveMap:
+    """Returns the voxel map of a drive or of a cloud's file.
+
+    Args:
+        source: the drive, or the path of the file.
+        columns: number of columns of a `.bin` file; by default guessed from the
+            values.
+
+    Raises:
+        InputError: a scan or the file cannot be read.
+    """
     if isinstance(source, Drive):
         voxels = map_drive(source, CELL_SIZE)
         positions = source.X_WS[:, :3, 3]

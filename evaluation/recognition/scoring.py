@@ -77,7 +77,15 @@ def _reranked(
     query: np.ndarray,
     places: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Returns the scores (D,) after the second stage of a method."""
+    """Returns the scores (D,) after the second stage of a method.
+
+    Args:
+        method: the method.
+        scores: (D,) scores of the first stage; NaN for a place that is no
+            candidate.
+        query: cloud of the query.
+        places: clouds of the D places.
+    """
     order = ranked_places(scores)
     num_candidates = int((~np.isnan(scores)).sum())
     best = order[: min(method.rerank_best, num_candidates)]

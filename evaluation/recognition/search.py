@@ -127,6 +127,11 @@ class Search:
 
         The result is None if there is one group, or the method compares each
         place.
+
+        Args:
+            query: drive with described queries.
+            rows: R queries.
+            is_known: (R, D) bool, which places may be candidates.
         """
         method = self._method
         most = method.num_shortlisted
@@ -163,7 +168,16 @@ class Search:
         group: slice,
         num_entries: int | None,
     ) -> np.ndarray:
-        """Returns the scores of a query in a group; see `_entries_by_group`."""
+        """Returns the scores of a query in a group; see `_entries_by_group`.
+
+        Args:
+            query: drive with described queries.
+            row: number of the query.
+            is_known: (D,) bool, which places may be candidates.
+            group: the places of the group, which is in memory.
+            num_entries: number of entries of the group that the search
+                chooses; None to let the method choose.
+        """
         queries = query.queries
         method = self._method
         is_whole = bool(is_known.all())

@@ -174,6 +174,13 @@ def _find_nearest_by_quadrant(
 
     Fills in (4,) indices of returns, -1 if there is none, and (4,) their
     angular distances [deg].
+
+    Args:
+        p: (3,) the point [m].
+        angles, starts: see `SeenSurfaces`.
+        corners: (4,) indices of the returns, an output.
+        away: (4,) angular distances of the returns, infinite for none, an
+            output.
     """
     corners[:] = -1
     away[:] = math.inf
