@@ -223,15 +223,15 @@ def _storey_walls(
             return (rows if length > _LONG_SIDE_M else blank)(edge, length)
         front = by_front[edge]
         relief: list[Relief] = []
-        for k, (a, b) in enumerate(front.cells):
+        for k, cell in enumerate(front.cells):
             if k == front.middle:
                 if ground:
-                    relief += door(a, b)
+                    relief += door(*cell)
                 elif flats.stair == "slit":
-                    relief += slit(a, b)
+                    relief += slit(*cell)
             else:
                 has_balcony = k in front.spots and not ground
-                relief += (french_window if has_balcony else window)(a, b)
+                relief += (french_window if has_balcony else window)(*cell)
         return relief
 
     band = (
@@ -255,11 +255,12 @@ def _add_balconies(
     pieces: list[Mesh] = []
     joined = flats.balconies == "ribbons"
     for front in walls:
-        for a, b in _balcony_stretches(front.cells, front.spots, joined):
-            width = b - a - 0.3
+        stretches = _balcony_stretches(front.cells, front.spots, joined)
+        for start, end in stretches:
+            width = end - start - 0.3
             if not joined:
                 width = min(width, flats.balcony_width)
-            x = (a + b) / 2
+            x = (start + end) / 2
             balcony = balconies.balcony(
                 x0=round(x - width / 2, 2),
                 x1=round(x + width / 2, 2),
@@ -372,9 +373,9 @@ def _balcony_stretches(
     """Returns stretches with balconies; neighbours are merged if `joined`."""
     runs: list[tuple[float, float]] = []
     for k in spots:
-        a, b = cells[k]
-        if joined and runs and abs(runs[-1][1] - a) < 1e-6:
-            runs[-1] = (runs[-1][0], b)
+        start, end = cells[k]
+        if joined and runs and abs(runs[-1][1] - start) < 1e-6:
+            runs[-1] = (runs[-1][0], end)
         else:
-            runs.append((a, b))
+            runs.append((start, end))
     return runs

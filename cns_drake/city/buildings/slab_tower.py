@@ -28,8 +28,8 @@ _STAIR_SETBACK_M = 1.2
 _MOST_FLATS = 11
 # Greatest number of parts of which the storeys consist.
 _MOST_GROUPS = 7
-# Distance of the hall's walls from each edge of the slab, from the front counter-
-# clockwise [m].
+# Distance of the hall's walls from the edges of the slab, from the front
+# counter-clockwise [m].
 _HALL_INSET_M = (2.4, 0.4, 2.4, 0.4)
 # Depth of the glass of the hall [m].
 _HALL_RECESS_M = 0.25

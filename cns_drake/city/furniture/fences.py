@@ -105,7 +105,7 @@ def fence(
             (y0 + y1) / 2,
             (top - ROOT_DEPTH) / 2,
         )
-        parts.append(block("end", size, at, rgb=rgb))
+        parts.append(block("end", size=size, center=at, rgb=rgb))
     return assemble(*parts)
 
 

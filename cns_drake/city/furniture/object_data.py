@@ -46,7 +46,7 @@ CHOICES = _DATA.choices
 def _one_mesh(mesh: str, kind: _OneMesh, rng: np.random.Generator) -> Model:
     dice = Dice(rng)
     factors = {
-        axis: dice.uniform(low, high, 3)
+        axis: dice.uniform(low, high, digits=3)
         for axis, (low, high) in kind.stretch.items()
     }
     scale = (

@@ -31,7 +31,9 @@ PAINTS = (
     (0.2, 0.32, 0.26),
     (0.58, 0.52, 0.42),
 )
+# Colour of tyres, windows and lamps.
 TRIM = (0.13, 0.15, 0.17)
+# Colour of the box of a truck.
 WHITE = (0.85, 0.85, 0.84)
 
 # Body type -> semantic class.

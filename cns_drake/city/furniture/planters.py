@@ -11,9 +11,19 @@ from cns_drake.city.geometry import Builder, Model, assemble, mesh_part
 
 # There are four meshes of shrubs.
 _LETTERS = "abcd"
+# Size of the mesh of a flower bed, along x and y [m].
+_BED_MESH_M = (4, 1.5)
+# Length of the mesh of a planter [m].
+_BOX_MESH_M = 2
+# Length of a planter for each shrub in it, approximately [m].
+_SHRUB_PITCH_M = 0.8
+# Tall shrubs are also wider, but less than in proportion: the width grows with
+# this power of the height.
+_WIDTH_POWER = 0.8
 
 
 def _leaves(dice: Dice) -> Rgb:
+    """Returns a random green of leaves."""
     return dice.tinted(COLOURS["grass"], 0.85, 1.15)
 
 
@@ -28,12 +38,11 @@ def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
     drawn = dice.uniform(0.8, 1.6)
     height = drawn if height is None else height
     mesh = f"shrub_{dice.pick(_LETTERS)}"
-    # Tall shrubs are also wider, but less than in proportion.
-    wide = height**0.8 * dice.uniform(0.85, 1.2)
-    deep = height**0.8 * dice.uniform(0.85, 1.2)
+    wide = height**_WIDTH_POWER * dice.uniform(0.85, 1.2)
+    deep = height**_WIDTH_POWER * dice.uniform(0.85, 1.2)
     scale = (round(wide, 3), round(deep, 3), round(height, 3))
     rgb = _leaves(dice)
-    yaw = dice.uniform(-math.pi, math.pi, 3)
+    yaw = dice.uniform(-math.pi, math.pi, digits=3)
     return assemble(mesh_part("leaves", mesh, yaw=yaw, rgb=rgb, scale=scale))
 
 
@@ -47,7 +56,8 @@ def flower_bed(
         length: length along x [m].
         width: length along y [m].
     """
-    scale = (round(length / 4, 4), round(width / 1.5, 4), 1.0)
+    mesh_length, mesh_width = _BED_MESH_M
+    scale = (round(length / mesh_length, 4), round(width / mesh_width, 4), 1.0)
     stone = COLOURS["stone"]
     rgb = Dice(rng).pick(CHOICES["flowers"])
     return assemble(
@@ -61,18 +71,18 @@ def flower_bed(
 def round_planter(rng: np.random.Generator) -> Model:
     """Returns a shrub in a round pot."""
     dice = Dice(rng)
-    size = dice.uniform(0.9, 1.2, 3)
+    size = dice.uniform(0.9, 1.2, digits=3)
     mesh = f"shrub_{dice.pick(_LETTERS)}"
-    tall = dice.uniform(0.7, 1.1, 3)
+    tall = dice.uniform(0.7, 1.1, digits=3)
     rgb = _leaves(dice)
-    yaw = dice.uniform(-math.pi, math.pi, 3)
+    yaw = dice.uniform(-math.pi, math.pi, digits=3)
     pot = (size, size, size)
     wide = round(0.75 * size, 3)
     stone = COLOURS["stone"]
     at, scale = (0, 0, round(0.5 * size, 3)), (wide, wide, tall)
     return assemble(
         mesh_part("pot", "round_pot", rgb=stone, scale=pot, material="pot"),
-        mesh_part("leaves", mesh, at, yaw, rgb, scale),
+        mesh_part("leaves", mesh, at=at, yaw=yaw, rgb=rgb, scale=scale),
     )
 
 
@@ -88,18 +98,20 @@ def box_planter(
     dice = Dice(rng)
     drawn = dice.uniform(1.6, 3.0)
     length = drawn if length is None else length
-    scale = (round(length / 2, 4), 1.0, 1.0)
+    scale = (round(length / _BOX_MESH_M, 4), 1.0, 1.0)
     rgb = COLOURS["planter"]
     box = mesh_part("box", "planter_box", rgb=rgb, scale=scale, material="pot")
     parts = [box]
-    count = max(1, round(length / 0.8))
+    count = max(1, round(length / _SHRUB_PITCH_M))
     for k in range(count):
         mesh = f"shrub_{dice.pick(_LETTERS)}"
-        size = (0.6, 0.55, dice.uniform(0.6, 1.0, 3))
+        size = (0.6, 0.55, dice.uniform(0.6, 1.0, digits=3))
         rgb = _leaves(dice)
         at = ((k + 0.5) * length / count - length / 2, 0, 0.45)
-        yaw = dice.uniform(-math.pi, math.pi, 3)
-        parts.append(mesh_part(f"leaves_{k}", mesh, at, yaw, rgb, size))
+        yaw = dice.uniform(-math.pi, math.pi, digits=3)
+        parts.append(
+            mesh_part(f"leaves_{k}", mesh, at=at, yaw=yaw, rgb=rgb, scale=size)
+        )
     return assemble(*parts)
 
 

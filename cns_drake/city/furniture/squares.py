@@ -20,13 +20,15 @@ from cns_drake.city.geometry import (
 def statue(rng: np.random.Generator) -> Model:
     """Returns a bronze figure, arm raised, on a stepped pedestal."""
     dice = Dice(rng)
-    size = dice.uniform(0.9, 1.2, 3)
-    yaw = dice.uniform(-0.4, 0.4, 3)
+    size = dice.uniform(0.9, 1.2, digits=3)
+    yaw = dice.uniform(-0.4, 0.4, digits=3)
     marble, bronze = COLOURS["marble"], COLOURS["bronze"]
     scale, top = (size, size, size), (0, 0, round(2.9 * size, 3))
     return assemble(
         mesh_part("pedestal", "statue_pedestal", rgb=marble, scale=scale),
-        mesh_part("figure", "statue_figure", top, yaw, bronze, scale),
+        mesh_part(
+            "figure", "statue_figure", at=top, yaw=yaw, rgb=bronze, scale=scale
+        ),
     )
 
 
@@ -79,12 +81,20 @@ def flag_poles(
     wind = dice.uniform(-math.pi, math.pi)
     parts = []
     for k in range(count):
-        y = in_a_row(k, spacing, count)
-        parts.append(post(f"pole_{k}", 0.05, height, (0, y), COLOURS["white"]))
+        y = in_a_row(k, distance=spacing, count=count)
+        parts.append(
+            post(
+                f"pole_{k}",
+                radius=0.05,
+                height=height,
+                xy=(0, y),
+                rgb=COLOURS["white"],
+            )
+        )
         yaw = round(wind + dice.uniform(-0.15, 0.15), 3)
         rgb = dice.tinted((1.0, 1.0, 1.0), 0.15, 0.85)
         at = (0, y, height - 0.1)
-        parts.append(mesh_part(f"flag_{k}", "flag", at, yaw, rgb))
+        parts.append(mesh_part(f"flag_{k}", "flag", at=at, yaw=yaw, rgb=rgb))
     return assemble(*parts)
 
 
@@ -93,14 +103,22 @@ def garage(rng: np.random.Generator) -> Model:
     dice = Dice(rng)
     walls = dice.pick(CHOICES["garage_walls"])
     door = dice.pick(CHOICES["garage_door"])
-    tall = dice.uniform(2.3, 2.8, 3)
+    tall = dice.uniform(2.3, 2.8, digits=3)
     # The walls begin 0.3 m below the ground.
-    size, center = (3, 5.8, tall + 0.3), (0, 0, tall / 2 - 0.15)
-    lid, top = (3.2, 6.1, 0.16), (0, 0, tall + 0.08)
     return assemble(
-        block("walls", size, center, rgb=walls),
-        block("roof", lid, top, rgb=COLOURS["concrete"]),
-        block("door", (2.4, 0.06, 2.1), (0, -2.92, 1.05), rgb=door),
+        block(
+            "walls",
+            size=(3, 5.8, tall + 0.3),
+            center=(0, 0, tall / 2 - 0.15),
+            rgb=walls,
+        ),
+        block(
+            "roof",
+            size=(3.2, 6.1, 0.16),
+            center=(0, 0, tall + 0.08),
+            rgb=COLOURS["concrete"],
+        ),
+        block("door", size=(2.4, 0.06, 2.1), center=(0, -2.92, 1.05), rgb=door),
     )
 
 
@@ -118,7 +136,13 @@ def bus_shelter(rng: np.random.Generator) -> Model:
         mesh_part(
             "panes", f"{mesh}_panes", rgb=COLOURS["pane"], material="glass"
         ),
-        post("stop", 0.03, 2.9, (0.9, -2.6 * advert), COLOURS["steel"]),
+        post(
+            "stop",
+            radius=0.03,
+            height=2.9,
+            xy=(0.9, -2.6 * advert),
+            rgb=COLOURS["steel"],
+        ),
     )
 
 
@@ -126,20 +150,20 @@ def cafe_table(rng: np.random.Generator) -> Model:
     """Returns a table with four chairs under an umbrella."""
     dice = Dice(rng)
     height = dice.uniform(2.5, 2.75)
-    yaw = dice.uniform(-math.pi, math.pi, 3)
+    yaw = dice.uniform(-math.pi, math.pi, digits=3)
     rgb = dice.pick(CHOICES["cafe_umbrella"])
     top = (0, 0, height)
     return assemble(
         mesh_part("table", "cafe_set", yaw=yaw, rgb=COLOURS["cafe_table"]),
-        post("pole", 0.025, height, rgb=COLOURS["steel"]),
-        mesh_part("umbrella", "cafe_umbrella", top, yaw / 3, rgb),
+        post("pole", radius=0.025, height=height, rgb=COLOURS["steel"]),
+        mesh_part("umbrella", "cafe_umbrella", at=top, yaw=yaw / 3, rgb=rgb),
     )
 
 
 def market_stall(rng: np.random.Generator) -> Model:
     """Returns a market stall under an awning."""
     dice = Dice(rng)
-    scale = (1.0, dice.uniform(0.9, 1.2, 3), 1.0)
+    scale = (1.0, dice.uniform(0.9, 1.2, digits=3), 1.0)
     stall = COLOURS["stall"]
     awning = dice.pick(CHOICES["market_awning"])
     return assemble(
@@ -155,10 +179,12 @@ def basketball_hoop(rng: np.random.Generator) -> Model:
     red = CHOICES["play"][0]
     board = (0.05, 1.8, 1.05)
     return assemble(
-        post("post", 0.07, height, rgb=grey),
-        block("arm", (0.9, 0.1, 0.1), (0.4, 0, height - 0.3), rgb=grey),
-        block("board", board, (0.85, 0, height), rgb=red),
-        block("rim", (0.46, 0.46, 0.03), (1.12, 0, height - 0.4)),
+        post("post", radius=0.07, height=height, rgb=grey),
+        block(
+            "arm", size=(0.9, 0.1, 0.1), center=(0.4, 0, height - 0.3), rgb=grey
+        ),
+        block("board", size=board, center=(0.85, 0, height), rgb=red),
+        block("rim", size=(0.46, 0.46, 0.03), center=(1.12, 0, height - 0.4)),
     )
 
 

@@ -28,10 +28,12 @@ def stone_bench(rng: np.random.Generator) -> Model:
     length = Dice(rng).uniform(1.6, 2.4)
     stone = COLOURS["stone"]
     feet = (
-        pillar(f"foot_{k}", 0.4, 0.35, 0.4, (0.0, y), rgb=stone)
+        pillar(f"foot_{k}", x=0.4, y=0.35, height=0.4, xy=(0.0, y), rgb=stone)
         for k, y in enumerate((-0.35 * length, 0.35 * length))
     )
-    seat = block("seat", (0.5, length, 0.12), (0, 0, 0.46), rgb=stone)
+    seat = block(
+        "seat", size=(0.5, length, 0.12), center=(0, 0, 0.46), rgb=stone
+    )
     return assemble(*feet, seat)
 
 
@@ -44,8 +46,8 @@ def recycling_bins(rng: np.random.Generator) -> Model:
             mesh_part(
                 f"container_{k}",
                 "rubbish_container",
-                (0, in_a_row(k, 1.5, count), 0),
-                yaw=dice.uniform(-0.08, 0.08, 3),
+                at=(0, in_a_row(k, distance=1.5, count=count), 0),
+                yaw=dice.uniform(-0.08, 0.08, digits=3),
                 rgb=dice.pick(CHOICES["recycling_bin"]),
             )
             for k in range(count)
@@ -58,7 +60,7 @@ def bollard(rng: np.random.Generator) -> Model:
     height = Dice(rng).uniform(0.8, 0.95)
     dark = COLOURS["dark"]
     head = Part("head", SphereShape(0.08), (0.0, 0.0, height), rgb=dark)
-    return assemble(post("shaft", 0.06, height, rgb=dark), head)
+    return assemble(post("shaft", radius=0.06, height=height, rgb=dark), head)
 
 
 def _bicycle_rgb(dice: Dice) -> Rgb:
@@ -77,13 +79,13 @@ def bicycle_rack(rng: np.random.Generator) -> Model:
     hoops = dice.whole(4, 8)
     parts = []
     for k in range(hoops):
-        y = in_a_row(k, 0.8, hoops)
+        y = in_a_row(k, distance=0.8, count=hoops)
         hoop = mesh_part(
-            f"hoop_{k}", "rack_hoop", (0, y, 0), rgb=COLOURS["steel"]
+            f"hoop_{k}", "rack_hoop", at=(0, y, 0), rgb=COLOURS["steel"]
         )
         parts.append(hoop)
         if dice.chance(0.55):
-            lean = dice.uniform(-0.08, 0.08, 3)
+            lean = dice.uniform(-0.08, 0.08, digits=3)
             x = dice.uniform(-0.1, 0.1)
             # Half of the bicycles point backwards.
             yaw = math.pi * dice.whole(0, 2)
@@ -104,8 +106,8 @@ def parking_meter(rng: np.random.Generator) -> Model:
     height = Dice(rng).uniform(1.15, 1.3)
     size, center = (0.16, 0.22, 0.36), (0, 0, height + 0.1)
     return assemble(
-        post("post", 0.035, height, rgb=COLOURS["steel"]),
-        block("head", size, center, rgb=COLOURS["dark"]),
+        post("post", radius=0.035, height=height, rgb=COLOURS["steel"]),
+        block("head", size=size, center=center, rgb=COLOURS["dark"]),
     )
 
 
@@ -115,8 +117,14 @@ def ticket_machine(rng: np.random.Generator) -> Model:
     rgb = COLOURS["ticket_machine"]
     size = (0.5, 0.46, 0.06)
     return assemble(
-        pillar("case", 0.28, 0.36, 1.5, yaw=yaw, rgb=rgb),
-        block("roof", size, (0.05, 0, 1.56), yaw, COLOURS["dark"]),
+        pillar("case", x=0.28, y=0.36, height=1.5, yaw=yaw, rgb=rgb),
+        block(
+            "roof",
+            size=size,
+            center=(0.05, 0, 1.56),
+            yaw=yaw,
+            rgb=COLOURS["dark"],
+        ),
     )
 
 
@@ -129,7 +137,7 @@ def newspaper_boxes(rng: np.random.Generator) -> Model:
             mesh_part(
                 f"box_{k}",
                 "newspaper_box",
-                (0, in_a_row(k, 0.55, count), 0),
+                at=(0, in_a_row(k, distance=0.55, count=count), 0),
                 rgb=dice.pick(CHOICES["newspaper_box"]),
             )
             for k in range(count)

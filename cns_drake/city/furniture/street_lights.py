@@ -17,6 +17,13 @@ from cns_drake.city.geometry import (
     post,
 )
 
+# Distance of the ends of straight arms from the mast [m].
+_ARM_M = 1.9
+# Distance of the middles of the lamps on straight arms from the mast [m].
+_LAMP_M = 2.1
+# Height of a curved arm, from its foot to the lamp [m].
+_CURVED_ARM_M = 1.2
+
 
 def lamp_post(
     rng: np.random.Generator, *, height: float | None = None, arms: int = 1
@@ -31,15 +38,28 @@ def lamp_post(
     drawn = Dice(rng).uniform(8.0, 9.5)
     height = drawn if height is None else height
     steel = COLOURS["lamp_steel"]
-    parts = [post("base", 0.14, 0.9, rgb=steel)] if arms != 2 else []
-    parts.append(post("mast", 0.085, height, rgb=steel))
+    parts = []
+    if arms != 2:
+        parts.append(post("base", radius=0.14, height=0.9, rgb=steel))
+    parts.append(post("mast", radius=0.085, height=height, rgb=steel))
+    foot, lamp_z = (0, 0, height - 0.15), height + 0.25
     for k in range(arms):
+        # The first arm points to +x, the second to -x.
         side = 1 - 2 * k
-        top = height + 0.25
-        start, end = (0, 0, height - 0.15), (side * 1.9, 0, top)
-        parts.append(bar(f"arm_{k}", start, end, 0.045, steel))
-        size, center = (0.75, 0.3, 0.12), (side * 2.1, 0, top)
-        parts.append(block(f"lamp_{k}", size, center, rgb=COLOURS["lamp"]))
+        arm = bar(
+            f"arm_{k}",
+            start=foot,
+            end=(side * _ARM_M, 0, lamp_z),
+            radius=0.045,
+            rgb=steel,
+        )
+        lamp = block(
+            f"lamp_{k}",
+            size=(0.75, 0.3, 0.12),
+            center=(side * _LAMP_M, 0, lamp_z),
+            rgb=COLOURS["lamp"],
+        )
+        parts += [arm, lamp]
     return assemble(*parts)
 
 
@@ -56,12 +76,15 @@ def lamp_post_curved(
     drawn = Dice(rng).uniform(7.0, 8.5)
     height = drawn if height is None else height
     dark = COLOURS["dark"]
-    at = (0, 0, height - 1.2)
+    mast = height - _CURVED_ARM_M
+    at = (0, 0, mast)
     return assemble(
-        post("base", 0.13, 1.1, rgb=dark),
-        post("mast", 0.075, height - 1.2, rgb=dark),
+        post("base", radius=0.13, height=1.1, rgb=dark),
+        post("mast", radius=0.075, height=mast, rgb=dark),
         *(
-            mesh_part(f"arm_{k}", "lamp_curved_arm", at, k * math.pi, dark)
+            mesh_part(
+                f"arm_{k}", "lamp_curved_arm", at=at, yaw=k * math.pi, rgb=dark
+            )
             for k in range(arms)
         ),
     )
@@ -79,9 +102,9 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
     green = COLOURS["lamp_green"]
     at = (0, 0, height - 0.75)
     return assemble(
-        post("base", 0.11, 0.7, rgb=green),
-        post("mast", 0.05, height - 0.7, rgb=green),
-        mesh_part("lantern", "lamp_lantern", at, rgb=COLOURS["lamp"]),
+        post("base", radius=0.11, height=0.7, rgb=green),
+        post("mast", radius=0.05, height=height - 0.7, rgb=green),
+        mesh_part("lantern", "lamp_lantern", at=at, rgb=COLOURS["lamp"]),
     )
 
 

@@ -17,9 +17,15 @@ from cns_drake.city.geometry import (
     post,
 )
 
+# Radius of a round sign [m].
+_ROUND_RADIUS_M = 0.32
+# Height of the masts of a sign with directions [m].
+_DIRECTION_MAST_M = 4.6
+
 
 def _sign_mast(height: float) -> Part:
-    return post("mast", 0.035, height, rgb=COLOURS["steel"])
+    """Returns the mast of a small sign; `height` is its height [m]."""
+    return post("mast", radius=0.035, height=height, rgb=COLOURS["steel"])
 
 
 def sign_round(rng: np.random.Generator) -> Model:
@@ -29,11 +35,11 @@ def sign_round(rng: np.random.Generator) -> Model:
     rgb = dice.pick(CHOICES["sign_round"])
     plate = Part(
         "plate",
-        CylinderShape(0.32, 0.03),
-        (0.05, 0.0, height - 0.32),
-        (0.0, math.pi / 2, 0.0),
-        rgb,
-        "way_sign" if rgb == COLOURS["blue"] else "stop_sign",
+        CylinderShape(radius=_ROUND_RADIUS_M, length=0.03),
+        xyz=(0.05, 0.0, height - _ROUND_RADIUS_M),
+        rpy=(0.0, math.pi / 2, 0.0),
+        rgb=rgb,
+        material="way_sign" if rgb == COLOURS["blue"] else "stop_sign",
     )
     return assemble(_sign_mast(height), plate)
 
@@ -44,7 +50,7 @@ def sign_triangular(rng: np.random.Generator) -> Model:
     at = (0.05, 0, height - 0.45)
     rgb = COLOURS["sign_red"]
     plate = mesh_part(
-        "plate", "sign_triangle", at, rgb=rgb, material="yield_sign"
+        "plate", "sign_triangle", at=at, rgb=rgb, material="yield_sign"
     )
     return assemble(_sign_mast(height), plate)
 
@@ -55,7 +61,7 @@ def sign_stop(rng: np.random.Generator) -> Model:
     at = (0.05, 0, height - 0.4)
     rgb = COLOURS["sign_red"]
     plate = mesh_part(
-        "plate", "sign_octagon", at, rgb=rgb, material="stop_sign"
+        "plate", "sign_octagon", at=at, rgb=rgb, material="stop_sign"
     )
     return assemble(_sign_mast(height), plate)
 
@@ -69,7 +75,7 @@ def sign_rectangular(rng: np.random.Generator) -> Model:
     rgb = dice.pick(CHOICES["sign_rectangular"])
     size, center = (0.03, width, tall), (0.05, 0, height - 0.5 * tall)
     material = "way_sign" if rgb == COLOURS["blue"] else "plain_sign"
-    plate = block("plate", size, center, rgb=rgb, material=material)
+    plate = block("plate", size=size, center=center, rgb=rgb, material=material)
     return assemble(_sign_mast(height), plate)
 
 
@@ -77,12 +83,22 @@ def sign_street_name(rng: np.random.Generator) -> Model:
     """Returns the names of two streets on a post, along x and along y."""
     height = Dice(rng).uniform(3.0, 3.3)
     blue = COLOURS["blue"]
-    x_size, x_center = (1.1, 0.03, 0.22), (0.4, 0, height - 0.12)
-    y_size, y_center = (0.03, 1, 0.22), (0, 0.35, height - 0.36)
     return assemble(
-        post("mast", 0.03, height, rgb=COLOURS["steel"]),
-        block("blade_x", x_size, x_center, rgb=blue, material="name_sign"),
-        block("blade_y", y_size, y_center, rgb=blue, material="name_sign"),
+        post("mast", radius=0.03, height=height, rgb=COLOURS["steel"]),
+        block(
+            "blade_x",
+            size=(1.1, 0.03, 0.22),
+            center=(0.4, 0, height - 0.12),
+            rgb=blue,
+            material="name_sign",
+        ),
+        block(
+            "blade_y",
+            size=(0.03, 1, 0.22),
+            center=(0, 0.35, height - 0.36),
+            rgb=blue,
+            material="name_sign",
+        ),
     )
 
 
@@ -90,12 +106,24 @@ def sign_direction(rng: np.random.Generator) -> Model:
     """Returns a large sign with directions on two masts."""
     width = Dice(rng).uniform(2.4, 3.4)
     steel = COLOURS["steel"]
-    size, center = (0.05, width, 1.7), (0.09, 0, 3.75)
-    return assemble(
-        post("mast_0", 0.06, 4.6, (0, 0.35 * width), steel),
-        post("mast_1", 0.06, 4.6, (0, -0.35 * width), steel),
-        block("plate", size, center, rgb=COLOURS["blue"], material="way_sign"),
+    masts = (
+        post(
+            f"mast_{k}",
+            radius=0.06,
+            height=_DIRECTION_MAST_M,
+            xy=(0, side * width),
+            rgb=steel,
+        )
+        for k, side in enumerate((0.35, -0.35))
     )
+    plate = block(
+        "plate",
+        size=(0.05, width, 1.7),
+        center=(0.09, 0, 3.75),
+        rgb=COLOURS["blue"],
+        material="way_sign",
+    )
+    return assemble(*masts, plate)
 
 
 TRAFFIC_SIGNS = {

@@ -16,6 +16,10 @@ from cns_drake.city.geometry import (
     triple,
 )
 
+# Tall trees are also wider, but less than in proportion: the width grows with
+# this power of the height.
+_WIDTH_POWER = 0.7
+
 
 @dataclass(frozen=True)
 class Species:
@@ -90,8 +94,7 @@ def tree(
         variant = drawn_variant
     names = wood, crown = mesh_names(species, variant)
     up = height / max(object_mesh(n).vertices[:, 2].max() for n in names)
-    # Tall trees are also wider, but less than in proportion.
-    across = up**0.7 * stretch
+    across = up**_WIDTH_POWER * stretch
     scale = triple(round(float(s), 3) for s in (*across, up))
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)
     rpy = (0.0, 0.0, round(yaw, 3))
