@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,20 @@ from evaluation.recognition.retrieval import Retrieval
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 # Number of top-ranked places that are kept for each query.
 NUM_BEST = 5
+
+
+class QueryDrive(NamedTuple):
+    """The drive of Q queries.
+
+    Attributes:
+        name: name of the drive.
+        stamps_ns: (Q,) time stamps of the queries [ns].
+        positions: (Q, 3) positions of the queries [m].
+    """
+
+    name: str
+    stamps_ns: np.ndarray
+    positions: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +110,7 @@ class PlaceOutcome:
         method: Method,
         protocol: RetrievalProtocol,
         retrieval: Retrieval,
-        query: tuple[str, np.ndarray, np.ndarray],
+        query: QueryDrive,
         drives: Sequence[str],
         overlaps: np.ndarray | None = None,
         num_here: int | None = None,
@@ -108,8 +123,7 @@ class PlaceOutcome:
             protocol: protocol of the retrieval: the radius of a match, and
                 whether geometric verification has changed the scores.
             retrieval: scores and ground truth of Q queries and D places.
-            query: name of the drive of the queries, and time stamps (Q,) [ns]
-                and positions (Q, 3) [m] of the queries.
+            query: the drive of the queries.
             drives: name of each place's drive (D names). The first name is the
                 name of the database drive.
             overlaps: (Q,) how much of the query's scan the best of its matches
@@ -128,13 +142,12 @@ class PlaceOutcome:
             num_here = sum(name == drives[0] for name in drives)
         if overlaps is None:
             overlaps = np.full(len(outcomes), math.nan)
-        query_name, stamps_ns, positions = query
         columns = {
             "query_frame": retrieval.query_frames,
-            "query_stamp_ns": stamps_ns,
-            "query_x": positions[:, 0],
-            "query_y": positions[:, 1],
-            "query_z": positions[:, 2],
+            "query_stamp_ns": query.stamps_ns,
+            "query_x": query.positions[:, 0],
+            "query_y": query.positions[:, 1],
+            "query_z": query.positions[:, 2],
             "block": outcomes.own_blocks,
             **_columns_of_answers(
                 retrieval, outcomes, drives, num_here, protocol.radius
@@ -146,7 +159,7 @@ class PlaceOutcome:
         return cls(
             method=name,
             database=drives[0],
-            query=query_name,
+            query=query.name,
             protocol=protocol.of(method),
             protocol_name=protocol.name_with(method),
             outcomes=outcomes,

@@ -18,7 +18,7 @@ from evaluation.recognition.describing import Role
 from evaluation.recognition.descriptors import DriveDescriptors
 from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.overlap_truth import overlaps_with_best_match
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import (
     compare_with_gates,
@@ -355,7 +355,9 @@ def _method_outcomes(
                 method,
                 replace(protocol, gate=is_gated, radius=radius),
                 replace(found, matches=matches),
-                (query.name, query.queries.stamps_ns, query.queries.p_WSs),
+                QueryDrive(
+                    query.name, query.queries.stamps_ns, query.queries.p_WSs
+                ),
                 drives,
                 overlaps,
                 num_here,

@@ -21,6 +21,7 @@ from evaluation.change.tcr import GRIDS
 from evaluation.methods.method import Method
 from evaluation.recognition.place_outcome import (
     PlaceOutcome,
+    QueryDrive,
     check_has_match,
 )
 from evaluation.recognition.protocol import RECORDED_PROTOCOL, RetrievalProtocol
@@ -60,7 +61,9 @@ def place_outcome(
         method,
         protocol,
         found,
-        (query.name, query.stamps_ns[frames], query.X_WS[frames, :3, 3]),
+        QueryDrive(
+            query.name, query.stamps_ns[frames], query.X_WS[frames, :3, 3]
+        ),
         [database.name] * len(found.database_frames),
     )
     check_has_match(outcome)

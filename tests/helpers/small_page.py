@@ -10,7 +10,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
 from evaluation.recognition.fault_kinds import PairEvidence
 from evaluation.recognition.place_numbers import place_numbers, pose_numbers
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.retrieval import Retrieval
@@ -183,7 +183,7 @@ def make_result(method, best, back=False):
         make_method(method, {}),
         PAPER_PROTOCOL,
         retrieval,
-        (query, np.arange(number), np.zeros((number, 3))),
+        QueryDrive(query, np.arange(number), np.zeros((number, 3))),
         [database] * len(places),
     )
     return replace(outcome, pair=(MAP, *stages))

@@ -8,7 +8,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.bootstrap import UNKNOWN
 from evaluation.recognition.faults import FAULTS, faults
 from evaluation.recognition.place_numbers import place_numbers, pose_numbers
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.query_outcomes import QueryOutcomes
@@ -239,7 +239,7 @@ def test_columns_hold_all_that_numbers_follow_from(blocks):
         make_method("solid", {}),
         RetrievalProtocol(gate=True),
         retrieval,
-        ("town_03", np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
+        QueryDrive("town_03", np.arange(8) * 50, np.arange(24.0).reshape(8, 3)),
         ["town_01"] * 6 + ["town_02"] * 3,
         np.linspace(0.2, 0.8, 8),
     )

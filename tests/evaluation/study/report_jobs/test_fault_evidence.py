@@ -14,7 +14,7 @@ from evaluation.recognition.fault_kinds import (
     PairEvidence,
     fault_kinds,
 )
-from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import Retrieval
@@ -100,7 +100,7 @@ def result_of(best, distances, protocol, method="solid"):
         make_method(method, {}),
         protocol,
         retrieval,
-        ("b", np.arange(rows), np.zeros((rows, 3))),
+        QueryDrive("b", np.arange(rows), np.zeros((rows, 3))),
         ["a"] * places,
     )
     return replace(outcome, pair=("town", "a", "b"))
