@@ -19,8 +19,8 @@ from cns_drake.command_line.experiment_drives import varied_drives
 from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:
-    from cns_drake.base.drives.drive import Drive
     from cns_drake.base.jobs.cluster import Cluster
+    from cns_drake.drives.drive import Drive
     from cns_drake.scenarios.scenario import Scenario
     from cns_drake.studies.exports.pair_export import ExportOptions
 
@@ -527,7 +527,7 @@ def _write_sessions(
     """Writes maps of two drives without labels."""
     with uninterrupted():
         from cns_drake.base.complete_files import draft_folder
-        from cns_drake.base.drives.same_world import check_same_world
+        from cns_drake.drives.same_world import check_same_world
         from evaluation.map_update.labels import SIDES
         from evaluation.map_update.sessions import write_session
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import shutil
 
 from cns_drake.base import complete_files, files
-from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
-from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.progress import doing, track
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.drives.deskewing import deskewed_notes, deskewed_scan
+from cns_drake.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.export.cns_layout import CNS
 from cns_drake.export.kitti_layout import KITTI, kitti_layout
 from cns_drake.export.layout import Layout

@@ -6,8 +6,8 @@ import re
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.points import encode_bin, encode_labels
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.layout import (
     Layout,
     imu_files,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.drives.drive_scenario import read_scenario
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
+from cns_drake.drives.drive_scenario import read_scenario
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.semantics import moving_id

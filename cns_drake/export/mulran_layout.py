@@ -3,9 +3,9 @@
 from pathlib import PurePosixPath
 
 from cns_drake.base import poses
-from cns_drake.base.drives import mulran_frames
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.points import encode_bin
+from cns_drake.drives import mulran_frames
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.layout import (
     Layout,
     checked_name,

@@ -24,10 +24,10 @@ from cns_drake.base.complete_files import (
     part_path,
     write_part,
 )
-from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.version import __version__
+from cns_drake.drives import ros_types
 from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder

@@ -24,9 +24,9 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.point_layouts import to_labels, to_layout
-from cns_drake.base.drives.sensor_names import (
+from cns_drake.drives import ros_types
+from cns_drake.drives.point_layouts import to_labels, to_layout
+from cns_drake.drives.sensor_names import (
     BASE_FRAME,
     IMU_FRAME,
     MAP_FRAME,

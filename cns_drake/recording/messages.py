@@ -14,10 +14,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.point_cloud2 import point_field_datatype
-from cns_drake.base.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 from cns_drake.base.jpeg_images import to_jpeg
+from cns_drake.drives import ros_types
+from cns_drake.drives.point_cloud2 import point_field_datatype
+from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 
 _NS_PER_S = 1_000_000_000
 # Variance given for an exact value, in the square of its unit: a standard

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.sensor_names import MAP_FRAME
+from cns_drake.drives import ros_types
+from cns_drake.drives.sensor_names import MAP_FRAME
 from cns_drake.recording import messages
 
 # Placeholders of numbers in a message: this and the following integers, which

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Mapping
 
 from pydrake.math import RigidTransform
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.sensor_names import BASE_FRAME, IMU_FRAME
+from cns_drake.drives import ros_types
+from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME
 from cns_drake.recording import messages
 from cns_drake.recording.messages import CAMERA_INFO, ENCODINGS, IMAGE
 from cns_drake.recording.rosbag2_metadata import Topic

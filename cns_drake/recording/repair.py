@@ -19,12 +19,12 @@ from mcap.records import (
 from mcap.writer import Writer
 
 from cns_drake.base.complete_files import check_writable, completing
-from cns_drake.base.drives.mcap_messages import STAMPED_RECORD
-from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
+from cns_drake.drives.mcap_messages import STAMPED_RECORD
+from cns_drake.drives.mcap_records import Fault, read_records
 from cns_drake.recording import rosbag2_metadata
 from cns_drake.recording.topic_chunks import TopicChunks
 

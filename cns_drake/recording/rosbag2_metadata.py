@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.base.drives import ros_types
+from cns_drake.drives import ros_types
 
 # Version of the format of `metadata.yaml`.
 _VERSION = 8

@@ -16,8 +16,8 @@ from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 import numpy as np
 
-from cns_drake.base.drives.mcap_messages import STAMPED_RECORD, read_stamp
-from cns_drake.base.drives.mcap_records import (
+from cns_drake.drives.mcap_messages import STAMPED_RECORD, read_stamp
+from cns_drake.drives.mcap_records import (
     Fault,
     chunk_times,
     locate_records,

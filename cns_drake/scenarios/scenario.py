@@ -17,8 +17,8 @@ from pydantic import (
     model_validator,
 )
 
-from cns_drake.base.drives.sensor_names import check_sensor_name
 from cns_drake.base.errors import validated
+from cns_drake.drives.sensor_names import check_sensor_name
 from cns_drake.roads.route import Route
 from cns_drake.roads.speeds import Speeds
 from cns_drake.scenarios.sections import (

@@ -6,8 +6,8 @@ import functools
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from cns_drake.base.drives.sensor_names import BASE_FRAME
 from cns_drake.base.progress import doing
+from cns_drake.drives.sensor_names import BASE_FRAME
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario

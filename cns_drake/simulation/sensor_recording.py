@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import RgbdSensor
 
-from cns_drake.base.drives.sensor_names import check_sensor_names
+from cns_drake.drives.sensor_names import check_sensor_names
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
 from cns_drake.recording.messages import ENCODINGS

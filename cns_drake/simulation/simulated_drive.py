@@ -17,10 +17,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive, index_instances
-from cns_drake.base.drives.sensor_names import MAP_FRAME
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.progress import doing
+from cns_drake.drives.drive import Drive, index_instances
+from cns_drake.drives.sensor_names import MAP_FRAME
 from cns_drake.motion.trajectory import pose_at
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording.messages import to_quat_xyzw

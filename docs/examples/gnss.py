@@ -25,7 +25,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake import Scenario, load_scenario, simulate
-from cns_drake.base.drives.ros_types import message_class
+from cns_drake.drives.ros_types import message_class
 from cns_drake.recording.messages import make_header
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.sensors.carriers import sensor_pose

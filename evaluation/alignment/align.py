@@ -25,10 +25,10 @@ from typing import Literal
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.same_world import check_same_map
 from cns_drake.base.errors import InputError
 from cns_drake.base.poses import yaw_pose
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import check_same_map
 from evaluation.alignment.loop_search import (
     SAME_PLACE,
     LoopSearch,

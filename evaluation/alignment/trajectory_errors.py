@@ -27,9 +27,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.mcap_messages import checked_poses
 from cns_drake.base.errors import InputError
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.mcap_messages import checked_poses
 from evaluation.drives.sampling import travelled
 from evaluation.drives.trajectories import StampedPoses
 

@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.same_world import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.listing import listed
+from cns_drake.base.progress import doing
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import (
     DriveNames,
     Placed,
     check_same_world,
 )
-from cns_drake.base.errors import InputError
-from cns_drake.base.listing import listed
-from cns_drake.base.progress import doing
 
 __all__ = [
     "Drive",
@@ -52,7 +52,7 @@ def open_drive(
         raise InputError(f"{path}: no such file or folder")
     doing(f"opening {path.name}")
     fitting = find_readers(path)
-    from cns_drake.base.drives.mcap_drive import McapDrive
+    from cns_drake.drives.mcap_drive import McapDrive
     from evaluation.drives.helipr import HeliprDrive
 
     if len(fitting) > 1:
@@ -86,7 +86,7 @@ def find_readers(path: Path) -> list[Any]:
     """Returns the drive classes whose format a file or folder has."""
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from cns_drake.base.drives import mcap_drive
+    from cns_drake.drives import mcap_drive
     from evaluation.drives import (
         boreas,
         cns_folder,

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import IMU_DTYPE
-from cns_drake.base.drives.drive_scenario import SCENARIO, read_scenario
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, read_text
 from cns_drake.base.yaml_files import YamlLoader, parse_yaml
+from cns_drake.drives.drive import IMU_DTYPE
+from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.drives.scan_files import FileDrive, first_existing, list_stamped
 from evaluation.drives.text_tables import read_stamped_rows

@@ -1,5 +1,5 @@
 """Removes the distortion that the motion of the LiDAR causes in a scan."""
 
-from cns_drake.base.drives.deskewing import deskew
+from cns_drake.drives.deskewing import deskew
 
 __all__ = ["deskew"]

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.same_world import check_same_world
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import check_same_world
 from evaluation.drives.sampling import sample_frames
 
 

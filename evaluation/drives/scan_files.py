@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import read_bytes, user_errors
 from cns_drake.base.listing import listed
 from cns_drake.base.points import FARTHEST_RETURN, check_range
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.lidar_fields import LidarField, lidar_field
 from evaluation.clouds.bin_columns import BinLayout, find_layout
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.drives.text_tables import check_increasing, parse_stamps_ns

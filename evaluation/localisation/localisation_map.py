@@ -10,9 +10,9 @@ import small_gicp
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.alignment.registration import Surface, make_surface
 from evaluation.clouds.cloud_files import read_blocks
 from evaluation.clouds.notes import OnNote, no_note

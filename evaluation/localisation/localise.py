@@ -16,9 +16,9 @@ import numpy as np
 
 from cns_drake.base import points as clouds
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError, errors_at
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cropped
 from evaluation.localisation.estimators import Estimator

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localise import Localiser, path_axes

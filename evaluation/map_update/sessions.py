@@ -25,12 +25,12 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from cns_drake.base.complete_files import completing
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import is_there, user_errors
 from cns_drake.base.listing import listed
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.clouds.cloud_files import read_blocks, read_cloud
 from evaluation.clouds.npy_files import read_npy
 from evaluation.drives.sampling import sample_frames

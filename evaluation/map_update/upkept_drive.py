@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.points import xyz
+from cns_drake.drives.drive import Drive
 from evaluation.drives.drive_views import MovedDrive
 from evaluation.map_update.upkeep import Updates
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces

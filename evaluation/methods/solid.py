@@ -16,8 +16,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from cns_drake.base.drives.lidar_fields import LidarField
 from cns_drake.base.poses import yaw_pose
+from cns_drake.drives.lidar_fields import LidarField
 from evaluation.maps.voxel_maps import Z_ORIGIN, downsample
 from evaluation.methods.method import Method, MethodConfig
 from evaluation.methods.registry import register

@@ -18,8 +18,6 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.drives.deskewing import deskewed_notes, deskewed_scan
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.jobs.file_digests import file_digests
@@ -27,6 +25,8 @@ from cns_drake.base.listing import listed
 from cns_drake.base.points import from_xyz, xyz
 from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track
+from cns_drake.drives.deskewing import deskewed_notes, deskewed_scan
+from cns_drake.drives.drive import Drive
 from evaluation.clouds.count_images import (
     check_image,
     count_image,

@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.drives.query_sensor import QuerySensor
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cloud_at

@@ -19,9 +19,9 @@ import numpy as np
 
 from cns_drake.base import poses
 from cns_drake.base.csv_files import read_records, write_csv
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cloud_at
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
 
-    from cns_drake.base.drives.drive import Drive
+    from cns_drake.drives.drive import Drive
     from evaluation.drives.query_sensor import QuerySensor
     from evaluation.methods.method import Method, PlaceScan
 

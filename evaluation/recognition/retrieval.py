@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.same_world import check_same_world
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import check_same_world
 from evaluation.methods.method import Method
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.descriptors import DescribedScans, DriveDescriptors

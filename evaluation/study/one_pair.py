@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import one_line
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.drives.drive import Drive
 from evaluation.change.drive_maps import DriveMap
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice

@@ -30,8 +30,8 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
-from cns_drake.base.drives import ros_types
 from cns_drake.base.process import num_cores
+from cns_drake.drives import ros_types
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import messages

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
+from cns_drake.drives.drive import Drive
 from evaluation.change.drive_change import (
     ChangeReport,
     change_between,

@@ -14,7 +14,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
-from cns_drake.base.drives.sensor_names import IMU_FRAME
+from cns_drake.drives.sensor_names import IMU_FRAME
 from cns_drake.sensors import carriers, system_names
 from cns_drake.sensors.imu.noise import ImuNoise
 from cns_drake.sensors.imu.noisy_imu import NoisyImu

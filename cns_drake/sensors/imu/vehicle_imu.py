@@ -19,8 +19,8 @@ from pydrake.systems.framework import (
 )
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.drives.drive import ImuSamples
 from cns_drake.base.elementary import product, rotated
+from cns_drake.drives.drive import ImuSamples
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.sensors import carriers
 from cns_drake.sensors.imu.config import ImuSection

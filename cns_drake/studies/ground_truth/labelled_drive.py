@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.base.errors import InputError, validated
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.mcap_drive import McapDrive, holds_mcap
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs

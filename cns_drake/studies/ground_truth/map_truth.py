@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from cns_drake.base.complete_files import draft_folder
-from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
+from cns_drake.drives.same_world import check_same_world
 from cns_drake.studies.ground_truth.exact_labels import label_points
 from cns_drake.studies.ground_truth.labelled_drive import LabelledDrive
 from cns_drake.studies.ground_truth.map_truth_page import write_page

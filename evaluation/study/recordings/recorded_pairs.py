@@ -3,11 +3,11 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.listing import natural_key
 from cns_drake.base.repetitions import repeated
+from cns_drake.drives.same_world import check_same_world
 from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import OWN

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
-from cns_drake.base.drives.same_world import check_same_world
 from cns_drake.base.jobs.running import Job
+from cns_drake.drives.same_world import check_same_world
 from evaluation.recognition.describing import Role
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import RetrievalProtocol

@@ -11,11 +11,11 @@ import math
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.drives.scan_clouds import within_range
 from evaluation.maps.voxel_maps import downsample
 from evaluation.methods import MethodConfig

@@ -13,8 +13,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 import yaml
 
-from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
+from cns_drake.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.rosbag2_metadata import Topic

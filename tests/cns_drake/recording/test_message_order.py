@@ -1,7 +1,7 @@
 import pytest
 
-from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
+from cns_drake.drives import ros_types
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.rosbag2_metadata import Topic
 

@@ -5,7 +5,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.drives import ros_types
+from cns_drake.drives import ros_types
 from cns_drake.recording import messages
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 

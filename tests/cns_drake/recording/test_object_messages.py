@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.ros_types import (
+from cns_drake.drives.ros_types import (
     DETECTIONS_3D,
     SCENE_UPDATE,
     deserialize,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.point_cloud2 import to_points, to_records
-from cns_drake.base.drives.point_layouts import (
+from cns_drake.drives.point_cloud2 import to_points, to_records
+from cns_drake.drives.point_layouts import (
     from_layout,
     to_labels,
     to_layout,
 )
-from cns_drake.base.drives.ros_types import POINT_CLOUD, deserialize
+from cns_drake.drives.ros_types import POINT_CLOUD, deserialize
 from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 

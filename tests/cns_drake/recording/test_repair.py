@@ -15,9 +15,9 @@ from rosbags.highlevel import AnyReader
 import yaml
 import zstandard
 
-from cns_drake.base.drives.mcap_file import CHUNK_LIMIT_BYTES
-from cns_drake.base.drives.mcap_records import Fault, read_records
 from cns_drake.base.errors import InputError
+from cns_drake.drives.mcap_file import CHUNK_LIMIT_BYTES
+from cns_drake.drives.mcap_records import Fault, read_records
 from cns_drake.recording.repair import repair_mcap
 
 COMPRESSIONS = (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD)

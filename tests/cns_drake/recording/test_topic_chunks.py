@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from cns_drake.base.drives.mcap_messages import STAMPED_RECORD
 from cns_drake.base.errors import InputError
+from cns_drake.drives.mcap_messages import STAMPED_RECORD
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.repair import repair_mcap
 from cns_drake.recording.rosbag2_metadata import Topic

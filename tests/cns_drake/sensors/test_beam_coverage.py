@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.lidar_fields import lidar_field
+from cns_drake.drives.lidar_fields import lidar_field
 from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS

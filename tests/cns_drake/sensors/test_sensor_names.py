@@ -8,7 +8,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.base.drives.sensor_names import RESERVED_NAMES
+from cns_drake.drives.sensor_names import RESERVED_NAMES
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import McapRecorder, RecordedSensor
 from cns_drake.recording.recorded_topics import points_topic, recording_topics

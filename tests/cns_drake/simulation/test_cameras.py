@@ -18,9 +18,9 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 import yaml
 
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.simulating import _camera_fields
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.recording import topic_chunks
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.sensors.camera import renderer

@@ -10,8 +10,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 import yaml
 
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.exporting import export_drive
 from cns_drake.recording.schedule import START_NS
 from cns_drake.scenarios.scenario_files import check_files, load_scenario

@@ -12,7 +12,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from cns_drake.base.drives.mcap_drive import McapDrive
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.sensors.imu.imu import add_imu
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
 from cns_drake.sensors.imu.noisy_imu import NoisyImu

@@ -10,8 +10,8 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.marked_drive import MarkedDrive
 from cns_drake.scenarios.planning import DrivePlan
 from cns_drake.scenarios.provenance import digest_inputs

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cns_drake.base.drives.mcap_drive import McapDrive
+from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.exporting import export_drive
 from cns_drake.scene.semantics import MOVING_IDS
 from cns_drake.simulation.simulation import simulate

@@ -21,8 +21,8 @@ from helpers.helipr_drive import (
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.mulran_frames import ORIGIN
 from cns_drake.base.errors import InputError
+from cns_drake.drives.mulran_frames import ORIGIN
 from evaluation.drives import check_same_world, open_drive
 from evaluation.drives.helipr import HeliprDrive
 

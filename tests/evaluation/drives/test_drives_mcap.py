@@ -23,9 +23,9 @@ import pytest
 import zstandard
 
 from cns_drake.base import poses
-from cns_drake.base.drives import mcap_file
-from cns_drake.base.drives.point_cloud2 import to_points
 from cns_drake.base.errors import InputError
+from cns_drake.drives import mcap_file
+from cns_drake.drives.point_cloud2 import to_points
 from cns_drake.recording.repair import repair_mcap
 from evaluation import drives
 from evaluation.drives import check_same_world, open_drive

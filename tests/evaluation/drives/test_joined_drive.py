@@ -5,9 +5,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import from_xyz
+from cns_drake.drives.drive import Drive
 from evaluation.drives.joined_drive import JoinedDrive
 from evaluation.localisation.localisation_map import make_map, map_frames
 from evaluation.localisation.settings import Settings

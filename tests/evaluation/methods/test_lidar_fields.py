@@ -6,7 +6,7 @@ from helpers.eval_program import make_block_scene, run
 import numpy as np
 import pytest
 
-from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
+from cns_drake.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.sensors.lidar.patterns import SpinningPattern
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
 from evaluation.drives import open_drive

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.drives.drive import Drive
 from cns_drake.base.errors import InputError
+from cns_drake.drives.drive import Drive
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.drives.lidar_fields import LidarField, lidar_field
 from cns_drake.base.errors import InputError
+from cns_drake.drives.lidar_fields import LidarField, lidar_field
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
 # velocities are velocities of B in W, expressed in B [m/s, rad/s].
@@ -125,7 +125,7 @@ class Drive(abc.ABC):
     def odometry(self) -> np.ndarray | None:
         """Poses and velocities of the vehicle; None if not recorded.
 
-        An array (M,) of dtype `cns_drake.base.drives.drive.ODOMETRY_DTYPE`:
+        An array (M,) of dtype `cns_drake.drives.drive.ODOMETRY_DTYPE`:
         position [m] and orientation of the vehicle B in the world W, and its
         velocities, expressed in B [m/s, rad/s].
         """
@@ -135,7 +135,7 @@ class Drive(abc.ABC):
     def imu(self) -> np.ndarray | None:
         """Samples of the IMU I; None if not recorded.
 
-        An array (M,) of dtype `cns_drake.base.drives.drive.IMU_DTYPE`:
+        An array (M,) of dtype `cns_drake.drives.drive.IMU_DTYPE`:
         orientation R_WI, and angular velocity [rad/s] and specific force
         [m/s^2], both expressed in I.
         """

@@ -4,10 +4,10 @@ from functools import cached_property
 
 import numpy as np
 
-from cns_drake.base.drives import mcap_messages, ros_types
-from cns_drake.base.drives.mcap_file import LOCATION
-from cns_drake.base.drives.mcap_topics import McapTopics
 from cns_drake.base.errors import InputError
+from cns_drake.drives import mcap_messages, ros_types
+from cns_drake.drives.mcap_file import LOCATION
+from cns_drake.drives.mcap_topics import McapTopics
 
 # `image_transport` adds this to the names of topics of depth images.
 _DEPTH = "/compressedDepth"

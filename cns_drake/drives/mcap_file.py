@@ -26,20 +26,20 @@ from mcap.records import Channel, Chunk, Metadata
 import numpy as np
 import zstandard
 
-from cns_drake.base.drives.mcap_contents import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular, user_errors
+from cns_drake.drives.mcap_contents import (
     REPAIR_ADVICE,
     Contents,
     read_summary,
 )
-from cns_drake.base.drives.mcap_records import (
+from cns_drake.drives.mcap_records import (
     CHUNK_LIMIT_BYTES,
     RECORD_HEADER,
     RecordContent,
     parse_attachment,
     uncompress,
 )
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular, user_errors
 
 # A table of structures has a few megabytes, too.
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
@@ -128,7 +128,7 @@ class McapFile:
         """Returns the locations of a topic's messages in the file, by time.
 
         Returns:
-            (N,) of dtype `cns_drake.base.drives.mcap_file.LOCATION`: chunk,
+            (N,) of dtype `cns_drake.drives.mcap_file.LOCATION`: chunk,
             offset in the chunk, log time [ns] and channel of each message.
 
         Raises:

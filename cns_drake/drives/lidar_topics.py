@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
-from cns_drake.base.drives import ros_types
 from cns_drake.base.errors import InputError
+from cns_drake.drives import ros_types
 
 LIDAR_TOPIC = "/lidar/points"
 

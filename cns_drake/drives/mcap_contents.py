@@ -21,14 +21,14 @@ from mcap.records import (
     Statistics,
 )
 
-from cns_drake.base.drives.mcap_records import (
+from cns_drake.base.errors import InputError
+from cns_drake.drives.mcap_records import (
     MAGIC,
     RECORD_HEADER,
     Fault,
     RecordContent,
     locate_records,
 )
-from cns_drake.base.errors import InputError
 
 # An index has a few megabytes; as Python objects it takes a hundred times as
 # much memory.

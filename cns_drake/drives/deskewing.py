@@ -5,9 +5,9 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from cns_drake.base import poses
-from cns_drake.base.drives.drive import Drive
-from cns_drake.base.drives.mcap_drive import McapDrive
 from cns_drake.base.errors import InputError
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.mcap_drive import McapDrive
 
 # Number of poses before and after a scan from which its motion is interpolated.
 # The splines have free ends; the error that this causes falls to about a

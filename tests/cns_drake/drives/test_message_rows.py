@@ -4,8 +4,8 @@ from helpers.drive_files import TYPES
 import numpy as np
 import pytest
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.message_rows import (
+from cns_drake.drives import ros_types
+from cns_drake.drives.message_rows import (
     MessageRows,
     imu_row,
     odometry_row,

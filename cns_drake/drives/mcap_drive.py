@@ -8,27 +8,27 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base.drives import mcap_messages, ros_types
-from cns_drake.base.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
-from cns_drake.base.drives.lidar_topics import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.listing import listed
+from cns_drake.drives import mcap_messages, ros_types
+from cns_drake.drives.drive import ODOMETRY_DTYPE, Drive, index_instances
+from cns_drake.drives.lidar_topics import (
     LIDAR_TOPIC,
     choose_lidar_topic,
     cloud_topics,
     lidar_name,
 )
-from cns_drake.base.drives.mcap_images import McapImages
-from cns_drake.base.drives.mcap_messages import StaticTransforms, checked_poses
-from cns_drake.base.drives.mcap_topics import McapTopics
-from cns_drake.base.drives.message_rows import (
+from cns_drake.drives.mcap_images import McapImages
+from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
+from cns_drake.drives.mcap_topics import McapTopics
+from cns_drake.drives.message_rows import (
     MessageRows,
     check_agreement,
     transform_row,
     vehicle_frames,
 )
-from cns_drake.base.drives.point_cloud2 import to_points, to_records
-from cns_drake.base.drives.point_layouts import from_layout
-from cns_drake.base.errors import InputError
-from cns_drake.base.listing import listed
+from cns_drake.drives.point_cloud2 import to_points, to_records
+from cns_drake.drives.point_layouts import from_layout
 
 _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"

@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.drives import ros_types
-from cns_drake.base.drives.drive import IMU_DTYPE, ODOMETRY_DTYPE
-from cns_drake.base.drives.mcap_messages import decode, stamp_ns, xyz, xyzw
+from cns_drake.drives import ros_types
+from cns_drake.drives.drive import IMU_DTYPE, ODOMETRY_DTYPE
+from cns_drake.drives.mcap_messages import decode, stamp_ns, xyz, xyzw
 
 
 def odometry_row(message: Any) -> tuple:
     """Returns a message nav_msgs/msg/Odometry as a record of `ODOMETRY_DTYPE`.
 
-    The dtype is `cns_drake.base.drives.drive.ODOMETRY_DTYPE`.
+    The dtype is `cns_drake.drives.drive.ODOMETRY_DTYPE`.
     """
     pose, twist = message.pose.pose, message.twist.twist
     return (
@@ -44,7 +44,7 @@ def transform_row(message: Any) -> tuple:
 def imu_row(message: Any) -> tuple:
     """Returns a message sensor_msgs/msg/Imu as a record of `IMU_DTYPE`.
 
-    The dtype is `cns_drake.base.drives.drive.IMU_DTYPE`.
+    The dtype is `cns_drake.drives.drive.IMU_DTYPE`.
     """
     return (
         stamp_ns(message.header),
@@ -191,7 +191,7 @@ class MessageRows:
         """Returns the rows (N,).
 
         Their dtype is `ODOMETRY_DTYPE` or `IMU_DTYPE` of
-        `cns_drake.base.drives.drive`.
+        `cns_drake.drives.drive`.
         """
         self._rows[self._copied] = self._convert(self._bytes)
         return self._rows
