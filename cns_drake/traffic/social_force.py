@@ -54,6 +54,8 @@ STANDING_SPEED = 0.2
 AT_NODE = 1.0
 # Greatest acceleration, in any direction [m/s^2].
 _STRONGEST = 2.5
+# Least speed by which is divided [m/s], and tolerance of distances [m].
+_TINY = 1e-9
 # A pedestrian as a record.
 WALKER = np.dtype(
     [
@@ -214,48 +216,103 @@ def move_walkers(paths: Paths, walkers: np.ndarray, force: np.ndarray) -> None:
         change_x, change_y = force[i, 0] * STEP, force[i, 1] * STEP
         for attempt in range(3):
             if attempt == 1:
-                # Try only the lateral part of the step, and slightly back.
-                c, s = np.cos(walker.yaw), np.sin(walker.yaw)
-                aside = change_y * c - change_x * s
-                back = vx * c + vy * s + 0.5 * abs(aside)
-                change_x = -aside * s - back * c
-                change_y = aside * c - back * s
+                change_x, change_y = _aside(walker, change_x, change_y)
             elif attempt == 2:
                 change_x, change_y = -vx, -vy
-            part = np.sqrt(change_x * change_x + change_y * change_y)
-            part = min(1.0, _STRONGEST * STEP / max(part, 1e-9))
-            new_vx, new_vy = vx + part * change_x, vy + part * change_y
-            speed = np.sqrt(new_vx * new_vx + new_vy * new_vy)
-            part = min(1.0, _HURRY * walker.speed / max(speed, 1e-9))
-            new_vx, new_vy = part * new_vx, part * new_vy
+            new_vx, new_vy, speed = _velocity_after(walker, change_x, change_y)
             new_x = x + 0.5 * (vx + new_vx) * STEP
             new_y = y + 0.5 * (vy + new_vy) * STEP
             if attempt == 2 and speed == 0.0:
                 new_x, new_y = rest_x, rest_y
             stop_x, stop_y = _stopping_place(new_x, new_y, new_vx, new_vy)
-            yaw = walker.yaw
-            row = _nearest_row(paths, walker, new_x, new_y)
-            tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
-            if paths.narrow[row] or speed > STANDING_SPEED:
-                turn = np.arctan2(new_vy, new_vx) - yaw
-                if paths.narrow[row]:
-                    # Facing along the path, forwards or backwards.
-                    ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
-                    turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
-                turn = (turn + np.pi) % (2 * np.pi) - np.pi
-                yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
+            place = (new_x, new_y)
+            yaw = _yaw_after(paths, walker, place, (new_vx, new_vy), speed)
             if attempt < 2 and (
-                _distance_to_path(paths, walker, stop_x, stop_y) > off + 1e-9
+                _distance_to_path(paths, walker, stop_x, stop_y) > off + _TINY
             ):
                 continue
-            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
+            if _is_free(walkers, i, place, (stop_x, stop_y), yaw):
                 walker.yaw = yaw
                 break
-            yaw = walker.yaw
-            if _is_free(walkers, i, (new_x, new_y), (stop_x, stop_y), yaw):
+            if _is_free(walkers, i, place, (stop_x, stop_y), walker.yaw):
                 break
         walker.xy[0], walker.xy[1] = new_x, new_y
         walker.velocity[0], walker.velocity[1] = new_vx, new_vy
+
+
+@compiled
+def _aside(
+    walker: Any, change_x: float, change_y: float
+) -> tuple[float, float]:
+    """Returns the lateral part of a change of velocity, and slightly back.
+
+    The pedestrian stops, and moves aside and half as fast backwards.
+
+    Args:
+        walker: record of the pedestrian.
+        change_x, change_y: the change [m/s].
+    """
+    vx, vy = walker.velocity[0], walker.velocity[1]
+    c, s = np.cos(walker.yaw), np.sin(walker.yaw)
+    aside = change_y * c - change_x * s
+    back = vx * c + vy * s + 0.5 * abs(aside)
+    return -aside * s - back * c, aside * c - back * s
+
+
+@compiled
+def _velocity_after(
+    walker: Any, change_x: float, change_y: float
+) -> tuple[float, float, float]:
+    """Returns the velocity after a change, within the limits of pedestrians.
+
+    Args:
+        walker: record of the pedestrian.
+        change_x, change_y: the wanted change in a time step [m/s].
+
+    Returns:
+        x and y of the velocity; and the speed before it is limited [m/s].
+    """
+    part = np.sqrt(change_x * change_x + change_y * change_y)
+    part = min(1.0, _STRONGEST * STEP / max(part, _TINY))
+    vx = walker.velocity[0] + part * change_x
+    vy = walker.velocity[1] + part * change_y
+    speed = np.sqrt(vx * vx + vy * vy)
+    part = min(1.0, _HURRY * walker.speed / max(speed, _TINY))
+    return part * vx, part * vy, speed
+
+
+@compiled
+def _yaw_after(
+    paths: Paths,
+    walker: Any,
+    place: tuple[float, float],
+    velocity: tuple[float, float],
+    speed: float,
+) -> float:
+    """Returns the heading of a pedestrian after a step [rad].
+
+    A pedestrian turns to its direction of motion. In a narrow gap, it turns
+    along its path, forwards or backwards.
+
+    Args:
+        paths: all walkways.
+        walker: record of the pedestrian before the step.
+        place: x and y after the step [m].
+        velocity: x and y of the velocity after the step [m/s].
+        speed: speed, see `_velocity_after`; a pedestrian who stands does not
+            turn.
+    """
+    yaw = walker.yaw
+    row = _nearest_row(paths, walker, place[0], place[1])
+    tx, ty = paths.tangents[row, 0], paths.tangents[row, 1]
+    if paths.narrow[row] or speed > STANDING_SPEED:
+        turn = np.arctan2(velocity[1], velocity[0]) - yaw
+        if paths.narrow[row]:
+            ahead = np.cos(yaw) * tx + np.sin(yaw) * ty
+            turn = np.arctan2(ty, tx) - yaw + np.pi * (ahead < 0.0)
+        turn = (turn + np.pi) % (2 * np.pi) - np.pi
+        yaw += min(max(turn, -_TURN_RATE * STEP), _TURN_RATE * STEP)
+    return yaw
 
 
 @compiled
