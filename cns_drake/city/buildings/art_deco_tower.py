@@ -21,7 +21,7 @@ from cns_drake.city.facades import (
 _TIER_STARTS = ((0.5,), (0.3, 0.62))
 # Greatest number of piers around the whole tower.
 _MOST_PIERS = 34
-# How far piers rise above the parapet of the terrace behind them [m].
+# How far the piers of a tier rise above its topmost storey [m].
 _PIER_RISE_M = 1.7
 # Height of the walls around a terrace [m].
 _TERRACE_WALL_M = 1.3

@@ -123,9 +123,13 @@ class DetachedHouse(FamilyHouse):
         garage_width = min(self.garage_width, 0.36 * (right - left))
         has_garage = self.garage != "none" and garage_width > _LEAST_GARAGE_M
         split = right - garage_width if has_garage else right
-        main = self._main_wing((left, front, split, main_back))
+        deep = main_back - front
+        wall_top = self._choose_storeys(deep)
+        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+        area = (left, front, split, main_back)
+        main = Wing.at(area, wall_top=wall_top, top=self.height, roof=roof)
         wing_width = max(_LEAST_WING_M, self.wing_share * (split - left))
-        slope = 2 * (self.height - self._wall_top - ROOF_M) / self._deep
+        slope = 2 * (self.height - wall_top - ROOF_M) / deep
         rise = slope * wing_width / 2
         middle = (front + main_back) / 2
         ends = _WING_ENDS[self.plan]
@@ -133,12 +137,12 @@ class DetachedHouse(FamilyHouse):
         if "front" in ends:
             wing_front = front - max(0.6, self.ahead - 0.6)
             area = (left - 0.02, wing_front, left + wing_width, middle)
-            boxes.append(self._cross_wing(area, rise))
+            boxes.append(self._cross_wing(area, wall_top, rise))
         if "back" in ends and back - main_back > 1.0:
             x = left + 0.4 * (split - left - wing_width)
             wing_back = min(back, main_back + _BACK_WING_M)
             area = (x, middle, x + wing_width, wing_back)
-            boxes.append(self._cross_wing(area, rise))
+            boxes.append(self._cross_wing(area, wall_top, rise))
         if has_garage:
             garage = garage_wing(
                 self.garage,
@@ -159,30 +163,34 @@ class DetachedHouse(FamilyHouse):
         self.garage_box = boxes[-1] if has_garage else None
         self.wings = boxes[1 : -1 if has_garage else None]
 
-    def _main_wing(self, area: outlines.Area) -> Wing:
-        """Returns the main wing on its ground [m]; chooses its storeys."""
-        _, front, _, back = area
-        deep = back - front
-        is_gambrel = self.roof == "gambrel"
-        pitch_deg = _GAMBREL_PITCH_DEG if is_gambrel else self.pitch_deg
-        self.storeys = storeys_for(self.height, self.floor, deep, pitch_deg)
-        wall_top = wall_top_for(self.height, self.floor, deep, self.storeys)
-        self._deep, self._wall_top = deep, wall_top
-        roof = Roof(self.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
-        return Wing.at(area, wall_top=wall_top, top=self.height, roof=roof)
+    def _choose_storeys(self, deep: float) -> float:
+        """Chooses the number of storeys; returns the height of the walls [m].
 
-    def _cross_wing(self, area: outlines.Area, rise: float) -> Wing:
+        `deep` is the depth of the main wing [m].
+        """
+        pitch_deg = self.pitch_deg
+        if self.roof == "gambrel":
+            pitch_deg = _GAMBREL_PITCH_DEG
+        self.storeys = storeys_for(self.height, self.floor, deep, pitch_deg)
+        return wall_top_for(self.height, self.floor, deep, self.storeys)
+
+    def _cross_wing(
+        self, area: outlines.Area, wall_top: float, rise: float
+    ) -> Wing:
         """Returns a wing in front of the main wing, or behind it.
 
-        `area` is the ground of the wing, and `rise` the height of its roof [m].
+        Args:
+            area: ground of the wing [m].
+            wall_top: height of the walls of the main wing [m].
+            rise: height of the wing's roof [m].
         """
         is_lower = self.storeys > 1 and self.low_wing
         drop = STOREY_M if is_lower else 0.0
-        top = min(self._wall_top + ROOF_M + rise, self.height - 0.25)
+        top = min(wall_top + ROOF_M + rise, self.height - 0.25)
         kind = "hip" if self.roof == "hip" else "gable"
         roof = Roof(kind, along_y=True, eaves=0.35, verge=0.3, thickness=ROOF_M)
         return Wing.at(
-            area, wall_top=self._wall_top - drop, top=top - drop, roof=roof
+            area, wall_top=wall_top - drop, top=top - drop, roof=roof
         )
 
 

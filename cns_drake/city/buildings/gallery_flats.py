@@ -41,8 +41,10 @@ _DOOR_RECESS_M = 0.15
 _END_M = 0.4
 # Width of a screen on a gallery [m].
 _SCREEN_M = 1.5
-# Numbers of the edges of the slab in front and at the back.
-_FRONT, _BACK = 0, 2
+# Number of the slab's edge in front.
+_FRONT = 0
+# Number of the slab's edge at the back.
+_BACK = 2
 
 
 class GalleryFlats(Building):
