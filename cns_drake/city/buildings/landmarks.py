@@ -41,6 +41,8 @@ _Triple = tuple[float, float, float]
 
 
 class _Part(BaseModel):
+    """A part of a model, as the docstring of this module describes it."""
+
     name: str
     mesh: str
     xyz: _Triple = (0.0, 0.0, 0.0)
@@ -51,6 +53,8 @@ class _Part(BaseModel):
 
 
 class _Model(BaseModel):
+    """The contents of `model.yaml`, see the docstring of this module."""
+
     size: tuple[float, float]
     overhang: tuple[float, float]
     height: float
@@ -58,6 +62,7 @@ class _Model(BaseModel):
 
 
 def _folders_by_archetype() -> dict[str, list[Path]]:
+    """Returns archetype -> folders of its models, in order."""
     folders = defaultdict(list)
     for path in sorted(_MODELS.glob("*/model.yaml")):
         folders[path.parent.name.rsplit("_", 1)[0]].append(path.parent)
@@ -109,6 +114,7 @@ class Landmark(Building):
 
 @cache
 def _read_model(folder: Path) -> _Model:
+    """Returns the contents of `model.yaml` in a folder."""
     text = (folder / "model.yaml").read_text(encoding="utf-8")
     return _Model.model_validate(parse_yaml(text))
 

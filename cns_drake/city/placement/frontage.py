@@ -23,6 +23,17 @@ _QUAD_SEGMENTS = 16
 _BEND = math.radians(17)
 # The heading at a place is the heading of a chord twice as long as this [m].
 _SHORT = 0.25
+# Shorter lines along streets are left out [m].
+_LEAST_LINE = 1.0
+# Least length of the chord of a lot's front, as a share of the front's length.
+_LEAST_CHORD = 0.9
+# Shares of a front at which its distance from its chord is measured.
+_CHORD_SHARES = np.linspace(0.1, 0.9, 9)
+# Where the side of a line with the street is determined, as a share of its
+# length: a place that is unlikely to be a corner.
+_SIDE_AT = 0.37
+# Distance from the line at which the two sides are compared [m].
+_SIDE_DISTANCE = 0.3
 
 
 class Lot(NamedTuple):
@@ -83,7 +94,7 @@ def lines_along(
         piece
         for line in shapely.get_parts(merged)
         for piece in _split_at_corners(_street_on_right(line, streets))
-        if piece.length > 1.0
+        if piece.length > _LEAST_LINE
     ]
     return sorted(pieces, key=lambda p: (*p.coords[0], p.length))
 
@@ -117,7 +128,7 @@ def lot_at(
     a = np.array(line.interpolate(start).coords[0])
     b = np.array(line.interpolate(end).coords[0])
     chord = float(np.hypot(*(b - a)))
-    if chord < 0.9 * width:
+    if chord < _LEAST_CHORD * width:
         return None
     along = (b - a) / chord
     away = np.array([-along[1], along[0]])
@@ -129,7 +140,7 @@ def lot_at(
     # street. The front moves back by the difference.
     between = [
         np.array(line.interpolate(start + width * u).coords[0]) - a
-        for u in np.linspace(0.1, 0.9, 9)
+        for u in _CHORD_SHARES
     ]
     step_back = max(0.0, *(float(p @ away) for p in between))
     centre = (a + b) / 2 + away * (depth / 2 + step_back)
@@ -137,15 +148,19 @@ def lot_at(
 
 
 def _street_on_right(line: LineString, streets: BaseGeometry) -> LineString:
-    at = station_at(line, line.length * 0.37)
-    left = Point(at.x - math.sin(at.yaw) * 0.3, at.y + math.cos(at.yaw) * 0.3)
-    right = Point(at.x + math.sin(at.yaw) * 0.3, at.y - math.cos(at.yaw) * 0.3)
+    """Returns the line, reversed if the street is on its left."""
+    at = station_at(line, line.length * _SIDE_AT)
+    x_step = math.sin(at.yaw) * _SIDE_DISTANCE
+    y_step = math.cos(at.yaw) * _SIDE_DISTANCE
+    left = Point(at.x - x_step, at.y + y_step)
+    right = Point(at.x + x_step, at.y - y_step)
     if streets.distance(left) < streets.distance(right):
         return LineString(line.coords[::-1])
     return line
 
 
 def _split_at_corners(line: LineString) -> list[LineString]:
+    """Returns the pieces of a line between its corners, in order."""
     coordinates = np.array(line.coords)[:, :2]
     edges = np.diff(coordinates, axis=0)
     heading = np.arctan2(edges[:, 1], edges[:, 0])

@@ -17,6 +17,14 @@ _FROM_KERB = 0.7
 _SMALL_ROAD_LANES = 2
 # Traffic lights stand this far from the junction, beside the stop line [m].
 _LIGHT_DISTANCE = 4.8
+# A traffic light on the other side stands this far from the junction [m].
+_POST_DISTANCE = 1.5
+# A stop sign stands this far from the junction [m].
+_STOP_DISTANCE = 1.0
+# The sign with the street's name stands this far from the junction [m].
+_NAME_DISTANCE = 0.2
+# Least distance of all these objects from other objects [m].
+_CLEARANCE = 0.1
 # Signs stand this far from the junction [m].
 _SIGN_DISTANCE = 9.0
 _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
@@ -36,6 +44,7 @@ def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
 def _furnish_arm(
     draft: Draft, road: Road, junction: Junction, arm: Arm, rng: Generator
 ) -> None:
+    """Places the lights and signs of one arm of a junction."""
     carriageway = draft.areas.carriageway
     starts = arm.end == "start"
     incoming: Direction = "backward" if starts else "forward"
@@ -63,16 +72,16 @@ def _furnish_arm(
         yaw = (heading if starts else heading + math.pi) + turn
         tags = ("junction", junction.name)
         model = OBJECTS[object_kind].build(rng)
-        draft.place(object_kind, model, (x, y), yaw, tags, clearance=0.1)
+        draft.place(object_kind, model, (x, y), yaw, tags, clearance=_CLEARANCE)
 
     if road.lanes[incoming]:
         if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:
             # It faces the traffic that comes along the arm.
-            place("sign_stop", 1.0, 1, 0.0)
+            place("sign_stop", _STOP_DISTANCE, 1, 0.0)
         else:
             place("traffic_light", _LIGHT_DISTANCE, 1, -math.pi / 2)
-            place("traffic_light_post", 1.5, -1, -math.pi / 2)
-        place("sign_street_name", 0.2, 1, 0.0)
+            place("traffic_light_post", _POST_DISTANCE, -1, -math.pi / 2)
+        place("sign_street_name", _NAME_DISTANCE, 1, 0.0)
     if road.lanes[outgoing] and road.length > 2 * _SIGN_DISTANCE:
         sign = _SIGNS[int(rng.integers(len(_SIGNS)))]
         # It faces the traffic that comes out of the junction.

@@ -16,6 +16,14 @@ from cns_drake.roads.network import RoadNetwork
 _BAY_LENGTH = (5.6, 7.0)
 # Share of the bays along a street in which a car stands.
 _BAY_FILL = 0.72
+# Distance of the first car from the start of a road, least and greatest [m].
+_FIRST_CAR = (2.0, 5.0)
+# Greatest angle between a parked car and the street [rad].
+_SKEW = 0.03
+# Greatest angle between a car and its bay, on a district's own ground [rad].
+_BAY_SKEW = 0.04
+# Greatest distance of a car from the middle of its bay, along x and y [m].
+_BAY_SHIFT = 0.15
 # Share of the drivers who park nose in.
 _NOSE_IN = 0.7
 # Cars are parked a little closer to the kerb than to the lane [m].
@@ -29,14 +37,14 @@ def park_along_streets(draft: Draft, network: RoadNetwork) -> None:
         rng = draft.task("bays", name, side)
         sign = 1 if side == "left" else -1
         offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
-        s = road.first_station + float(rng.uniform(2.0, 5.0))
+        s = road.first_station + float(rng.uniform(*_FIRST_CAR))
         while s < road.last_station:
             x, y, _, heading = road.evaluate([s], offset)[0]
             if shapely.contains_xy(bay, x, y) and rng.uniform() < _BAY_FILL:
                 # On the left of the direction `forward`, traffic runs the other
                 # way.
                 yaw = heading + (math.pi if side == "left" else 0.0)
-                yaw += float(rng.uniform(-0.03, 0.03))
+                yaw += float(rng.uniform(-_SKEW, _SKEW))
                 tags = ("bay", name)
                 place_car(draft, draft.plan.cars, (x, y), yaw, rng, tags)
             s += float(rng.uniform(*_BAY_LENGTH))
@@ -62,9 +70,10 @@ def park_in_bays(
         if rng.uniform() > plan.fill:
             continue
         at = start + along * (k + 0.5) * width + inwards * depth / 2
-        at = at + rng.uniform(-0.15, 0.15, 2)
+        at = at + rng.uniform(-_BAY_SHIFT, _BAY_SHIFT, 2)
         nose = inwards if rng.uniform() < _NOSE_IN else -inwards
-        yaw = math.atan2(nose[1], nose[0]) + float(rng.uniform(-0.04, 0.04))
+        skew = float(rng.uniform(-_BAY_SKEW, _BAY_SKEW))
+        yaw = math.atan2(nose[1], nose[0]) + skew
         place_car(draft, draft.plan.cars, tuple(at), yaw, rng, (district,))
 
 

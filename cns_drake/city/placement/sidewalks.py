@@ -22,6 +22,13 @@ _FROM_KERB_OF = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
 _JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
 # Least distance between two objects, and from objects to lanes [m].
 _CLEARANCE = 0.4
+# Distance of the first object from the start of a sidewalk, least and greatest
+# [m].
+_FIRST_OBJECT = (1.0, 8.0)
+# Distance of the first tree from the start of a median, least and greatest [m].
+_FIRST_TREE = (1.0, 3.0)
+# Least distance of objects from the end of a sidewalk or median [m].
+_END = 1.0
 # A trunk's least distance from any building, as a share of the crown's reach.
 _CROWN_PART = 0.85
 
@@ -55,8 +62,8 @@ def plant_medians(draft: Draft) -> None:
     for index, median in enumerate(draft.areas.medians.geoms):
         rng = draft.task("median", index)
         line = _middle_line(median)
-        s = float(rng.uniform(1.0, 3.0))
-        while s < line.length - 1.0:
+        s = float(rng.uniform(*_FIRST_TREE))
+        while s < line.length - _END:
             at = station_at(line, s)
             species = pick_key(plan.trees, rng)
             _place_along(draft, species, at, rng, ("median",))
@@ -84,8 +91,8 @@ def _furnish_sidewalk(
     rng: Generator,
 ) -> None:
     """Places the objects of one task along one sidewalk."""
-    s = float(rng.uniform(1.0, 8.0))
-    while s < line.length - 1.0:
+    s = float(rng.uniform(*_FIRST_OBJECT))
+    while s < line.length - _END:
         at = station_at(line, s)
         here = shapely.Point(at.x, at.y)
         district = min(districts, key=lambda d: d.area.distance(here))
