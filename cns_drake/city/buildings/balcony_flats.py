@@ -26,6 +26,14 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # Room for balconies in front, and for canopies [m].
 _FRONT_M = 1.7
+# Depth of the ground in front of the sections and behind them [m].
+_AROUND_M = 2.0
+# Least depth of the other ground if sections stand back [m].
+_STAGGER_DEPTH_M = 12.0
+# Greatest number of sections.
+_MOST_SECTIONS = 3
+# Greatest number of windows in front.
+_MOST_BAYS = 16
 # Length of front for each section, which has a stair of its own [m].
 _SECTION_M = 18.0
 # Height of everything above the topmost storey: roof and stair house [m].
@@ -46,18 +54,22 @@ class BalconyFlats(Building):
     def draw(self) -> None:
         """Samples sizes and style."""
         site = self.site
-        room = site.depth - 2.0
+        room = site.depth - _AROUND_M
         # Distance by which every other section stands back.
-        self.stagger = self.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
+        self.stagger = 0.0
+        if room > _STAGGER_DEPTH_M:
+            self.stagger = self.pick((0.0, 0.0, 1.5, 2.4))
         # Number of sections of the slab, each with its own stair.
-        self.sections = min(max(round(site.width / _SECTION_M), 1), 3)
+        self.sections = min(
+            max(round(site.width / _SECTION_M), 1), _MOST_SECTIONS
+        )
         # Number of storeys by which every other section is lower.
         self.step = self.whole(0, 2)
         self.depth = round(
             min(room - self.stagger, self.uniform(11.0, 14.0)), 1
         )
         self.storey = self.uniform(2.8, 3.1)
-        self.pitch = max(self.uniform(2.8, 3.6), site.width / 16)
+        self.pitch = max(self.uniform(2.8, 3.6), site.width / _MOST_BAYS)
         self.window_width = self.uniform(1.3, 2.0, digits=2)
         self.recess = self.uniform(0.12, 0.22, digits=2)
         self.balcony_width = self.uniform(2.8, 3.8, digits=2)

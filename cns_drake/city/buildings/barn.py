@@ -23,6 +23,10 @@ from cns_drake.city.geometry.mesh import Mesh
 _MARGIN_M = 0.5
 # Depth of the windows behind the wall [m].
 _RECESS_M = 0.15
+# Least depth of a site with a jetty [m].
+_JETTY_DEPTH_M = 10.0
+# Least width of a barn with a lean-to, along its shorter side [m].
+_LEAN_TO_WIDTH_M = 9.0
 # Least width of a lean-to [m].
 _LEAST_AISLE_M = 1.5
 # Part of the ridge along which ventilators stand.
@@ -51,11 +55,15 @@ class Barn(Building):
         # Height of the walls, as a share of the height of the ridge.
         self.wall = self.uniform(0.42, 0.58)
         # Depth of the jetty in front of a boat house; 0 for a barn.
-        self.deck = self.pick((0.0, 0.0, 2.0)) if site.depth > 10.0 else 0.0
+        self.deck = 0.0
+        if site.depth > _JETTY_DEPTH_M:
+            self.deck = self.pick((0.0, 0.0, 2.0))
         self.door_width = self.uniform(2.6, 4.4, digits=2)
         self.door_height = self.uniform(2.4, 3.4, digits=2)
         # Width of the lean-to on one side; 0 for none.
-        self.aisle = aisle if self.chance(0.6) and width > 9.0 else 0.0
+        self.aisle = (
+            aisle if self.chance(0.6) and width > _LEAN_TO_WIDTH_M else 0.0
+        )
         self.aisle_left = self.chance(0.5)
         # Distance between battens.
         self.batten = self.uniform(1.0, 1.6)

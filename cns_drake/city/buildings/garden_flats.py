@@ -31,6 +31,10 @@ _FLOOR_M = 0.3
 
 # Distance between the windows of the sides [m].
 _SIDE_PITCH_M = 4.5
+# Greatest number of windows in front.
+_MOST_BAYS = 12
+# Wider groups have no frames around their windows [m].
+_CASINGS_WIDTH_M = 20.0
 # Greatest depth of a house [m].
 _MOST_DEPTH_M = 13.0
 # Houses with lower walls have no window above the entrance [m].
@@ -60,12 +64,12 @@ class GardenFlats(Building):
         self.stagger = round(self.uniform(0.0, 0.16) * site.depth, 2)
         # Whether every other house turns its gable to the front.
         self.crossed = self.chance(0.5)
-        self.window_pitch = max(self.uniform(2.6, 3.4), site.width / 12)
+        self.window_pitch = max(self.uniform(2.6, 3.4), site.width / _MOST_BAYS)
         self.window_width = self.uniform(1.1, 1.6, digits=2)
         self.veranda_width = self.uniform(2.8, 4.0, digits=2)
         self.veranda_reach = self.uniform(1.4, 1.9, digits=2)
         self.casing = "sill"
-        if site.width < 20.0:
+        if site.width < _CASINGS_WIDTH_M:
             self.casing = self.pick(("frame", "sill"))
 
     def build(self) -> None:
