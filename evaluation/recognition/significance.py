@@ -81,21 +81,7 @@ def compared_by_auc(
     """
     sets = list(zip(*answers.values(), strict=True))
     drives = range(len(sets)) if drives is None else drives
-    blocks = [outcomes[0].own_blocks for outcomes in sets]
-    # Drive -> number of its blocks, and AUC (methods, B) of each bootstrap
-    # sample, summed over the sets of the drive.
-    of_drive: dict[int, int] = {}
-    sums: dict[int, Any] = {}
-    drawn = weights_by_drive(blocks, drives)
-    for drive, outcomes, (number, weights) in zip(
-        drives, sets, drawn, strict=True
-    ):
-        samples = [
-            resampled_metrics(outcome, weights).auc for outcome in outcomes
-        ]
-        sums[drive] = sums.get(drive, 0.0) + np.array(samples)
-        of_drive[drive] = number
-    numbers = np.array(list(of_drive.values()))
+    numbers, sums = _samples_by_drive(sets, drives)
     areas = [
         [pr_curve(outcome).auc for outcome in outcomes] for outcomes in sets
     ]
@@ -109,9 +95,7 @@ def compared_by_auc(
         )
         if (numbers < 2).any():
             return Difference(value, UNKNOWN, math.nan)
-        samples = [
-            by_method[first] - by_method[second] for by_method in sums.values()
-        ]
+        samples = [by_method[first] - by_method[second] for by_method in sums]
         variances = np.var(samples, axis=1) * numbers / (numbers - 1)
         spread = math.sqrt(variances.sum()) / len(sets)
         freedom = (numbers - 1).sum()
@@ -129,3 +113,31 @@ def compared_by_auc(
     ).tolist()
     names = itertools.combinations(answers, 2)
     return dict(zip(names, zip(found, corrected, strict=True), strict=True))
+
+
+def _samples_by_drive(
+    sets: Sequence[Sequence[QueryOutcomes]], drives: Sequence[int]
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Returns AUCs of bootstrap samples, summed over the sets of each drive.
+
+    Args:
+        sets: for each set of queries, the outcomes of the methods.
+        drives: for each set, a number that identifies the drive.
+
+    Returns:
+        For each of the different drives, the number of its blocks, (N,); and
+        the sums (methods, B) of the AUCs in B samples.
+    """
+    numbers: dict[int, int] = {}
+    sums: dict[int, Any] = {}
+    blocks = [outcomes[0].own_blocks for outcomes in sets]
+    drawn = weights_by_drive(blocks, drives)
+    for drive, outcomes, (number, weights) in zip(
+        drives, sets, drawn, strict=True
+    ):
+        samples = [
+            resampled_metrics(outcome, weights).auc for outcome in outcomes
+        ]
+        sums[drive] = sums.get(drive, 0.0) + np.array(samples)
+        numbers[drive] = number
+    return np.array(list(numbers.values())), list(sums.values())
