@@ -11,7 +11,7 @@ from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.files import is_there
 from cns_drake.base.number_text import whole_number
 from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
-from evaluation.map_update.sessions import SessionPair
+from evaluation.map_update.sessions import Session, SessionPair
 
 
 @dataclass(frozen=True)
@@ -118,39 +118,55 @@ def structure_changes(
     for session, labels, names, mine, theirs in zip(
         pair, truth, tables, present, present[::-1], strict=True
     ):
-        numbers, counts, found = verdicts(
-            session.instances, labels, session.side
-        )
-        seen = {
-            number: (*row, verdict)
-            for number, row, verdict in zip(
-                numbers.tolist(), counts.tolist(), found.tolist(), strict=True
-            )
-        }
         alone = {
             number
             for number, entry in names.items()
             if entry.get("name") in mine and entry["name"] not in theirs
         }
-        for number in sorted({*seen, *alone}):
-            entry = names.get(number, {})
-            points, observed, changed, verdict = seen.get(
-                number, (0, 0, 0, SIDES[session.side][0])
+        rows += _changes_in_map(session, labels, names, alone)
+    return rows
+
+
+def _changes_in_map(
+    session: Session,
+    labels: np.ndarray,
+    names: Mapping[int, Mapping],
+    alone: Collection[int],
+) -> list[StructureChange]:
+    """Returns how much each structure of one map has changed.
+
+    Args:
+        session: the session with the map.
+        labels: (N,) labels of its points.
+        names: instance -> name and class.
+        alone: instances that the world of the other drive lacks.
+    """
+    found = verdicts(session.instances, labels, session.side)
+    seen = {
+        number: (*counts, verdict)
+        for number, counts, verdict in zip(
+            *(column.tolist() for column in found), strict=True
+        )
+    }
+    unseen = (0, 0, 0, SIDES[session.side][0])
+    rows = []
+    for number in sorted({*seen, *alone}):
+        entry = names.get(number, {})
+        points, observed, changed, verdict = seen.get(number, unseen)
+        rows.append(
+            StructureChange(
+                session.side,
+                number,
+                str(entry.get("name", "")),
+                str(entry.get("class", "")),
+                int(entry.get("label", 0)),
+                points,
+                observed,
+                changed,
+                Label(verdict).name.lower(),
+                number in alone,
             )
-            rows.append(
-                StructureChange(
-                    session.side,
-                    number,
-                    str(entry.get("name", "")),
-                    str(entry.get("class", "")),
-                    int(entry.get("label", 0)),
-                    points,
-                    observed,
-                    changed,
-                    Label(verdict).name.lower(),
-                    number in alone,
-                )
-            )
+        )
     return rows
 
 
