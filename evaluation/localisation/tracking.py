@@ -110,18 +110,15 @@ def track_drive(
             f"{query.name}: {len(frames)} scans, {SPACING:g} m apart, in the"
             " map; a track has two and more"
         )
-    # Between two sections, the drive left the map.
-    gaps = np.add.reduceat(~is_mapped, frames)[:-1] > 0
-    stretches = np.concatenate([[0], np.cumsum(gaps)])
     steps = drifting_steps(X_WS[frames], way[frames], drift, starts.seed)
-    rows = np.zeros(len(frames), TRACKED)
+    rows = _untracked_rows(frames, is_mapped, way)
+    begins = np.diff(rows["stretch"], prepend=-1) > 0
     last: np.ndarray | None = None
     for k in track(
         range(len(frames)), f"tracking {query.name}", len(frames), "scans"
     ):
         frame = int(frames[k])
-        is_first = k == 0 or stretches[k] != stretches[k - 1]
-        if is_first or last is None:
+        if begins[k] or last is None:
             initial = InitialPose.moved(X_WS[frame], *starts.draw(frame))
         else:
             initial = InitialPose.compared(last @ steps[k - 1], X_WS[frame])
@@ -143,8 +140,25 @@ def track_drive(
         rows["track_error"][k] = np.linalg.norm(
             last[:3, 3] - X_WS[frame, :3, 3]
         )
-        rows["stretch"][k], rows["way"][k] = stretches[k], way[frame]
-        rows["step"][k] = 0.0 if is_first else way[frame] - way[frames[k - 1]]
+    return rows
+
+
+def _untracked_rows(
+    frames: np.ndarray, is_mapped: np.ndarray, way: np.ndarray
+) -> np.ndarray:
+    """Returns records of `TRACKED` with sections and lengths of path only.
+
+    Args:
+        frames: (K,) frames that are aligned.
+        is_mapped: (N,) bool, which frames of the drive lie within the map.
+        way: (N,) length of the path up to each frame [m].
+    """
+    rows = np.zeros(len(frames), TRACKED)
+    # Between two sections, the drive left the map.
+    gaps = np.add.reduceat(~is_mapped, frames)[:-1] > 0
+    rows["stretch"] = np.concatenate([[0], np.cumsum(gaps)])
+    rows["way"] = way[frames]
+    rows["step"][1:] = np.where(gaps, 0.0, np.diff(way[frames]))
     return rows
 
 
