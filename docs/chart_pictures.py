@@ -47,33 +47,35 @@ def survival(path: Path) -> str:
     """Draws what methods retain of their AUC strict; returns the title.
 
     Cities are the units: a point is the mean over a city's pairs, and a bar is
-    the 95 % t interval over the cities.
+    the 95 % t interval over the cities. The points stand below the bar, each
+    city's at a height of its own, so that none hides another or the bar's ends.
     """
     rows = kept_rows()
     # The best method without geometric verification is on top.
     ranked = {gate: rank_methods(rows[gate])[0] for gate in rows}
     order = [one.method for one in ranked[False]][::-1]
     styles = method_styles(order)
-    figure = Figure(figsize=(WIDTH, 5.4), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 6.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, gate in zip(panels, (False, True), strict=True):
         for one in ranked[gate]:
             y = order.index(one.method)
             colour = styles[title(one.method)][0]
             ends = 100.0 * np.array([one.interval.low, one.interval.high])
-            axes.plot(ends, [y, y], color=INK, lw=2, zorder=2)
-            axes.plot(100.0 * one.value, y, "|", color=INK, ms=18, mew=3.5)
-            for city, (marker, _) in _CITY_MARKERS.items():
+            above = [y + _INTERVAL_ABOVE] * 2
+            axes.plot(ends, above, "|-", color=INK, lw=2, ms=7, mew=2)
+            axes.plot(100.0 * one.value, above[0], "|", color=INK, ms=13, mew=4)
+            for city, (marker, _, below) in _CITY_MARKERS.items():
                 some = [
                     row.value
                     for row in rows[gate]
                     if (row.map, row.method) == (city, one.method)
                 ]
                 at = 100.0 * np.mean(some)
-                axes.plot(at, y, marker, mec="white", mfc=colour, ms=9)
-        axes.axvline(100.0 * SURVIVES, color=INK, lw=1, ls=":", zorder=0)
+                axes.plot(at, y - below, marker, color=colour, ms=6)
+        axes.axvline(100.0 * SURVIVES, color=INK, lw=1.5, ls=":", zorder=0)
         axes.axvline(100.0, color=PALE, lw=1, zorder=0)
-        axes.set_xlim(-4.0, 119.0)
+        axes.set(xlim=(-4.0, 119.0), ylim=(-0.7, len(order) - 0.45))
         axes.set_xlabel("retained AUC strict [%]")
         verified = "with" if gate else "without"
         axes.set_title(f"{verified} verification", loc="left")
@@ -82,7 +84,7 @@ def survival(path: Path) -> str:
     panels[0].set_yticks(range(len(order)), names)
     signs = "  ".join(
         f"{sign} {city.capitalize()}"
-        for city, (_, sign) in _CITY_MARKERS.items()
+        for city, (_, sign, _) in _CITY_MARKERS.items()
     )
     figure.supxlabel(
         f"{signs}\n┃ mean over pairs, with a 95 % interval over cities   "
@@ -97,12 +99,15 @@ def survival(path: Path) -> str:
     return finding
 
 
-# Of each shipped city: its marker, and a character that looks like it.
+# Distance of an interval above the middle of a method's row [rows].
+_INTERVAL_ABOVE = 0.28
+# Of each shipped city: its marker, a character that looks like it, and the
+# marker's distance below the middle of a method's row [rows].
 _CITY_MARKERS = {
-    "downtown": ("o", "●"),
-    "metropolis": ("s", "■"),
-    "riverside": ("^", "▲"),
-    "suburbia": ("D", "◆"),
+    "downtown": ("o", "●", -0.07),
+    "metropolis": ("s", "■", 0.08),
+    "riverside": ("^", "▲", 0.23),
+    "suburbia": ("D", "◆", 0.38),
 }
 
 

@@ -4,6 +4,7 @@ import csv
 import re
 
 from helpers import documents
+from matplotlib.figure import Figure
 import numpy as np
 import pytest
 import scipy.stats
@@ -115,6 +116,32 @@ def test_the_chart_says_who_survives(tmp_path):
     assert survive == {False: set(), True: {"layered-overlap"}}
     assert finding.startswith("No method survives a rebuilt city;")
     assert finding.endswith("verification, layered overlap* does")
+
+
+def test_marks_of_the_chart_hide_neither_each_other_nor_an_end(
+    tmp_path, monkeypatch
+):
+    drawn = []
+    monkeypatch.setattr(
+        Figure, "savefig", lambda self, *_, **__: drawn.append(self)
+    )
+    chart_pictures.survival(tmp_path / "chart.png")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        marks, ends = [], []
+        for line in axes.lines:
+            places = axes.transData.transform(line.get_xydata())
+            if line.get_marker() == "|":
+                ends.extend(places)
+            elif line.get_marker() in "os^D":
+                marks.extend(places)
+        assert len(marks) == 7 * 4
+        assert len(ends) == 7 * 3
+        for k, mark in enumerate(marks):
+            others = np.array(marks[k + 1 :] + ends)
+            apart = np.linalg.norm(others - mark, axis=1).min()
+            assert apart > 6.0 * figure.dpi / 72.0  # A mark's size.
 
 
 def test_the_page_has_all_pairs_and_methods():
