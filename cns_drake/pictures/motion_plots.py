@@ -17,6 +17,12 @@ _PLOT_WIDTH = 400.0
 _PLOT_HEIGHT = 20.0
 # Unit -> least range of a plot. A smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
+# Least distance of three labels of a scale, as a share of the plot's height,
+# which is 22 pixels on a phone. The digits are 8 pixels high.
+_LABEL_SHARE = 0.45
+# Possible round values on a scale, for reaches from 1 to 10. They are so near
+# to each other that two labels always have space, 9 pixels on a phone.
+_ROUND = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8)
 # Possible distances of the times on the scale [s].
 _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800)
 
@@ -31,7 +37,7 @@ class TimePlot:
         values: values to display as text, at evenly spaced times of the drive.
         points: the points of the curve, in the format of SVG.
         ticks: labels of the scale, and their positions from the top, as shares
-            of the height.
+            of the height. Where there is no space for a label, it is empty.
     """
 
     name: str
@@ -75,15 +81,20 @@ def _ticks(low: float, high: float) -> list[tuple[str, float]]:
     """Returns ticks for zero, a round value above it, and its negative.
 
     Values outside of the range from `low` to `high` are left out. A tick is a
-    label, and its distance from the top as a share of the height.
+    label, and its distance from the top as a share of the height. The label of
+    zero is empty if it would touch those above and below it.
     """
     reach = max(-low, high)
     power = 10.0 ** math.floor(math.log10(reach))
-    step = max(k * power for k in (1, 2, 5) if k * power <= reach)
+    step = max(k * power for k in _ROUND if k * power <= reach)
+    values = [value for value in (-step, 0.0, step) if low <= value <= high]
+    is_tight = len(values) == 3 and step < _LABEL_SHARE * (high - low)
     return [
-        (f"{value:g}", (high - value) / (high - low))
-        for value in (-step, 0.0, step)
-        if low <= value <= high
+        (
+            f"{value:g}" if value or not is_tight else "",
+            (high - value) / (high - low),
+        )
+        for value in values
     ]
 
 

@@ -43,6 +43,31 @@ def test_scale_has_at_least_two_round_values(scale, sign):
         assert all(0.0 <= share <= 1.0 for _, share in ticks)
 
 
+@pytest.mark.parametrize("high", [0.0, 0.7, 1.0, 1.6, 2.4, 3.9, 4.99, 12.0])
+@pytest.mark.parametrize("low", [0.0, -0.7, -1.49, -2.4, -4.99, -9.99, -41.0])
+def test_labels_of_a_scale_do_not_touch(low, high):
+    ticks = TimePlot.of("a", "m/s²", np.array([low, 0.0, high])).ticks
+    shares = sorted(share for text, share in ticks if text)
+    assert len(shares) >= 2
+    # The plot is 22 pixels high on a phone, and digits are 8 pixels high.
+    assert np.diff(shares).min() > 9.0 / 22.0
+
+
+def test_zero_between_near_labels_keeps_its_line():
+    plot = TimePlot.of("a", "m/s²", np.array([-2.4, 2.4]))
+    assert plot.ticks == [
+        ("-2", pytest.approx(4.4 / 4.8)),
+        ("", 0.5),
+        ("2", pytest.approx(0.4 / 4.8)),
+    ]
+    drive = record(2)
+    drive.specific_forces_I[:] = np.array([[-2.4, 0, 9.8], [2.4, 0, 9.8]])
+    html = make_panel("a", drive, set(), ShownStages())
+    plot = html.partition("IMU, forward")[2].partition("</div>")[0]
+    assert re.findall(r">(-?\d)</i>", plot) == ["-2", "2"]
+    assert plot.count("<line") == 3
+
+
 def test_times_have_a_scale():
     def scale(frames):
         html = make_panel("a", record(frames), set(), ShownStages())
