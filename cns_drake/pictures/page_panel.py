@@ -66,6 +66,8 @@ def make_panel(
     duration = (len(p_WBset) - 1) * drive.period
     minutes, seconds = divmod(round(duration), 60)
     took = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+    metres = round(length)
+    way = f"{metres} m" if metres < 1000 else f"{length / 1000.0:.2f} km"
     lowest, highest = drawing.POINT_HEIGHTS
     environment = Environment(
         autoescape=True,
@@ -76,7 +78,7 @@ def make_panel(
     return environment.from_string(read_template("panel.html")).render(
         style=Markup(read_template("drive.css")),
         title=title,
-        facts=f"{length / 1000.0:.2f} km in {took}",
+        facts=f"{way} in {took}",
         points=_gradient(drawing.height_rgb(np.linspace(lowest, highest, 9))),
         heights=f"{lowest:g} to {highest:g} m",
         route=_hex(drawing.ROUTE_RGB),

@@ -139,8 +139,11 @@ function setTime(time) {
 }
 
 function showTime() {
-  const minutes = (s) =>
-    `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
+  // Rounded, as the duration in the panel is.
+  const minutes = (time) => {
+    const s = Math.round(time);
+    return `${Math.floor(s / 60)}:${String(s % 60).padStart(2, "0")}`;
+  };
   byId("time").value = animator.time;
   byId("clock").value =
     `${minutes(animator.time)} / ${minutes(animator.duration)}`;

@@ -85,6 +85,22 @@ def test_times_have_a_scale():
     assert [text for _, text in scale(7321)][1::3] == ["15:00", "60:00"]
 
 
+@pytest.mark.parametrize(
+    ("length", "frames", "facts"),
+    [
+        (2.4, 5, "2 m in 2 s"),
+        (999.4, 121, "999 m in 1 min 0 s"),
+        (999.6, 121, "1.00 km in 1 min 0 s"),
+        (1714.0, 331, "1.71 km in 2 min 45 s"),
+    ],
+)
+def test_panel_says_length_and_duration(length, frames, facts):
+    drive = record(frames)
+    drive.X_WBs[-1] = RigidTransform([length, 0.0, 0.0])
+    html = make_panel("a", drive, set(), ShownStages())
+    assert f"<p>{facts}</p>" in html
+
+
 def test_page_says_which_points_it_shows():
     assert 'id="shown"' not in make_panel("a", record(2), set(), ShownStages())
     drive = record(40)
