@@ -239,7 +239,12 @@ def _shown_tables(report: Report) -> dict[str, list[Table]]:
         "why": [fault_table(results, report.evidence)],
         "poses": [pose_table(results)],
         "costs": [cost_table(report.costs)],
-        "audit": [audit_table([*results, *report.repeated], report.reference)],
+        # A printed table has a single protocol.
+        "audit": [
+            audit_table(shown, report.reference)
+            for shown in (results, report.repeated)
+            if shown or shown is results
+        ],
         "sessions": [sessions_table(report.sessions)],
     }
 
@@ -251,9 +256,22 @@ def _content(
     ranked, headline = ranking.ranked_methods(
         report.results, report.differences
     )
+    measured = [report.recognitions, report.repeated]
     return {
         "report": report,
         "tables": tables,
+        "protocols": [
+            f"{words}: {shown[0].protocol_name}"
+            for shown, words in zip(
+                measured,
+                (
+                    "Protocol of this report",
+                    f"Protocol of {report.reference.title}",
+                ),
+                strict=True,
+            )
+            if shown
+        ],
         "ranked": ranked,
         "beside": ranking.further_columns(report.results),
         "styles": method_styles(in_table_order(mean.method for mean in ranked)),

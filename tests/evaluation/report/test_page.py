@@ -6,14 +6,15 @@ from math import nan
 import re
 from types import SimpleNamespace
 
-from helpers.small_page import make_content, make_results
+from helpers.small_page import make_content, make_result, make_results
 import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
-from evaluation.report.page import write_page
+from evaluation.report.page import write_page, write_report
 from evaluation.report.page_data import browser_data
 from evaluation.report.ranking import further_columns, ranked_methods
+from evaluation.report.reference import Reference
 from evaluation.report.route_pictures import route_picture
 from evaluation.report.tables.differences import MethodDifference
 from evaluation.report.tables.recognition import recognition_table
@@ -406,3 +407,32 @@ def test_a_page_says_what_made_it(tmp_path):
     write_page(tmp_path / "report.html", content)
     text = (tmp_path / "report.html").read_text()
     assert "Made by cns-drake 9.9; solid rings=8 &amp; more" in text
+
+
+def test_tables_of_two_protocols_are_apart(tmp_path):
+    fair = replace(make_result("ring++", [1, 2, 4, 0, 3]), protocol_name="fair")
+    again = make_result("ring++", [0, 2, 4, 6, 3])
+    content = make_content(
+        tmp_path,
+        recognitions=[fair],
+        pairs=[(fair, None)],
+        evidence={},
+        repeated=[again],
+        reference=Reference("the paper"),
+    )
+    write_report(content, tmp_path)
+    text = (tmp_path / "report.html").read_text()
+    headings = [
+        "Protocol of this report: fair",
+        "Protocol of the paper: paper",
+    ]
+    assert re.findall(r"<h3>(Protocol .*?)</h3>", text) == headings
+    tables = text.split("<h3>Protocol ")[1:]
+    for table, result in zip(tables, (fair, again), strict=True):
+        body = table[: table.index("</table>")]
+        # A row for each mode.
+        assert body.count("<tr>") == 3
+        assert f"{result.by_mode['all'].auc:.4f}" in body
+        assert body.count(f"<td>{result.protocol_name}</td>") == 2
+    lines = (tmp_path / "report.md").read_text().splitlines()
+    assert [line[4:] for line in lines if line.startswith("### ")] == headings
