@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from evaluation.recognition.describing import Role
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 from evaluation.report.reference import Reference
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.features import described_key
@@ -26,12 +26,15 @@ class Repeat:
     Attributes:
         method: the method.
         protocol: the protocol of the published numbers.
+        stated: the protocol that tables name: the shipped protocol that equals
+            `protocol` with this method, if there is one.
         shares_places: whether the run uses the descriptors of the places that
             the first run computed, instead of computing its own.
     """
 
     method: MethodChoice
     protocol: RetrievalProtocol
+    stated: RetrievalProtocol
     shares_places: bool
 
     def described(self, role: Role) -> str:
@@ -44,7 +47,7 @@ class Repeat:
         """Returns a pair of drives as the second run measures it."""
         return replace(
             pair,
-            stated=self.protocol,
+            stated=self.stated,
             protocol=self.protocol,
             key=f"{pair.key} published {self.method.key}",
             parts={},
@@ -118,5 +121,6 @@ def repeats_of(
             shares_places = places == published.descriptor_options(
                 queries=False
             )
-            found.append(Repeat(choice, published, shares_places))
+            stated = PROTOCOLS.get(published.name_with(method), published)
+            found.append(Repeat(choice, published, stated, shares_places))
     return found

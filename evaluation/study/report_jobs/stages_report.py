@@ -44,6 +44,8 @@ from evaluation.study.tasks.task import Task
 _COSTS_COST = 5.0
 # The experiment whose rows a report writes, and its tasks.
 _EXPERIMENT = "stages"
+# Table of the results by the protocol of published numbers.
+_SECOND_RUNS = "published_protocol.csv"
 _TASKS: Mapping[str, type[Task]] = {
     task.name: task for task in (PlaceTask, PoseTask, ChangeTask)
 }
@@ -55,10 +57,13 @@ class _Plan:
 
     Attributes:
         engine: the engine of the experiment `stages`, with all pairs.
+        published: the engine of the second runs, by the protocol of published
+            numbers.
         cities: the parts of the report, one for each city.
     """
 
     engine: Engine
+    published: Engine
     cities: list[CityReport]
 
 
@@ -116,10 +121,8 @@ class StagesReport:
             {one.key: (one, one.columns) for one in self.methods},
             output,
         )
-        # Measures second runs, by the protocol of published numbers. The tables
-        # contain only the pairs of `stages`.
         published = Engine(
-            self.reference.title,
+            _EXPERIMENT,
             made_tasks({PlaceTask.name: {}}, _TASKS, _EXPERIMENT),
             engine.methods,
             output,
@@ -136,7 +139,7 @@ class StagesReport:
             )
             for city in self.cities
         ]
-        return _Plan(engine, cities)
+        return _Plan(engine, published, cities)
 
     def jobs(self) -> list[Job]:
         """Returns the jobs whose results `assemble` puts into a report.
@@ -199,6 +202,8 @@ class StagesReport:
         - `report.md`: the report as Markdown.
         - `results.csv`, `queries.csv`: the results and the answers to queries;
           both tables are the tables of the experiment `stages`.
+        - `published_protocol.csv`: the results of second runs, by the protocol
+          of published numbers; written only if there are second runs.
         - `figures`: a folder with figures. Figures that exist are kept.
 
         If `with_tables` is true, wide tables are written as well. The wide
@@ -237,6 +242,7 @@ class StagesReport:
             self.protocol.to_text(),
         ]
         results, _ = self._plan.engine.write_tables()
+        self._write_second_runs()
         report.results = self._shown_rows(results)
         for one in self._plan.cities:
             one.collect(report, on_note)
@@ -253,6 +259,19 @@ class StagesReport:
         for one in self._plan.cities:
             remove_descriptors(one.jobs.values())
         return written
+
+    def _write_second_runs(self) -> None:
+        """Writes the results of second runs, and removes outdated results.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        path = self.output / _SECOND_RUNS
+        results, _ = self._plan.published.tables()
+        if results.rows:
+            results.write_csv(path)
+        else:
+            path.unlink(missing_ok=True)
 
     def _shown_rows(self, results: Results) -> Results:
         """Returns the rows of a table that the report shows.

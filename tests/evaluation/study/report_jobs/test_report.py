@@ -355,6 +355,28 @@ def test_each_protocol_is_that_of_the_single_command(recordings, report):
         assert {row["protocol"] for row in rows} == {"fair"}
 
 
+def test_numbers_by_the_protocol_of_the_paper_are_rows(report):
+    kept = {
+        (row["database"], row["method"]): row
+        for row in read_csv(report / "published_protocol.csv")
+        if row["metric"] == "auc" and row["gate"] == "0"
+    }
+    assert {row["protocol"] for row in kept.values()} == {"paper"}
+    assert {row["experiment"] for row in kept.values()} == {"stages"}
+    printed = {
+        row["method"]: row["AUC"]
+        for row in forward(report / "place_recognition.csv")
+        if (row["mode"], row["protocol"]) == ("all", "paper")
+    }
+    assert printed == {
+        method: row["value"]
+        for (database, method), row in kept.items()
+        if database == "metropolis_01"
+    }
+    protocols = {row["protocol"] for row in read_csv(report / "results.csv")}
+    assert "paper" not in protocols
+
+
 def test_metrics_of_other_benchmarks(report):
     rows = forward(report / "metrics.csv")
     audit = {
@@ -485,6 +507,7 @@ def test_report_of_a_single_stage(tmp_path):
     tables = ("survival", "query_details", "query_details_unchanged")
     for name in (*tables, "results", "queries"):
         assert read_csv(tmp_path / "out" / f"{name}.csv") == []
+    assert not (tmp_path / "out" / "published_protocol.csv").exists()
 
 
 @pytest.mark.usefixtures("unrendered_figures")
