@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from cns_drake.base import program, progress_display, terminal
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line import options
+from cns_drake.command_line.suggestions import suggest_export
 
 if TYPE_CHECKING:
     from cns_drake.scenarios.scenario import Scenario
@@ -119,15 +120,7 @@ def run_drive(
         f"({run.real_time_factor:.1f} times real time)",
         json=json,
     )
-    terminal.next_command(
-        "cns-drake",
-        "export",
-        run.folder,
-        "--format",
-        "kitti",
-        "--output",
-        "kitti",
-    )
+    suggest_export(run.folder, scenario)
     return run
 
 

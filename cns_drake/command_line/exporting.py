@@ -16,6 +16,11 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import next_command, note, show
 from cns_drake.command_line import options
 from cns_drake.command_line.experiment_drives import varied_drives
+from cns_drake.command_line.suggestions import (
+    suggest_evaluation,
+    suggest_page,
+    suggest_recognition,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:
@@ -196,8 +201,11 @@ def export(
         learned = _learned_drives(words, vary, output, cluster)
         spacing = spacing or _PAIR_SPACING
         if layout == Format.OVERLAP_TABLE:
-            max_range = max_range or _OVERLAP_RANGE
-            _write_overlap_table(learned, output, spacing, max_range, json=json)
+            named = [*words, *(["--vary", vary] if vary else [])]
+            protocol = RetrievalProtocol(
+                query_spacing=spacing, max_range=max_range or _OVERLAP_RANGE
+            )
+            _write_overlap_table(learned, named, output, protocol, json=json)
             return
         with uninterrupted():
             from cns_drake.studies.exports.pair_export import ExportOptions
@@ -295,16 +303,7 @@ def _export_recording(
     )
     show({"output": str(path)}, str(path), json=json)
     if layout != Format.TUM:
-        next_command(
-            "cns-eval",
-            "pr",
-            path,
-            path,
-            "--method",
-            "solid",
-            "--exclude-recent",
-            30,
-        )
+        suggest_evaluation(Path(recording), lidar, path)
 
 
 def _export_repaired(file: str, output: Path, *, json: bool) -> None:
@@ -373,8 +372,7 @@ def _export_film(
         f"{output}: {number} images",
         json=json,
     )
-    words = ("--output", "drives", "--recording", "drive.html")
-    next_command("cns-drake", "simulate", scenario, *words)
+    suggest_page(drive, scenario)
 
 
 def _learned_drives(
@@ -400,13 +398,16 @@ def _learned_drives(
 
 def _write_overlap_table(
     drives: Sequence[Scenario],
+    words: Sequence[str],
     output: Path,
-    spacing: float,
-    max_range: float,
+    protocol: RetrievalProtocol,
     *,
     json: bool,
 ) -> None:
-    """Writes the overlaps between a database and a query drive."""
+    """Writes the overlaps between a database and a query drive.
+
+    `words` are the words of the command line that name the drives.
+    """
     with uninterrupted():
         from cns_drake.studies.exports import pair_export
 
@@ -414,22 +415,11 @@ def _write_overlap_table(
         raise InputError(
             "--format overlap-table: give two drives, database and query"
         )
-    protocol = RetrievalProtocol(query_spacing=spacing, max_range=max_range)
     table = pair_export.write_overlap_table(
         drives[0], drives[1], output, protocol
     )
     show({"output": [str(table)]}, str(table), json=json)
-    next_command(
-        "cns-eval",
-        "pr",
-        *(f"drives/{drive.name}" for drive in drives),
-        "--method",
-        "solid",
-        "--truth",
-        "overlap:0.5",
-        "--exact-overlaps",
-        table,
-    )
+    suggest_recognition(drives, words, table, protocol)
 
 
 def _write_training_data(

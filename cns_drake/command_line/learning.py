@@ -88,12 +88,8 @@ def train(
     picture = make_weights(plan, output, command, cluster)
     print(output)
     print(picture)
+    words = ("--output", f"{output.with_suffix('')}_report", "--no-recordings")
+    setting = ("--set", f"learned.weights={output}")
     terminal.next_command(
-        "cns-eval",
-        "report",
-        "drives",
-        "--output",
-        "report",
-        "--set",
-        f"learned.weights={output}",
+        "cns-drake", "reproduce", "metropolis", *words, *setting
     )

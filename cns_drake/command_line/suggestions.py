@@ -1,8 +1,128 @@
-"""Commands that a command suggests as the next one."""
+"""Commands that a command suggests as the next one.
 
+A suggested command works on the files that are there when it is suggested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.terminal import next_command
+
+if TYPE_CHECKING:
+    from cns_drake.drives.drive import Drive
+    from cns_drake.scenarios.scenario import Scenario
+    from evaluation.recognition.protocol import RetrievalProtocol
+
+# Folder of recordings in the suggestions.
+_RECORDINGS = Path("drives")
+# The suggested --exclude-recent [s].
+_EXCLUDED = 30
+
+
+def suggest_export(recording: Path, scenario: Scenario) -> None:
+    """Names the command that exports a new recording to a new folder."""
+    for output in (Path("kitti"), Path(f"kitti_{recording.name}")):
+        if not os.path.lexists(output):
+            break
+    else:
+        return
+    words: tuple[object, ...] = (recording, "--format", "kitti")
+    lidars = tuple(scenario.lidars)
+    if len(lidars) > 1 and "lidar" not in lidars:
+        # Without a name, an export takes the LiDAR named `lidar`.
+        words += ("--lidar", lidars[0])
+    next_command("cns-drake", "export", *words, "--output", output)
+
+
+def suggest_evaluation(
+    recording: Path, lidar: str | None, exported: Path
+) -> None:
+    """Names a command that evaluates an exported drive.
+
+    This is the measurement of loop closure if the drive returns to a place, and
+    otherwise the comparison of the export with the recording.
+    """
+    from evaluation.drives import open_drive
+
+    try:
+        drive = open_drive(exported)
+    except InputError:  # Such as a recording of a single scan.
+        return
+    if has_loop(drive):
+        words = ("--method", "solid", "--exclude-recent", _EXCLUDED)
+        next_command("cns-eval", "pr", exported, exported, *words)
+    elif lidar is None:
+        next_command("cns-eval", "tcr", recording, exported)
+
+
+def has_loop(drive: Drive) -> bool:
+    """Returns whether loop closure can be measured along a drive.
+
+    It can if some query has a match in the suggested protocol.
+    """
+    from scipy.spatial.distance import cdist
+
+    from evaluation.recognition.overlap_truth import compared_frames
+    from evaluation.recognition.protocol import RetrievalProtocol
+
+    protocol = RetrievalProtocol(exclude_recent=_EXCLUDED)
+    queries, places = compared_frames(drive, drive, protocol)
+    p_WS, stamps_ns = drive.X_WS[:, :3, 3], drive.stamps_ns
+    is_near = cdist(p_WS[queries], p_WS[places]) <= protocol.radius
+    age_ns = stamps_ns[queries][:, None] - stamps_ns[places][None, :]
+    return bool((is_near & (age_ns >= _EXCLUDED * 1e9)).any())
+
+
+def suggest_recognition(
+    drives: Sequence[Scenario],
+    words: Sequence[str],
+    table: Path,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Names the command that uses a table of overlaps.
+
+    It needs recordings of both drives. If they are not there yet, the command
+    that makes them is named first.
+
+    Args:
+        drives: database and query drive.
+        words: words with which the command line named both drives.
+        table: the table.
+        protocol: protocol of the table.
+    """
+    folders = [_RECORDINGS / drive.name for drive in drives]
+    if not all(map(os.path.lexists, folders)):
+        next_command("cns-drake", "generate", *words, "--output", _RECORDINGS)
+    usual = type(protocol)()
+    given: list[object] = []
+    if protocol.query_spacing != usual.query_spacing:
+        given += ["--query-spacing", protocol.query_spacing]
+    if protocol.max_range != usual.max_range:
+        given += ["--max-range", protocol.max_range]
+    next_command(
+        "cns-eval",
+        "pr",
+        *folders,
+        "--method",
+        "solid",
+        "--truth",
+        "overlap:0.5",
+        "--exact-overlaps",
+        table,
+        *given,
+    )
+
+
+def suggest_page(scenario: Scenario, word: str) -> None:
+    """Names the command that records a drive, and writes a page of it."""
+    if not os.path.lexists(_RECORDINGS / scenario.name):
+        words = ("--output", _RECORDINGS, "--recording", "drive.html")
+        next_command("cns-drake", "simulate", word, *words)
 
 
 def suggest_reproduction(folder: Path) -> None:

@@ -291,7 +291,9 @@ def test_command(drive, tmp_path):
     done = run(*arguments)
     assert done.returncode == 0
     assert done.stdout == f"{tmp_path / 'out/sequences/07'}\n"
-    assert done.stderr.splitlines()[-1].startswith("next: cns-eval pr ")
+    assert done.stderr.splitlines()[-1] == (
+        f"next: cns-eval tcr {drive} {tmp_path / 'out/sequences/07'}"
+    )
     again = run(*arguments)
     assert again.returncode == 2
     assert again.stdout == ""
