@@ -120,6 +120,9 @@ def run_drive(
         f"({run.real_time_factor:.1f} times real time)",
         json=json,
     )
+    for file in (recording, graphviz):
+        if file is not None:
+            terminal.note(f"wrote {file}")
     suggest_export(run.folder, scenario)
     return run
 

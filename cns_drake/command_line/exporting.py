@@ -162,8 +162,9 @@ def export(
             images with poses) or film.
         output: Folder to write; created if it does not exist. With map-truth,
             map-sessions and bev-images, the folder must be new or empty. With
-            mcap and film, the output is a file instead; a film's name ends in
-            .webp, or in .mp4, which needs ffmpeg.
+            mcap and film, the output is a file instead, and an existing file is
+            replaced; a film's name ends in .webp, or in .mp4, which needs
+            ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with --format kitti.

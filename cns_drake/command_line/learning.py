@@ -43,7 +43,8 @@ def train(
     packages of the extra `train` (JAX).
 
     Args:
-        output: File for the weights. The training curve is written to FILE.png.
+        output: File for the weights; an existing file is replaced. The training
+            curve is written to FILE.png.
             The state of the training is written to FILE.npz.training; after an
             interruption, the same command resumes from this file.
         minutes: Approximate computing time on one core in minutes. The numbers

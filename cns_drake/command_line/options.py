@@ -47,14 +47,16 @@ Recording = Annotated[
     Path | None,
     typer.Option(
         help="File for a web page (.html) that replays the drive in a browser, "
-        "with Meshcat. By default no page is written."
+        "with Meshcat. An existing file is replaced. By default no page is "
+        "written."
     ),
 ]
 Graphviz = Annotated[
     Path | None,
     typer.Option(
         help="File for a graph of the connected systems in Drake's Diagram, as "
-        "Graphviz text. By default no graph is written."
+        "Graphviz text. An existing file is replaced. By default no graph is "
+        "written."
     ),
 ]
 Overwrite = Annotated[

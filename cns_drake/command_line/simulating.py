@@ -228,7 +228,8 @@ def scan(
         world: SDF file of the world to scan.
         pose: Pose of the LiDAR in the world: position, then roll, pitch and yaw
             [m, rad].
-        output: File for the scan; its name ends in .pcd, .bin or .npy.
+        output: File for the scan; its name ends in .pcd, .bin or .npy. An
+            existing file is replaced.
         seed: Seed of the random noise and weather. A different seed gives
             different errors with the same statistics.
         model_path: Folder with the world's model:// files. The command searches

@@ -95,7 +95,7 @@ def pr(
             overlap:0.5, a match can lie at any distance, and the scan of the
             match shows at least PART of what the query's scan shows.
         overlaps: CSV file to write: the overlap of each query with each place.
-            Needs --truth overlap:PART.
+            An existing file is replaced. Needs --truth overlap:PART.
         exact_overlaps: File with exact overlaps, from cns-drake export --format
             overlap-table. Without such a file, overlaps are estimated from the
             scans. Needs --truth overlap:PART.
@@ -110,12 +110,13 @@ def pr(
             queries.
         output: Folder for the tables results.csv and queries.csv, which have
             the columns of a study's tables; created if it does not exist.
-        scores: CSV file for the score of each pair of a query and a place. With
-            this option, the scans need no poses: DATABASE and QUERY are folders
-            with .bin, .pcd, .npy or .ply files, and the command computes only
-            scores, no AUC and no other metric. Every query is compared with
-            every place, even if the method usually skips some places to save
-            time. The score of a place that the method rejects is empty.
+        scores: CSV file for the score of each pair of a query and a place. An
+            existing file is replaced. With this option, the scans need no
+            poses: DATABASE and QUERY are folders with .bin, .pcd, .npy or .ply
+            files, and the command computes only scores, no AUC and no other
+            metric. Every query is compared with every place, even if the method
+            usually skips some places to save time. The score of a place that
+            the method rejects is empty.
     """
     if scores is not None:
         commands.check_only_with(context, "scores", _WITH_SCORES)

@@ -237,7 +237,7 @@ RECIPES = {
             ("--frames 200", "--frames 2"),
             ("metropolis_01", "suburbia_01"),
             # The page of a whole city takes as long as all the rest.
-            (" --recording drive.html", ""),
+            (" --recording suburbia_01.html", ""),
         ),
         makes=(
             "recordings/suburbia_01/metadata.yaml",
@@ -529,8 +529,8 @@ RECIPES = {
             ("riverside_01", "town/sequence_01.yaml"),
         ),
         after=("start a city",),
-        prints=("first/town_01: 2 frames",),
-        makes=("drive.html",),
+        prints=("tutorial/town_01: 2 frames",),
+        makes=("tutorial.html",),
     ),
     "a look first": Recipe(
         "python3 -m venv .venv && .venv/bin/pip install .\n",

@@ -182,7 +182,8 @@ def test_diagram_script_has_options():
 
 def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
     page = tmp_path / "drive.html"
-    status, out, _ = run_program(
+    page.write_text("An older page.")  # It is replaced, as the help says.
+    status, out, err = run_program(
         capfd,
         "a.py",
         lambda: run_script(str(files / "drive.yaml"), "A drive."),
@@ -197,6 +198,7 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
     assert "2 frames" in out
     assert (tmp_path / "drive" / "metadata.yaml").is_file()
     assert page.stat().st_size > 100_000
+    assert f"wrote {page}" in err
 
 
 @pytest.mark.parametrize(
