@@ -37,6 +37,9 @@ _LESS = re.compile(
 
 # Values that differ by no more are the same result, with the digits that ship.
 _ALIKE = 1e-4
+# Values that differ by no more can be those of the same program: a rounding
+# error that changes an answer changes a share of 100 queries by this.
+_ROUNDED = 0.01
 
 
 class Compared(NamedTuple):
@@ -295,6 +298,11 @@ def _ranked_entries(
                     " once"
                 )
             else:
+                notes += [
+                    _difference_note(method, other, table, common)
+                    for other, name in kept
+                    if name == method and table is tables[0]
+                ]
                 kept.append((table, method))
     counts = Counter(method for _, method in kept)
     # In the order of the tables, as ties are shown.
@@ -305,6 +313,33 @@ def _ranked_entries(
         else method: (table, method)
         for table, method in kept
     }, notes
+
+
+def _difference_note(
+    method: str,
+    own: MetricTable,
+    other: MetricTable,
+    common: Sequence[Condition],
+) -> str:
+    """Returns a note on how far a method's values in two tables differ."""
+    differences = [
+        abs(
+            own.rows[method, condition].value
+            - other.rows[method, condition].value
+        )
+        for condition in common
+    ]
+    number = sum(difference > _ALIKE for difference in differences)
+    note = (
+        f"{method}: other values in {own.name} and {other.name} in {number} of "
+        f"{len(common)} conditions, by up to {max(differences):.4f}"
+    )
+    if max(differences) <= _ROUNDED:
+        note += (
+            "; rounding on another processor, or by other versions of "
+            "packages, can change single answers"
+        )
+    return note
 
 
 def _mismatch_notes(

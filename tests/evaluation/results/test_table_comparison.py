@@ -159,8 +159,27 @@ def test_an_entrant_stands_among_the_shipped(tmp_path):
     assert value["solid (entrant)"] == pytest.approx(expected - 0.01)
     mean = np.mean([row.value for row in shipped(**changed, method="ring++")])
     assert value["ring++"] == pytest.approx(mean)
-    assert found.notes == []
+    (note,) = found.notes
+    assert note.startswith("solid: other values in entrant and ")
+    assert " in 2 of 2 conditions, by up to " in note
     assert found.agreements == []
+
+
+@pytest.mark.parametrize(
+    ("change", "may_be_rounding"), [(0.0069, True), (0.011, False)]
+)
+def test_small_differences_can_be_rounding(tmp_path, change, may_be_rounding):
+    """One query of 152 changes R@1 by 0.0066."""
+    rows = [
+        Row(**{**vars(row), "value": row.value + change})
+        for row in shipped(map="metropolis", metric="r1", method="btc")
+    ]
+    path = tmp_path / "mine.csv"
+    Results.of(rows).write_csv(path)
+    notes = compare_tables([path], "r1").notes
+    (note,) = (note for note in notes if note.startswith("btc: other values"))
+    assert f"by up to {change:.4f}" in note
+    assert ("rounding" in note) == may_be_rounding
 
 
 def test_controls_are_not_ranked(tmp_path):
