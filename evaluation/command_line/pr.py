@@ -125,6 +125,7 @@ def pr(
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
     from cns_drake.base import files
+    from cns_drake.drives.same_world import check_same_map
     from evaluation.drives import check_same_world
     from evaluation.drives.drive_views import CountedDrive
     from evaluation.recognition import overlap_truth
@@ -147,11 +148,16 @@ def pr(
     given = _choice_of(method, parameter)
     choice = given.at_height(sensor_height)
     chosen = _made(choice)
-    drives = options.aligned(
-        options.open_noted(database, query, lidar=lidar, columns=columns),
-        align,
-        across_maps=across_maps,
-    )
+    opened = options.open_noted(database, query, lidar=lidar, columns=columns)
+    if not across_maps:
+        try:
+            check_same_map(*opened)
+        except InputError as error:
+            raise InputError(
+                f"{error} (--across-maps allows this, for cities along the same"
+                " streets)"
+            ) from None
+    drives = options.aligned(opened, align, across_maps=across_maps)
     check_same_world(*drives, across_maps=across_maps)
     places, queries = counted = [CountedDrive(drive) for drive in drives]
     shares = _overlaps(places, queries, protocol, exact_overlaps)
@@ -366,7 +372,8 @@ def _recognition_rows(
     curve = metrics.curve
     if metrics.f1_max_index is not None:
         index = metrics.f1_max_index
-        f1 += f"  (TP {curve.true_positives[index]}, T {curve.counted[index]})"
+        right = curve.true_positives[index]
+        f1 += f"  (TP {right}, FP + FN {curve.counted[index] - right})"
     yield "F1max", f1
     yield (
         "recall at full precision",

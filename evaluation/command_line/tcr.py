@@ -117,6 +117,8 @@ def tcr(
 
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `tcr`."""
+    from evaluation.change.drive_change import COVERAGE_RADIUS
+
     change = report.change
     source, target = report.source, report.target
     yield "pair", f"{source} <-> {target}"
@@ -131,7 +133,12 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
         counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
         yield f"TCR {names}", f"{number_text(side.ratio)}  {counts}"
     if report.masked is not None:
-        yield "TCR_sym where both drove", number_text(report.masked.symmetric)
+        value = number_text(report.masked.symmetric)
+        if report.masked.undefined_because:
+            value += (
+                f"  (no point lies within {COVERAGE_RADIUS:g} m of both routes)"
+            )
+        yield "TCR_sym where both drove", value
     if report.control is not None and report.control_names is not None:
         names = " <-> ".join(report.control_names)
         value = number_text(report.control.symmetric)

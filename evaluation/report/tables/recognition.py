@@ -229,7 +229,9 @@ def audit_table(
             "TP of F1max": lambda c: c.at_f1_max(
                 c.metrics.curve.true_positives
             ),
-            "T of F1max": lambda c: c.at_f1_max(c.metrics.curve.counted),
+            "FP + FN of F1max": lambda c: c.at_f1_max(
+                c.metrics.curve.counted - c.metrics.curve.true_positives
+            ),
             **protocol_columns("result."),
         },
         CAPTIONS["audit"],

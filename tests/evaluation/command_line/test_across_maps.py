@@ -17,7 +17,9 @@ def test_two_draws_of_a_city(capsys, tmp_path):
         drive(tmp_path / f"{city}_{stage}", stage, route, city=city)
     both = ["pr", tmp_path / "town_01", tmp_path / "town_c1_02"]
     both += ["--method", "solid", "--json"]
-    assert_refused(capsys, both, "through town_c1", "through town")
+    assert_refused(
+        capsys, both, "through town_c1", "through town (--across-maps"
+    )
     with pytest.raises(InputError, match="through town_c1"):
         place_outcome(*map(open_drive, both[1:3]), make_method("solid", {}))
     status, out, err = run(capsys, *both, "--across-maps")

@@ -3,6 +3,7 @@ import json
 import subprocess
 import sys
 
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.eval_program import assert_refused, run
 import numpy as np
 import pytest
@@ -196,6 +197,20 @@ def test_tcr_table(capsys, towns):
         assert text in out
 
 
+def test_drives_far_apart_say_why_nothing_is_measured_where_both_drove(
+    capsys, tmp_path
+):
+    a, b = (tmp_path / f"town_0{stage}" for stage in (1, 2))
+    near = np.random.default_rng(1).uniform(-40.0, 40.0, (400, 3))
+    for path, y in ((a, 0.0), (b, 100.0)):
+        poses = [yaw_pose(3.0 * i, y, 0.0, 0.0) for i in range(5)]
+        scans = [make_scan(near) for _ in poses]
+        write_recording(path, scans, poses)
+    status, out, _ = run(capsys, "tcr", a, b)
+    assert status == 0
+    assert "undefined  (no point lies within 40 m of both routes)" in out
+
+
 def test_tcr_undefined_is_null_with_a_reason(capsys, towns, tmp_path):
     np.save(tmp_path / "empty.npy", np.empty((0, 3)))
     arguments = ("tcr", towns / "town_01.npy", tmp_path / "empty.npy")
@@ -267,7 +282,15 @@ def test_pr_table_modes_and_parameters(capsys, towns):
     )
     status, out, _ = run(capsys, *arguments)
     assert status == 0
-    for text in ("filtered", "R@1 ", "TP 8 of N 8", "AUC", "F1max", "R@1%"):
+    for text in (
+        "filtered",
+        "R@1 ",
+        "TP 8 of N 8",
+        "AUC",
+        "F1max",
+        ", FP + FN 0)",
+        "R@1%",
+    ):
         assert text in out
     _, out, _ = run(capsys, *arguments, "--json")
     parameters = json.loads(out)["parameters"]
