@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 import shutil
 import stat
+import tempfile
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.file_locks import exclusive, lock_file
@@ -164,6 +165,19 @@ def check_writable(path: Path) -> None:
         make_folder(path.parent)
         part.touch()
         part.unlink()
+
+
+def check_folder_writable(folder: Path) -> None:
+    """Checks before a long run that files can be written to a folder.
+
+    Creates the folder if necessary, and leaves nothing else behind.
+
+    Raises:
+        InputError: if no file could be written.
+    """
+    make_folder(folder)
+    with user_errors(folder), tempfile.TemporaryFile(dir=folder):
+        pass
 
 
 def sole_writer(folder: Path) -> contextlib.AbstractContextManager[None]:

@@ -9,7 +9,11 @@ import time
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from cns_drake.base.complete_files import check_writable, write_text
+from cns_drake.base.complete_files import (
+    check_folder_writable,
+    check_writable,
+    write_text,
+)
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.progress import doing
@@ -132,6 +136,7 @@ def simulate(
             if file is not None:
                 check_writable(file)
         RecordingFolder(folder).check(overwrite)
+        check_folder_writable(folder.parent)
         plan = DrivePlan(scenario)
         if scenario.cameras:
             check_renderer()

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cns_drake.base.complete_files import check_folder_writable
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
@@ -76,6 +77,8 @@ _FORMER = (
     "map_update.csv",
     "localisation.csv",
 )
+# Files of `cns-eval report`, and the folder of `cns-drake reproduce`.
+_OF_REPORTS = ("report.html", "report")
 
 
 def run_study(
@@ -181,6 +184,13 @@ class Study:
                     f"{self.output / name}: results of an older version; give"
                     " another folder"
                 )
+        for name in _OF_REPORTS:
+            if (self.output / name).exists():
+                raise InputError(
+                    f"{self.output / name}: results of another command; give"
+                    " another folder"
+                )
+        check_folder_writable(self.output)
         self._note_lower_levels()
         found = list(self._maps.pairs(maps))
         doing("looking at all conditions")

@@ -10,6 +10,7 @@ from threading import Thread
 import pytest
 
 from cns_drake.base.complete_files import (
+    check_folder_writable,
     check_writable,
     complete_part,
     completing,
@@ -171,3 +172,14 @@ def test_two_writers_of_one_file(tmp_path):
     assert order == ["first", "second"]
     assert path.read_text() == "second"
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_a_folder_is_checked_before_it_is_filled(tmp_path):
+    folder = tmp_path / "a" / "b"
+    check_folder_writable(folder)
+    assert list(folder.iterdir()) == []
+    (folder / "file").write_text("")
+    check_folder_writable(folder)
+    for wrong in (folder / "file", Path("/proc/cns-drake")):
+        with pytest.raises(InputError, match=wrong.name):
+            check_folder_writable(wrong)
