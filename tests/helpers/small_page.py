@@ -74,7 +74,10 @@ def make_content(folder, **changed):
                 "svg",
                 section="change",
                 num_panels=2,
-                legend=(((200, 0, 0), "gone < new"),),
+                legend=(
+                    ((200, 0, 0), "gone < new"),
+                    ((0, 0, 0), "A meaning that is wider than a phone. " * 3),
+                ),
             ),
             Illustration(folder / "none", "not for the page", "svg", "print"),
             Illustration(folder / "survival", "kept", "svg", "survival"),

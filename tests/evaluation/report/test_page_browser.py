@@ -10,6 +10,7 @@ import pytest
 
 from evaluation.methods import shipped_methods
 from evaluation.paper.paper_reference import paper_reference
+from evaluation.recognition.costs import Cost
 from evaluation.report.camera_images import CameraImages
 from evaluation.report.page import write_page
 
@@ -168,6 +169,26 @@ def test_table_ii_fits_its_box(browser, content, tmp_path):
           (one) => [one.scrollWidth, one.clientWidth])"""
     )
     assert len(widths) > 2
+    assert [width for width, box in widths if width > box] == []
+
+
+@pytest.mark.parametrize("width", [1100, 1380, 1440])
+def test_tables_side_by_side_fit_their_boxes(browser, content, tmp_path, width):
+    path = tmp_path / "report.html"
+    results = [make_result(name, [0, 1, 4, 6, 3]) for name in shipped_methods()]
+    costs = [
+        Cost(name, 10, 123456.0, 1234.5, 1234.5, 1000, 1234567.0)
+        for name in shipped_methods()
+    ]
+    page = replace(content, recognitions=results, evidence={}, costs=costs)
+    write_page(path, page)
+    browser.open(path.as_uri(), width, 900)
+    unfold(browser)
+    widths = browser.evaluate(
+        """[...document.querySelectorAll(".beside.tables .table")].map(
+          (one) => [one.scrollWidth, one.clientWidth])"""
+    )
+    assert len(widths) == 2
     assert [width for width, box in widths if width > box] == []
 
 
