@@ -83,7 +83,7 @@ def compare(
             (
                 f"{compared.first} - {compared.second}",
                 f"{number_text(compared.difference.value)}  {interval}"
-                f"  p {number_text(compared.p_value)}",
+                f"  p {_p_text(compared.p_value)}",
             )
         )
     for alike in found.agreements:
@@ -94,6 +94,12 @@ def compare(
             )
         )
     terminal.show(found.to_json(), rows, json=json)
+
+
+def _p_text(p_value: float) -> str:
+    from evaluation.results.table_forms import p_value_text
+
+    return number_text(p_value) if isnan(p_value) else p_value_text(p_value)
 
 
 def _spaced_interval(interval: Interval) -> str:

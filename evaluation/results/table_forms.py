@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import html
-from itertools import groupby
+from itertools import accumulate, groupby
 import math
 from operator import attrgetter
 from pathlib import Path
@@ -64,6 +64,8 @@ _LATEX = {
     "–": "--",
     "·": r"$\cdot$",
 }
+# A number that is written as text, such as "< 0.0001" or "12 %".
+_NUMBER = re.compile(r"(< )?-?[\d.]+( %)?")
 # Characters that turn text into a table, a link, a picture or a tag.
 _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
     ord("<"): "&lt;",
@@ -190,24 +192,53 @@ class Table:
         return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
     def to_html(self) -> str:
-        """Returns the table as an HTML element."""
+        """Returns the table as an HTML element.
+
+        Cells of columns with text are of the class `text`. The cells of the
+        first column under each named heading are of the class `first`.
+        """
         caption = html.escape(self.caption)
+        kinds = self._column_classes()
         lines = [
             "".join(
                 f'<th colspan="{span}" class="group">{html.escape(name)}</th>'
                 for name, span in self.groups
             ),
-            "".join(f"<th>{html.escape(name)}</th>" for name in self.header),
+            "".join(
+                f"<th{kind}>{html.escape(name)}</th>"
+                for kind, name in zip(kinds, self.header, strict=True)
+            ),
         ]
         head = "".join(f"<tr>{line}</tr>" for line in lines if line)
         body = "".join(
-            f"<tr>{''.join(f'<td>{_HTML_FORM.cell(v)}</td>' for v in row)}</tr>"
+            "<tr>"
+            + "".join(
+                f"<td{kind}>{_HTML_FORM.cell(value)}</td>"
+                for kind, value in zip(kinds, row, strict=True)
+            )
+            + "</tr>"
             for row in self.rows
         )
         return (
             f"<table>{caption and f'<caption>{caption}</caption>'}"
             f"<thead>{head}</thead><tbody>{body}</tbody></table>"
         )
+
+    def _column_classes(self) -> list[str]:
+        """Returns the attribute `class` of each column's cells in HTML."""
+        starts = accumulate((span for _, span in self.groups), initial=0)
+        first = {
+            start
+            for start, (name, _) in zip(starts, self.groups, strict=False)
+            if name
+        }
+        found = []
+        for k in range(len(self.header)):
+            names = ["first"] * (k in first)
+            if any(_is_text(row[k]) for row in self.rows):
+                names.append("text")
+            found.append(f' class="{" ".join(names)}"' if names else "")
+        return found
 
     def to_latex(self) -> str:
         r"""Returns the table as LaTeX `table*`, for the package booktabs."""
@@ -392,6 +423,14 @@ def by_pair_and_method(items: Sequence[Any]) -> list[Any]:
     )
 
 
+def p_value_text(value: float) -> str:
+    """Returns a p-value with four decimals; "< 0.0001" if it has none.
+
+    NaN becomes a dash.
+    """
+    return "< 0.0001" if value < 0.5e-4 else to_text(float(value))
+
+
 def to_text(value: object) -> str:
     """Returns a value as the text that tables show."""
     if _is_missing(value):
@@ -447,6 +486,11 @@ _LATEX_FORM = _Form(
 
 def _latex_row(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
+
+
+def _is_text(value: object) -> bool:
+    """Returns whether a cell contains words, and not a number as text."""
+    return isinstance(value, str) and not _NUMBER.fullmatch(value)
 
 
 def _is_missing(value: object) -> bool:

@@ -13,6 +13,7 @@ from evaluation.results.table_forms import (
     Table,
     by_pair,
     by_pair_and_method,
+    p_value_text,
     title,
 )
 
@@ -83,7 +84,7 @@ def difference_table(differences: Sequence[MethodDifference]) -> Table:
             "A - B": lambda d: d.difference.value,
             "low": lambda d: d.difference.interval.low,
             "high": lambda d: d.difference.interval.high,
-            "p": lambda d: d.p_value,
+            "p": lambda d: p_value_text(d.p_value),
         },
         CAPTIONS["differences"],
     )

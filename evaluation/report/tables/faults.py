@@ -62,7 +62,7 @@ def fault_table(results: Sequence[PlaceOutcome], evidence: Evidence) -> Table:
             **keyed({fault_words(k): k for k in FAULT_KINDS[1:]}, share),
             "changed by": lambda count: (
                 ", ".join(
-                    f"{n} {name}" for name, n in count.changed.most_common()
+                    f"{name} ({n})" for name, n in count.changed.most_common()
                 )
                 or None
             ),

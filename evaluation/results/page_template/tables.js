@@ -18,7 +18,9 @@ addEventListener("beforeprint", () => document
 function sortBy(heading) {
   const body = heading.closest("table").tBodies[0];
   const down = heading.ariaSort !== "descending";
-  const text = (row) => row.cells[heading.cellIndex].innerText.trim();
+  // A p-value "< 0.0001" is sorted by its limit.
+  const text = (row) =>
+    row.cells[heading.cellIndex].innerText.trim().replace(/^< /, "");
   const kind = (value) => !value || value === "–" ? 2
     : Number.isNaN(parseFloat(value)) ? 1 : 0;
   const compare = (a, b) => kind(a) ? a.localeCompare(b)

@@ -433,6 +433,6 @@ def test_tables_of_two_protocols_are_apart(tmp_path):
         # A row for each mode.
         assert body.count("<tr>") == 3
         assert f"{result.by_mode['all'].auc:.4f}" in body
-        assert body.count(f"<td>{result.protocol_name}</td>") == 2
+        assert body.count(f">{result.protocol_name}</td>") == 2
     lines = (tmp_path / "report.md").read_text().splitlines()
     assert [line[4:] for line in lines if line.startswith("### ")] == headings

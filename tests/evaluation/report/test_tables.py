@@ -1,10 +1,18 @@
+import re
+
 from helpers.small_page import make_content
 import numpy as np
 import pytest
 
 from evaluation.report.page import write_report
 from evaluation.results.ranges import range_of
-from evaluation.results.table_forms import Cell, Table, keyed, ranked
+from evaluation.results.table_forms import (
+    Cell,
+    Table,
+    keyed,
+    p_value_text,
+    ranked,
+)
 
 PLAIN = Table(
     ("name", "value", "count"),
@@ -87,8 +95,32 @@ def test_latex_is_escaped_booktabs():
 def test_html_is_escaped():
     text = GROUPED.to_html()
     assert '<th colspan="1" class="group">RING++</th>' in text
-    assert "<td><b>0.7500</b><small>0.5000</small></td>" in text
-    assert "<td>x &amp; y</td>" in text
+    cell = '<td class="first"><b>0.7500</b><small>0.5000</small></td>'
+    assert cell in text
+    assert '<td class="text">x &amp; y</td>' in text
+
+
+def test_text_has_a_class_and_numbers_have_none():
+    row = ("BTC", "12 %", "building (92)", "< 0.0001", None, "-1.5")
+    text = Table(
+        tuple("abcdef"), (row, ("A", None, None, "0", 1.0, "2"))
+    ).to_html()
+    assert re.findall(r'<th class="text">(\w)</th>', text) == ["a", "c"]
+    assert text.count('<td class="text">') == 4
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "< 0.0001"),
+        (0.49e-4, "< 0.0001"),
+        (0.51e-4, "0.0001"),
+        (1.0, "1.0000"),
+        (float("nan"), "–"),
+    ],
+)
+def test_no_p_value_is_zero(value, text):
+    assert p_value_text(value) == text
 
 
 @pytest.mark.parametrize(
