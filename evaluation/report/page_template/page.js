@@ -28,6 +28,8 @@ function showStatus() {
     "aria-valuetext", `query ${state.query + 1}: ${WORDS[kind]}`);
   const count = pair.queries.filter((_, query) => fits(query)).length;
   byId("filtered").textContent = `${count} of ${pair.queries.length}`;
+  byId("no-query").hidden = count > 0;
+  if (!count) byId("status").replaceChildren();
   showCaption(
     "query", "Query", pair.query, pair.queries[state.query]);
   const place = best[state.rank];

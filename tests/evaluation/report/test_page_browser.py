@@ -327,12 +327,36 @@ def test_only_those_of_one_reason(reader):
     assert status(reader).endswith(" – perceptual aliasing")
     choose(reader, "filter", "right")
     assert reader.evaluate('byId("filtered").value') == "0 of 5"
-    choose(reader, "filter", "all")
-    choose(reader, "why", "no_place")
+    choose(reader, "why", "")
+    choose(reader, "filter", "none")
     shown(reader, 0, 0, 4, 0)
     assert status(reader).startswith("Query 5 of 5, Scan Context++: no match")
-    choose(reader, "why", "")
+    choose(reader, "filter", "all")
     assert reader.evaluate('byId("filtered").value') == "5 of 5"
+
+
+def test_no_query_is_shown_if_none_fits(reader):
+    parts = """["#no-query", ".views", ".steering", ".lists"].map(
+      (name) => document.querySelector(name).offsetHeight > 0)"""
+    assert reader.evaluate(parts) == [False, True, True, True]
+    choose(reader, "why", "occluded")
+    assert reader.evaluate('byId("filtered").value') == "0 of 5"
+    assert reader.evaluate(parts) == [True, False, False, False]
+    assert status(reader) == ""
+    choose(reader, "why", "")
+    assert reader.evaluate(parts) == [False, True, True, True]
+    shown(reader, 0, 0, 0, 0)
+    assert (pixels(reader, "map") < 128).any()
+
+
+def test_the_legend_of_the_map_has_its_marks(reader):
+    kinds = reader.evaluate(
+        """[...document.querySelectorAll("figure.map .key")].map(
+          (key) => [key.tagName, key.classList[1]])"""
+    )
+    assert ["svg", "query"] in kinds
+    assert ["svg", "wrong"] in kinds
+    assert len(kinds) == 7
 
 
 def test_verdicts_of_all_methods(reader):
