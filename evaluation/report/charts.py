@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-from matplotlib.colors import to_rgb
-
 from cns_drake.base.errors import InputError
 from evaluation.report.contents import Report
 from evaluation.report.illustrations import Illustration, Section
@@ -58,17 +56,13 @@ def draw_charts(report: Report, folder: Path) -> list[Illustration]:
         except InputError as error:
             report.notes = [*report.notes, f"{words}: left out: {error}"]
             continue
-        legend = []
-        for label, (colour, *_) in drawn.legend.items():
-            red, green, blue = (round(255 * part) for part in to_rgb(colour))
-            legend.append(((red, green, blue), label))
         shown.append(
             Illustration(
                 folder / stem,
                 words,
                 "svg",
                 section=section,
-                legend=tuple(legend),
+                methods=drawn.legend,
             )
         )
     return shown

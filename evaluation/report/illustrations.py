@@ -1,10 +1,11 @@
 """A figure of a report, and where the page shows it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from evaluation.results.styles import Legend
+from evaluation.results.styles import Legend, MethodStyle
 
 Section = Literal["survival", "change", "recognition", "figures", "print"]
 
@@ -22,6 +23,8 @@ class Illustration:
         num_panels: number of panels side by side; a phone shows one at a time.
         legend: colours, each as values of red, green and blue, with their
             meanings. The page shows these colours below the figure.
+        methods: name of a method -> its style in the figure. The page shows the
+            methods' markers below the figure.
     """
 
     stem: Path
@@ -30,3 +33,4 @@ class Illustration:
     section: Section = "figures"
     num_panels: int = 1
     legend: Legend = ()
+    methods: Mapping[str, MethodStyle] = field(default_factory=dict)

@@ -46,6 +46,7 @@ from evaluation.report.tables.recognition import (
     recognition_table,
     sessions_table,
 )
+from evaluation.results.charts.markers import marker_corners
 from evaluation.results.page_frame import (
     PageSection,
     environment,
@@ -329,6 +330,7 @@ def _environment() -> jinja2.Environment:
         _TEMPLATES,
         {
             "captioned": _captioned,
+            "corners": marker_corners,
             "data_address": _data_address,
             "interval_text": survival.interval_text,
             "markdown": escape_markdown,

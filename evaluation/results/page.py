@@ -8,7 +8,6 @@ import tempfile
 from typing import Any
 
 from markupsafe import Markup
-from matplotlib.markers import MarkerStyle
 import numpy as np
 
 from cns_drake.base.complete_files import write_text
@@ -18,6 +17,7 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.version import __version__
 from evaluation.results.charts.chart import NARROW, WIDE
 from evaluation.results.charts.kinds import DrawnChart, draw_chart
+from evaluation.results.charts.markers import marker_corners
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_files import save_figure
 from evaluation.results.keys import CAUSE, KEYS, LEVEL, SETTINGS
@@ -167,7 +167,9 @@ def _sections(
         experiment_text: the experiment as YAML.
     """
     templates = environment(
-        __package__, _TEMPLATES, {"shown": _value_text, "corners": _corners}
+        __package__,
+        _TEMPLATES,
+        {"shown": _value_text, "corners": marker_corners},
     )
 
     def section(
@@ -215,15 +217,6 @@ def _svg(drawn: DrawnChart, prefix: str) -> Markup:
         text = stem.with_suffix(".svg").read_text()
     text = text[text.index("<svg") :]
     return Markup(re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", text))
-
-
-def _corners(marker: str) -> str:
-    """Returns the points of an SVG polygon that shows a marker of a chart."""
-    style = MarkerStyle(marker)
-    path = style.get_path().transformed(style.get_transform())
-    # 8 px wide, around the middle of its line; SVG's y points down.
-    corners = np.array(path.to_polygons()[0]) * (8, -8) + (18, 6)
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
 
 
 def _summary(results: Results, task: str) -> dict[str, Any]:

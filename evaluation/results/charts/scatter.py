@@ -34,6 +34,7 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
         raise InputError(f"charts: scatter: no {y_name} has a {x_name}")
     figure = chart.figure(380.0)
     axes = figure.subplots()
+    has_points_beyond = False
     for label, (colour, style, marker) in chart.styles.items():
         known = sorted(
             (at, row.value) for row, at in points if title(row.label) == label
@@ -44,7 +45,11 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
         few = len(x) < LEAST_POINTS
         size, alpha = (8.0, 0.9) if few else (5.0, 0.55)
         axes.plot(x, y, marker, color=colour, mew=0, ms=size, alpha=alpha)
-        for curve in curves(x, y):
+        drawn = list(curves(x, y))
+        has_points_beyond |= bool(drawn) and not all(
+            any(curve.x[0] <= at <= curve.x[-1] for curve in drawn) for at in x
+        )
+        for curve in drawn:
             axes.fill_between(
                 curve.x, curve.low, curve.high, color=colour, alpha=0.18, lw=0
             )
@@ -57,7 +62,10 @@ def draw_scatter(chart: Chart) -> tuple[str, Figure]:
     # On a phone there is room for a few numbers.
     axes.locator_params(axis="x", nbins=6)
     axes.grid(alpha=0.3)
-    return _trend_message(chart, points), figure
+    message = _trend_message(chart, points)
+    if has_points_beyond:
+        message += "; curves end where gaps between points are wide"
+    return message, figure
 
 
 def _trend_message(chart: Chart, points: Iterable[tuple[Row, float]]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.fault_kinds import FAULT_KINDS
+from evaluation.report.illustrations import Illustration
 from evaluation.report.page import write_page, write_report
 from evaluation.report.page_data import browser_data
 from evaluation.report.ranking import further_columns, ranked_methods
@@ -18,7 +19,9 @@ from evaluation.report.reference import Reference
 from evaluation.report.route_pictures import route_picture
 from evaluation.report.tables.differences import MethodDifference
 from evaluation.report.tables.recognition import recognition_table
+from evaluation.results.charts.markers import marker_corners
 from evaluation.results.keys import LAST, OWN, STAGE
+from evaluation.results.styles import method_styles
 from evaluation.results.table import Results, Row
 
 PAIR = ("metropolis", "01", "04")
@@ -291,6 +294,19 @@ def test_figures_stand_in_their_sections(text):
     assert "curves" not in change
     assert "curves" in text[text.index('<section id="figures">') :]
     assert "not for the page" not in text
+
+
+def test_legends_of_charts_have_their_markers(tmp_path):
+    (tmp_path / "chart.svg").write_text("<svg/>")
+    styles = method_styles(["solid", "btc"])
+    one = Illustration(tmp_path / "chart", "a chart", "svg", methods=styles)
+    content = make_content(tmp_path, illustrations=[one])
+    write_page(tmp_path / "report.html", content)
+    text = (tmp_path / "report.html").read_text()
+    text = text[text.index('<section id="figures">') :]
+    for name, (colour, _, marker) in styles.items():
+        shape = f'<polygon points="{marker_corners(marker)}" fill="{colour}"/>'
+        assert f"{shape}</svg>{name}</span>" in text
 
 
 def test_recordings_are_linked(tmp_path):

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.results import page as page_module
 from evaluation.results.charts.chart import NARROW, ROW, WIDE
 from evaluation.results.charts.kinds import draw_chart
+from evaluation.results.charts.markers import marker_corners
 from evaluation.results.charts.words import value_words
 from evaluation.results.figure_files import save_figure
 from evaluation.results.page import write_page
@@ -314,6 +314,25 @@ def test_a_scatter_of_points_on_a_line(number):
     assert {bool(style) for _, style, _ in drawn.legend.values()} == {has_curve}
 
 
+def test_a_scatter_says_why_its_curves_end():
+    version = {"database.version": 9}
+    far = [
+        row(1.0, version, "", "tcr_sym", task="change", protocol=""),
+        row(0.2, version, "a"),
+    ]
+    chart = {"kind": "scatter", "x": "tcr_sym", "y": "auc"}
+    words = "; curves end where gaps between points are wide"
+
+    def says_so(rows):
+        return draw_chart(chart, Results.of(rows)).message.endswith(words)
+
+    # The points are from 0 to 0.4, and at 1.
+    assert says_so([*scattered(5).rows, *far])
+    assert not says_so(scattered(5).rows)
+    # There is no curve that could end.
+    assert not says_so([*scattered(4).rows, *far])
+
+
 def test_other_keys_select_rows():
     rows = [*aged().rows, row(0.01, {YEARS: 0}, "mine", gate=True)]
     chart = {"kind": "lines", "over": YEARS, "metric": "auc", "seed": 2}
@@ -560,9 +579,7 @@ def test_a_page_shows_the_markers_of_its_charts():
     names = ["btc", "scan-context++", "mine"]
     styles = method_styles(names)
     corners = [
-        np.array(
-            [c.split(",") for c in page_module._corners(marker).split()], float
-        )
+        np.array([c.split(",") for c in marker_corners(marker).split()], float)
         for _, _, marker in styles.values()
     ]
     square, triangle, cross = corners
