@@ -1,9 +1,10 @@
-"""Estimates of the time that is left, made only if the pace is steady."""
+"""Estimates of the time that is left, from the pace of the work so far."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 
 # An estimate is made once this share of the work is done.
 _LEAST_SHARE = 0.1
@@ -67,10 +68,16 @@ class _JobState:
 # A job that takes less than this share of its expected time was done before. It
 # is left out of the pace.
 _REAL_SHARE = 0.05
+# Work that is older than this share of all work hardly counts in the pace of
+# jobs, which follows the load of the machine.
+_MEMORY = 0.25
 
 
 class TimeLeft:
     """Estimates the time left for jobs from the jobs that have ended.
+
+    The time that these jobs took, divided by their expected time, is the pace
+    of the jobs that are left. Jobs that ended lately count most.
 
     The methods take the present time `now` [s], always of the same clock.
     """
@@ -83,7 +90,10 @@ class TimeLeft:
         """
         self._works = {name: _JobState(cost) for name, cost in costs.items()}
         self._most_running = 1
-        self._pace = Pace()
+        self._total = sum(costs.values())
+        # Expected time of all jobs that gave a pace [s].
+        self._measured = 0.0
+        # Expected and real times of these jobs, weighted sums [s].
         self._expected = 0.0
         self._taken = 0.0
 
@@ -105,24 +115,26 @@ class TimeLeft:
         taken = 0.0 if work.since is None else now - work.since
         work.since, work.is_ended = None, True
         if taken >= _REAL_SHARE * work.cost:
-            self._expected += work.cost * (1.0 - (work.first or 0.0))
-            self._taken += taken
-            self._pace.measure(self._expected, self._taken)
+            expected = work.cost * (1.0 - (work.first or 0.0))
+            kept = math.exp(-expected / (_MEMORY * self._total))
+            self._measured += expected
+            self._expected = kept * self._expected + expected
+            self._taken = kept * self._taken + taken
 
     def share(self) -> float:
         """Returns the share of all work that has ended, 0 to 1."""
         works = self._works.values()
         ended = sum(work.cost for work in works if work.is_ended)
-        return ended / max(sum(work.cost for work in works), 1e-9)
+        return ended / max(self._total, 1e-9)
 
     def seconds(self, now: float) -> float | None:
         """Returns the time left [s]; None while it cannot be estimated."""
         left = [work for work in self._works.values() if not work.is_ended]
         if not left:
             return 0.0
-        pace = self._pace.steady(sum(w.cost for w in self._works.values()))
-        if pace is None:
+        if self._measured < _LEAST_SHARE * self._total or not self._expected:
             return None
+        pace = self._taken / self._expected
         running, waiting = [], []
         for work in left:
             needed = pace * work.cost

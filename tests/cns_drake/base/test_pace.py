@@ -1,4 +1,4 @@
-"""The remaining time is told only from a steady pace."""
+"""The remaining time follows the pace of the work."""
 
 import pytest
 
@@ -58,7 +58,7 @@ def test_nothing_is_told_before_jobs_have_ended():
     assert left.seconds(0.0) is None
     assert left.share() == 0.0
     now = ended(left, "a", 0.0, 20.0)
-    assert left.seconds(now) is None
+    assert left.seconds(now) == pytest.approx(7 * 20.0)
     now = ended(left, "b", now, 20.0)
     assert left.seconds(now) == pytest.approx(6 * 20.0)
     assert left.share() == pytest.approx(0.25)
@@ -66,11 +66,30 @@ def test_nothing_is_told_before_jobs_have_ended():
     assert left.seconds(now) == 0.0
 
 
-def test_jobs_of_another_pace():
-    left = TimeLeft(dict.fromkeys("abcdefgh", 10.0))
-    now = ended(left, "a", 0.0, 20.0)
-    now = ended(left, "b", now, 30.0)
+def test_a_first_small_job_is_no_measure():
+    left = TimeLeft({"a": 1.0, "b": 1.0, "c": 18.0})
+    now = ended(left, "a", 0.0, 1.0)
     assert left.seconds(now) is None
+    now = ended(left, "b", now, 1.0)
+    assert left.seconds(now) == pytest.approx(18.0)
+
+
+def test_the_estimate_follows_the_pace():
+    names = [str(k) for k in range(40)]
+    left = TimeLeft(dict.fromkeys(names, 10.0))
+    now = ended(left, names[:20], 0.0, 10.0)
+    assert left.seconds(now) == pytest.approx(200.0)
+    # Other programs take two thirds of the machine.
+    before = left.seconds(now)
+    for k, name in enumerate(names[20:35]):
+        now = ended(left, [name], now, 30.0)
+        told = left.seconds(now)
+        # It never jumps, and ends near the truth.
+        assert abs(told - before) < 35.0
+        truth = 30.0 * (19 - k)
+        assert 0.3 * truth < told < 1.05 * truth
+        before = told
+    assert before == pytest.approx(5 * 30.0, rel=0.2)
 
 
 def test_jobs_side_by_side():
