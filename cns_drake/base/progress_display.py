@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 import contextlib
 from dataclasses import dataclass, field
 import datetime
+import math
+import re
 import shutil
 import sys
 import threading
@@ -27,6 +29,9 @@ _INTERVAL = 1.8
 _GROWTH = 1 / 30
 # How often it is checked whether something must be shown [s].
 _TICK = 0.25
+# Part of a fingerprint at the end of a job's name, which keeps it unique. Words
+# and dates are none.
+_FINGERPRINT = re.compile(r" (?=\S*\d)(?=\S*[a-f])(?:[0-9a-f]{6}|[0-9a-f]{8})$")
 # Length of a bar [characters].
 _BAR = 20
 
@@ -78,7 +83,7 @@ class _Task:
         if self.total:
             counted = f"{self.done} of {self.total} {self.unit}".rstrip()
         what = ", ".join(filter(None, (self.activity, counted)))
-        return ": ".join(filter(None, (self.name, what)))
+        return ": ".join(filter(None, (shown_name(self.name), what)))
 
     def left(self) -> float | None:
         """Returns the time left for this activity [s], if it can be told."""
@@ -86,6 +91,11 @@ class _Task:
             return None
         pace = self.pace.steady(self.total - self.first)
         return None if pace is None else pace * (self.total - self.done)
+
+
+def shown_name(name: str) -> str:
+    """Returns the name of a job without the fingerprint at its end, if any."""
+    return _FINGERPRINT.sub("", name)
 
 
 def shown_times(elapsed: float, left: float | None) -> str:
@@ -269,9 +279,14 @@ def _share(task: _Task) -> float | None:
 
 
 def _bar(share: float) -> str:
-    """Returns a bar of constant length, for a share from 0 to 1."""
-    full = round(_BAR * min(share, 1.0))
-    return f"[{'#' * full}{'.' * (_BAR - full)}] {100 * share:.0f} %"
+    """Returns a bar of constant length, for a share from 0 to 1.
+
+    The bar is full, and says 100 %, only if everything is done.
+    """
+    # Sums of shares have rounding errors.
+    percent = min(math.floor(100.0 * share + 1e-6), 100)
+    full = _BAR * percent // 100
+    return f"[{'#' * full}{'.' * (_BAR - full)}] {percent} %"
 
 
 @contextlib.contextmanager
@@ -330,7 +345,8 @@ class _JobsDisplay(JobsListener):
         self._num_ended += 1
         self._tasks.pop(name, None)
         if not fault:
-            self._display.print(f"{name}: done, {self._summary()}")
+            shown = shown_name(name)
+            self._display.print(f"{shown}: done, {self._summary()}")
         self._display.refresh()
 
     def rows(self, now: float) -> list[tuple[str, float | None]]:

@@ -8,7 +8,7 @@ import sys
 from helpers.listening import Heard
 import pytest
 
-from cns_drake.base import progress
+from cns_drake.base import progress, progress_display
 from cns_drake.base.progress import doing, heard_by, interlude, listener, track
 from cns_drake.base.progress_display import Display, show_progress, shown_times
 
@@ -276,3 +276,26 @@ def test_one_display_at_a_time():
 def test_durations_are_labelled(seconds, text):
     assert shown_times(seconds, None) == f"elapsed {text}"
     assert shown_times(0.0, seconds) == f"elapsed 0:00, about {text} left"
+
+
+@pytest.mark.parametrize(
+    ("share", "full", "percent"),
+    [(0.0, 0, 0), (0.989, 19, 98), (0.9999, 19, 99), (0.1 * 3 / 0.3, 20, 100)],
+)
+def test_a_bar_is_full_only_at_the_end(share, full, percent):
+    bar = progress_display._bar(share)
+    assert bar == f"[{'#' * full}{'.' * (20 - full)}] {percent} %"
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("place town_01 town_02 59e74dc7", "place town_01 town_02"),
+        ("describe town_01 queries 3fa9c1", "describe town_01 queries"),
+        ("features of facade", "features of facade"),
+        ("features of 20260101", "features of 20260101"),
+        ("town_59e74dc7", "town_59e74dc7"),
+    ],
+)
+def test_fingerprints_of_jobs_are_not_shown(name, shown):
+    assert progress_display.shown_name(name) == shown
