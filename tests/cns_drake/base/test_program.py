@@ -122,3 +122,25 @@ def test_an_argument_that_is_no_text(tmp_path):
     assert result.returncode == 2
     assert result.stderr.count(b"\n") == 1
     assert b"not UTF-8 text" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "suggested"),
+    [("--frame", "--frames"), ("--fames", "--frames")],
+)
+def test_options_that_continue_a_word_are_suggested_alone(
+    capsys, word, suggested
+):
+    app = program.plain_app()
+
+    @app.command()
+    def do(frames: int = 1, frame_names: int = 1, camera_fame: int = 1):
+        pass
+
+    def main():
+        program.run(app, "program", contextlib.nullcontext())
+
+    status, _, err = run_program(capsys, "program", main, word, "3")
+    assert status == 2
+    assert suggested in err
+    assert ("--camera" in err) <= (word == "--fames")
