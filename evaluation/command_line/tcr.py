@@ -117,7 +117,7 @@ def tcr(
 
 def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
     """Yields names and values of the results of `tcr`."""
-    from evaluation.change.drive_change import COVERAGE_RADIUS
+    from evaluation.change.tcr import COVERAGE_RADIUS
 
     change = report.change
     source, target = report.source, report.target
