@@ -239,7 +239,7 @@ class StagesReport:
         report.made_by = [
             f"cns-drake {__version__}",
             *(one.key for one in self.methods if one.settings),
-            self.protocol.to_text(),
+            f"protocol: {self.protocol.to_text()}",
         ]
         results, _ = self._plan.engine.write_tables()
         self._write_second_runs()
