@@ -53,7 +53,10 @@ def reproduce(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.recordings import reproduction
-        from evaluation.command_line.suggestions import suggest_comparison
+        from evaluation.command_line.suggestions import (
+            name_tables,
+            suggest_comparison,
+        )
 
     cluster = choose_cluster(jobs, scheduler)
     if pages and not recordings:
@@ -75,6 +78,7 @@ def reproduce(
             on_note=note,
         )
     typer.echo(report)
+    name_tables(report.parent)
     suggest_comparison(report.parent)
 
 
@@ -167,7 +171,10 @@ def study(
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.studies.study import run_study
-        from evaluation.command_line.suggestions import suggest_comparison
+        from evaluation.command_line.suggestions import (
+            name_tables,
+            suggest_comparison,
+        )
 
     with resumable():
         page = run_study(
@@ -179,6 +186,7 @@ def study(
             on_note=note,
         )
     typer.echo(page)
+    name_tables(output)
     suggest_comparison(output)
 
 

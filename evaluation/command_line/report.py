@@ -40,7 +40,10 @@ def report(
         output: Folder for the report; created if it does not exist.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.command_line.suggestions import suggest_comparison
+    from evaluation.command_line.suggestions import (
+        name_tables,
+        suggest_comparison,
+    )
     from evaluation.paper import reference_for
     from evaluation.study.report_jobs import stages_report
 
@@ -60,4 +63,5 @@ def report(
         with_tables=tables,
     )
     print(path)
+    name_tables(path.parent)
     suggest_comparison(path.parent)

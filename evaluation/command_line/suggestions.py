@@ -1,10 +1,11 @@
-"""Suggests what to run next."""
+"""Names the tables of results, and suggests what to run next."""
 
 import contextlib
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.terminal import next_command
+from cns_drake.base.terminal import next_command, note
+from evaluation.results.table import QUERIES, RESULTS
 from evaluation.results.table_comparison import compare_tables
 
 
@@ -17,3 +18,9 @@ def suggest_comparison(folder: Path) -> None:
     with contextlib.suppress(InputError):
         compare_tables([folder])
         next_command("cns-eval", "compare", folder)
+
+
+def name_tables(folder: Path) -> None:
+    """Prints where the tables beside a page are, unless there are none."""
+    if (folder / RESULTS).is_file():
+        note(f"wrote {folder / RESULTS} and {QUERIES}")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.command_line.suggestions import suggest_comparison
+from evaluation.command_line.suggestions import name_tables, suggest_comparison
 from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
 from evaluation.results.keys import LAST, OWN, STAGE, made_by
 from evaluation.results.metric_tables import _BASELINES
@@ -640,3 +640,11 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
     assert any(
         "old: rows do not say how they were made" in n for n in found.notes
     )
+
+
+def test_tables_beside_a_page_are_named(tmp_path, capsys):
+    name_tables(tmp_path / "a")
+    assert capsys.readouterr().err == ""
+    write_table(tmp_path / "a", {"a": {"x": 0.5}})
+    name_tables(tmp_path / "a")
+    assert capsys.readouterr().err.startswith("wrote ")
