@@ -78,7 +78,7 @@ _SECTIONS = {
     "figures": "Figures",
     "browser": "Queries",
 }
-# The sections that are shown from the start.
+# The sections that are shown from the start, as is an only section.
 _OPEN = ("summary", "browser")
 _SCRIPTS = ("state.js", "pictures.js", "page.js")
 
@@ -174,8 +174,13 @@ def write_page(path: Path, report: Report) -> None:
     if report.compared:
         forms.append(f"Beside {report.reference.title}")
     forms_of_table = zip(forms, tables["place_recognition"], strict=True)
-    # A section without an entry is always there.
+    content = _content(report, tables)
     has_section = {
+        "summary": any(
+            content[name]
+            for name in ("headline", "survival_summary", "judgements")
+        )
+        or bool(report.pages),
         "survival": bool(report.survivals),
         "maps": bool(drives_of_maps),
         "change": bool(tables["tcr"][0].rows or illustrations["change"]),
@@ -184,7 +189,7 @@ def write_page(path: Path, report: Report) -> None:
         "browser": bool(report.recognitions),
     }
     values = {
-        **_content(report, tables),
+        **content,
         "illustrations": illustrations,
         "survivals_by_pair": by_pair(report.survivals),
         "drives_of_maps": drives_of_maps,
@@ -198,10 +203,10 @@ def write_page(path: Path, report: Report) -> None:
             name,
             word,
             Markup(_render(f"section_{name}.html", **values)),
-            is_open=name in _OPEN,
+            is_open=name in _OPEN or sum(has_section.values()) == 1,
         )
         for name, word in _SECTIONS.items()
-        if has_section.get(name, True)
+        if has_section[name]
     ]
     text = framed_page(
         _TITLE,

@@ -169,8 +169,10 @@ def nothing_to_compare(cities: Iterable[MapDrives]) -> list[str]:
     return [
         f"{city.name}: nothing to compare: all drives are through stage"
         f" {', '.join(city.stages)}. A report compares drives through two"
-        " stages: `cns-drake import --years` makes stages of a real city, and"
-        " a second drive (sequence_NN.yaml) goes through one of them."
+        " stages of a city: add a drive through another stage to the folder."
+        " The shipped drives of a city (cns-drake simulate), such as"
+        " riverside_01 and riverside_02, go through different stages."
+        " cns-drake import --years makes stages of a real city."
         " --exclude-recent compares a drive with itself."
         + (
             _GUESSED

@@ -417,6 +417,20 @@ def test_page_without_recognition_has_no_browser(content, tmp_path):
     assert re.findall(r'<a href="#(\w+)">', text) == ["summary", "maps"]
 
 
+def test_a_page_without_pairs_has_no_ranking(tmp_path):
+    empty = make_content(
+        tmp_path,
+        recognitions=[],
+        pairs=[],
+        illustrations=[],
+        reference=Reference(),
+    )
+    write_page(tmp_path / "report.html", empty)
+    text = (tmp_path / "report.html").read_text()
+    assert re.findall(r'<a href="#(\w+)">', text) == ["maps"]
+    assert '<details class="part" open>' in text
+
+
 def test_a_page_says_what_made_it(tmp_path):
     words = ["cns-drake 9.9", "solid rings=8 & more"]
     content = make_content(tmp_path, made_by=words)

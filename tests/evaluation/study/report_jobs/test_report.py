@@ -500,6 +500,9 @@ def test_report_of_a_single_stage(tmp_path):
     (note,) = notes
     assert note.startswith(said)
     assert "--years" in note
+    assert "a drive through another stage" in note
+    # Notes are shown as they are.
+    assert "`" not in note
     assert "Temporal change ratio" not in text
     page = path.read_text()
     assert "Queries, one by one" not in page
