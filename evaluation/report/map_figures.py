@@ -4,10 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -215,19 +218,24 @@ def _draw_panels(
     legend: Legend = (),
     routes: Sequence[np.ndarray] = (),
 ) -> None:
-    """Draws pictures side by side, of equal height; the legend stands below."""
-    shapes = [(e[1] - e[0], e[3] - e[2]) for e in (p.extent for p in pictures)]
-    tallest = max(height / width for width, height in shapes)
+    """Draws pictures side by side; the legend stands below.
+
+    All panels show the same part of the picture plane, at one scale.
+    """
+    extents = np.array([picture.extent for picture in pictures])
+    left, bottom = extents[:, [0, 2]].min(axis=0)
+    right, top = extents[:, [1, 3]].max(axis=0)
+    shape = (top - bottom) / (right - left)
     figure = Figure(
         figsize=(
             _PANEL_INCHES * len(pictures),
-            _PANEL_INCHES * min(tallest, 1.6) + 0.4,
+            _PANEL_INCHES * min(shape, 1.6) + 0.4,
         ),
         layout="constrained",
     )
     panels = figure.subplots(1, len(pictures), squeeze=False)[0]
     for axes, title, picture in zip(panels, titles, pictures, strict=True):
-        _show(axes, picture)
+        _show(axes, picture, (left, right, bottom, top))
         axes.set_title(escape_dollars(title), fontsize=9)
     for axes, route in zip(panels, routes, strict=False):
         _draw_route(axes, route)
@@ -244,16 +252,27 @@ def _draw_panels(
     save_figure(figure, stem, PIXELS)
 
 
-def _show(axes: Axes, picture: Picture) -> None:
-    """Shows a picture, axes in metres, with a scale bar."""
+def _show(
+    axes: Axes, picture: Picture, limits: tuple[float, float, float, float]
+) -> None:
+    """Shows a picture, axes in metres, with a scale bar.
+
+    Args:
+        axes: panel to draw in.
+        picture: the picture.
+        limits: left, right, bottom and top of the panel [m].
+    """
     axes.imshow(
         picture.image, extent=picture.extent, interpolation="antialiased"
     )
     axes.set_axis_off()
-    left, right, bottom, top = picture.extent
+    left, right, bottom, top = limits
     end = right - 0.03 * (right - left)
     base = bottom + 0.03 * (top - bottom)
-    axes.plot([end - _SCALE_BAR, end], [base, base], color="black", linewidth=2)
+    bar = [end - _SCALE_BAR, end]
+    # White rims keep the bar and its length legible on dark walls.
+    (line,) = axes.plot(bar, [base, base], color="black", linewidth=2)
+    line.set_path_effects([withStroke(linewidth=5, foreground="white")])
     axes.annotate(
         f"{_SCALE_BAR:.0f} m",
         (end - 0.5 * _SCALE_BAR, base),
@@ -261,6 +280,7 @@ def _show(axes: Axes, picture: Picture) -> None:
         textcoords="offset points",
         ha="center",
         fontsize=8,
+        path_effects=[withStroke(linewidth=3, foreground="white")],
     )
     axes.set(xlim=(left, right), ylim=(bottom, top))
 
@@ -279,6 +299,15 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
         capstyle="round",
     )
     axes.add_collection(segments)
-    for end, marker, label in ((0, "^", "start"), (-1, "s", "end")):
-        axes.plot(*line[end], marker, color="black", markersize=6, label=label)
-    axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
+    colours = colormaps[ROUTE_COLOURS]
+    ends = ((0, "^", "start"), (-1, "s", "end"))
+    for end, marker, _ in ends:
+        axes.plot(*line[end], marker, color="black", markersize=6)
+    key = [
+        Line2D(
+            [], [], color=colours(float(end != 0)), lw=2, label=label,
+            marker=marker, ms=6, mfc="black", mec="black",
+        )
+        for end, marker, label in ends
+    ]  # fmt: skip
+    axes.legend(handles=key, fontsize=7, loc="upper right", framealpha=0.8)

@@ -10,8 +10,12 @@ import pytest
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.methods import shipped_methods
-from evaluation.report import curve_figures
-from evaluation.report.map_figures import top_view, voxel_of_each
+from evaluation.report import curve_figures, map_figures
+from evaluation.report.map_figures import (
+    draw_routes,
+    top_view,
+    voxel_of_each,
+)
 from evaluation.results.figure_files import PIXELS, save_figure
 from evaluation.results.figure_text import name_lines
 
@@ -28,6 +32,35 @@ def test_view_from_above_shows_the_route_and_60_m_around():
     # Without a point in view the whole map is shown.
     far = top_view(line, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
+
+
+def test_panels_of_routes_show_the_same_part_with_a_legible_scale(
+    tmp_path, monkeypatch
+):
+    drawn = []
+    monkeypatch.setattr(
+        map_figures, "save_figure", lambda figure, *_: drawn.append(figure)
+    )
+    route = np.array([[0.0, 0.0, 1.6], [60.0, 0.0, 1.6]])
+    x = np.arange(-50.0, 110.0, 0.5)
+    wide = np.stack([x, 0.4 * x, np.zeros_like(x)], axis=1)
+    views = [top_view(wide[cut], route) for cut in (slice(240), slice(90, 320))]
+    draw_routes("town", ["01", "02"], views, [route, route], tmp_path / "a")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    first, second = figure.axes
+    assert first.get_xlim() == second.get_xlim()
+    assert first.get_ylim() == second.get_ylim()
+    np.testing.assert_allclose(first.get_xlim(), [-50.0, 110.0], atol=2.0)
+    boxes = [axes.get_window_extent() for axes in figure.axes]
+    np.testing.assert_allclose(boxes[0].size, boxes[1].size, atol=0.01)
+    assert boxes[0].y0 == pytest.approx(boxes[1].y0, abs=0.01)
+    for axes in figure.axes:
+        (label,) = axes.texts
+        assert label.get_text() == "50 m"
+        assert label.get_path_effects()
+        key = axes.get_legend().get_texts()
+        assert [text.get_text() for text in key] == ["start", "end"]
 
 
 def test_points_of_pictures_have_their_voxels():
