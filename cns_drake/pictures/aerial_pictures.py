@@ -2,10 +2,14 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 import numpy as np
 
 from cns_drake.pictures.camera_views import View
@@ -22,6 +26,18 @@ _MARGIN = 40.0
 _CAMERA_HEIGHT = 1200.0
 # Red at the start and blue at the end, as in the paper.
 _COLOURS = "turbo_r"
+# Values of the colours at the start and at the end of a route.
+_COLOUR_RANGE = 0.04, 0.92
+# Markers of the start and of the end of a route.
+_MARKERS = {"start": "o", "end": "s"}
+_MARKER_STYLE: dict[str, Any] = {
+    "markersize": 8,
+    "mfc": "white",
+    "mec": "black",
+}
+# Possible lengths of the scale bar [m], which is at most a quarter as wide as
+# a picture.
+_SCALE_BARS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 # Number of points at which a route is drawn.
 _POINTS = 400
 # Number of drives side by side.
@@ -34,6 +50,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     """Draws drives in two columns of panels, seen from above, with north up.
 
     All panels show the same part of the world, so that they can be compared.
+    Each has a scale bar. A key at the bottom explains colours and markers.
 
     Args:
         scenarios: title -> scenario of each drive.
@@ -54,7 +71,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     rows = -(-len(drives) // _COLUMNS)
     columns = min(len(drives), _COLUMNS)
     figure = Figure(
-        figsize=(columns * _PANEL_INCHES, rows * (_PANEL_INCHES + 0.25)),
+        figsize=(columns * _PANEL_INCHES, rows * (_PANEL_INCHES + 0.3) + 0.4),
         layout="constrained",
     )
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -71,6 +88,8 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
         axes.imshow(pictures[world])
         axes.set_title(title)
         _draw_route(axes, view, positions)
+        _draw_scale_bar(axes, view)
+    _draw_key(figure)
     save_figure(figure, path, dpi=150)
 
 
@@ -100,11 +119,51 @@ def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
         LineCollection(segments, colors="white", linewidths=widths + 1.5)
     )
     line = LineCollection(segments, cmap=_COLOURS, linewidths=widths)
-    line.set_array(np.linspace(0.04, 0.92, len(segments)))
+    line.set_array(np.linspace(*_COLOUR_RANGE, len(segments)))
     line.set_clim(0, 1)
     axes.add_collection(line)
-    for place, marker in ((pixels[0], "o"), (pixels[-1], "s")):
-        axes.plot(
-            *place, marker, markersize=8, markerfacecolor="white",
-            markeredgecolor="black",
-        )  # fmt: skip
+    ends = pixels[0], pixels[-1]
+    for place, marker in zip(ends, _MARKERS.values(), strict=True):
+        axes.plot(*place, marker, **_MARKER_STYLE)
+
+
+def _draw_scale_bar(axes: Axes, view: View) -> None:
+    """Draws a scale bar, for lengths on the ground, and its length.
+
+    Both lie in the margin below the routes.
+    """
+    # The view looks straight down at its target.
+    half = _CAMERA_HEIGHT * np.tan(np.deg2rad(view.fov_y_deg) / 2)
+    length = max(one for one in _SCALE_BARS if one <= half / 2)
+    end, base = 0.97 * _SIDE, 0.97 * _SIDE
+    start = end - length * _SIDE / (2 * half)
+    # White rims keep the bar and its length legible on roofs and trees.
+    (bar,) = axes.plot([start, end], [base, base], color="black", linewidth=3)
+    bar.set_path_effects([withStroke(linewidth=6, foreground="white")])
+    axes.annotate(
+        f"{length} m",
+        (start, base),
+        xytext=(-6, 0),
+        textcoords="offset points",
+        ha="right",
+        va="center_baseline",
+        path_effects=[withStroke(linewidth=3, foreground="white")],
+    )
+
+
+def _draw_key(figure: Figure) -> None:
+    colours = colormaps[_COLOURS](_COLOUR_RANGE)
+    figure.legend(
+        handles=[
+            Line2D(
+                [], [], color=colour, lw=4, marker=marker, label=label,
+                **_MARKER_STYLE,
+            )
+            for (label, marker), colour in zip(
+                _MARKERS.items(), colours, strict=True
+            )
+        ],
+        loc="outside lower center",
+        ncols=len(_MARKERS),
+        frameon=False,
+    )  # fmt: skip

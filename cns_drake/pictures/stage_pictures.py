@@ -14,6 +14,8 @@ from cns_drake.sensors.lidar.presets import make_beam_pattern
 # Size of a camera's view [pixels].
 _WIDTH = 704
 _HEIGHT = 396
+# Distance at which the colours of points end [m].
+_FARTHEST = 100.0
 # Height of the LiDAR, which stands below the camera [m].
 _SENSOR_HEIGHT = 1.6
 
@@ -23,7 +25,8 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
 
     Under the picture of each stage is a picture of a scan. The LiDAR stands on
     the ground below the camera. The points of the scan are drawn as seen from
-    the camera, coloured by distance.
+    the camera, coloured by distance from the LiDAR; a colour bar is at the
+    bottom.
 
     Args:
         stages: title -> SDF file of each stage, from left to right.
@@ -34,7 +37,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         InputError: a world cannot be loaded, or the picture cannot be written.
     """
     figure = Figure(
-        figsize=(3.2 * len(stages), 2 * 1.8 + 0.3), layout="constrained"
+        figsize=(3.2 * len(stages), 2 * 1.8 + 0.9), layout="constrained"
     )
     axes = figure.subplots(2, len(stages), squeeze=False)
     for column, (title, world) in enumerate(stages.items()):
@@ -42,9 +45,9 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
         axes[0, column].imshow(scene.photograph(view, _WIDTH, _HEIGHT))
         axes[0, column].set_title(title)
         pixels, distances = _scan_seen_by(scene, view)
-        axes[1, column].scatter(
-            *pixels.T, c=distances, s=0.4, cmap="viridis_r", vmin=0, vmax=100,
-            linewidths=0, rasterized=True,
+        points = axes[1, column].scatter(
+            *pixels.T, c=distances, s=0.4, cmap="viridis_r", vmin=0,
+            vmax=_FARTHEST, linewidths=0, rasterized=True,
         )  # fmt: skip
         axes[1, column].set_xlim(0, _WIDTH)
         axes[1, column].set_ylim(_HEIGHT, 0)
@@ -52,6 +55,10 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     for axis in axes.flat:
         axis.set_xticks([])
         axis.set_yticks([])
+    figure.colorbar(
+        points, ax=axes, location="bottom", shrink=0.5, aspect=40,
+        extend="max", label="distance from the LiDAR [m]",
+    )  # fmt: skip
     save_figure(figure, path, dpi=220)
 
 

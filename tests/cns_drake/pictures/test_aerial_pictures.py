@@ -1,12 +1,20 @@
 """Drives from above: the view shows all of them, north up."""
 
 from helpers.small_map import write_small_map
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 import numpy as np
 import pytest
 import yaml
 
-from cns_drake.pictures.aerial_pictures import draw_drives, view_from_above
+from cns_drake.pictures.aerial_pictures import (
+    _SIDE,
+    _draw_key,
+    _draw_scale_bar,
+    draw_drives,
+    view_from_above,
+)
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_drives
 
@@ -23,6 +31,31 @@ def test_the_view_shows_every_position_north_up():
     assert np.corrcoef(pixels[:, 1], positions[:, 1])[0, 1] < -0.999
     # The drives fill the picture: the margin is 40 m on 400 m of width.
     assert np.ptp(pixels[:, 0]) > 380
+
+
+@pytest.mark.parametrize(
+    ("width", "bar"), [(20.0, "20 m"), (320.0, "100 m"), (4000.0, "1000 m")]
+)
+def test_scale_bar_has_its_length(width, bar):
+    view = view_from_above(np.array([[-width / 2, 9, 5], [width / 2, 9, 5]]))
+    axes = Figure().subplots()
+    _draw_scale_bar(axes, view)
+    assert axes.texts[0].get_text() == bar
+    length = float(bar.split()[0])
+    ends = np.array([[0.0, 9.0, 5.0], [length, 9.0, 5.0]])
+    pixels, _ = view.project(ends, _SIDE, _SIDE)
+    left, right = axes.lines[0].get_xdata()
+    assert right - left == pytest.approx(np.ptp(pixels[:, 0]))
+
+
+def test_key_names_both_ends_of_a_route():
+    figure = Figure()
+    _draw_key(figure)
+    (key,) = figure.legends
+    assert [text.get_text() for text in key.get_texts()] == ["start", "end"]
+    red, blue = (np.array(to_rgb(one.get_color())) for one in key.get_lines())
+    assert red.argmax() == 0
+    assert blue.argmax() == 2
 
 
 @pytest.mark.night

@@ -69,9 +69,9 @@ def test_stages_are_drawn_side_by_side(small_map, tmp_path):
     middle = picture.shape[1] // 2
     left, right = picture[:, :middle, :3], picture[:, -middle:, :3]
     assert np.abs(left - right).max() > 0.2  # The stages differ,
-    # and both halves of both rows show something.
+    # and both halves of both rows, above the colour bar, show something.
     for half in (left, right):
-        for rows in np.array_split(half, 2):
+        for rows in np.array_split(half[: int(0.85 * len(half))], 2):
             assert rows.std() > 0.02
     assert [p.name for p in path.parent.iterdir()] == ["stages.png"]
 
