@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cns_drake.base.complete_files import check_folder_writable
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.cluster import Cluster
@@ -190,7 +189,6 @@ class Study:
                     f"{self.output / name}: results of another command; give"
                     " another folder"
                 )
-        check_folder_writable(self.output)
         self._note_lower_levels()
         found = list(self._maps.pairs(maps))
         doing("looking at all conditions")
