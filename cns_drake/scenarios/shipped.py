@@ -112,8 +112,11 @@ def unpacked(archive: Path) -> Path:
     """Returns a folder with the files of an archive, unpacked only once.
 
     The folder is in the user's cache. The folder's name contains a digest of
-    the archive, so that each release has a folder of its own. Several processes
-    may call the function at the same time.
+    the archive, so that each release has a folder of its own.
+
+    Several processes may call the function at the same time: each unpacks to a
+    temporary folder and then renames it, so that the folder is always whole,
+    and the first process to finish provides it.
 
     Args:
         archive: a tar file, compressed by any method.
