@@ -61,6 +61,8 @@ def judge_scans(
         The result of `evaluation.real.judge.judge_draws`; None for a data set
         of a single place.
     """
+    # Imported here: the module needs the optional packages of the extra
+    # `judge`. Studies without this task must work without these packages.
     from evaluation.real import judge
 
     drive = source()
