@@ -3,6 +3,11 @@
 Part of layered overlap (see `evaluation.methods.layered_overlap`). All
 arithmetic is in integers: sines and cosines are in units of 2^-14, positions in
 half cells. Counts are therefore the same on every processor.
+
+A cell is packed into 16 bits, see `layer_cells`: the upper byte is its row, the
+lower byte its column. Its centre lies 2 * row + 1 - GRID and
+2 * column + 1 - GRID half cells from the sensor, which is at the corner between
+the four middle cells. In half cells, centres are therefore whole numbers.
 """
 
 import math
@@ -81,6 +86,7 @@ def coarse_maps(
                 v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
                 x = c * u - s * v + (GRID << _UNIT_BITS)
                 y = s * u + c * v + (GRID << _UNIT_BITS)
+                # One bit more than the unit turns half cells into cells.
                 row = x >> (_UNIT_BITS + 1 + halvings)
                 column = y >> (_UNIT_BITS + 1 + halvings)
                 if 0 <= row < rows and 0 <= column < rows:
@@ -292,6 +298,7 @@ def _count_common(
         for i in range(starts[layer], starts[layer + 1]):
             u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
             v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
+            # One bit more than the unit turns half cells into cells.
             row = (c * u - s * v + right) >> (_UNIT_BITS + 1)
             column = (s * u + c * v + up) >> (_UNIT_BITS + 1)
             row = _MARGIN + min(max(row, -1 - step), last)
