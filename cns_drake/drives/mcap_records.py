@@ -41,17 +41,30 @@ _CHUNK_TIME = struct.Struct("<Q")
 # chunk holds a few scans.
 CHUNK_LIMIT_BYTES = 1 << 26
 _LAST_OPCODE = max(Opcode)
-# The beginning of a chunk: the record's opcode and length, two times, size and
-# checksum of the content, compression, length of the compressed content. A
-# lookahead, so that a false beginning hides no true one.
+# Size of a chunk's fields before its compression: the times of its earliest and
+# latest message, and size and checksum of the uncompressed content [bytes].
+_CHUNK_FIELDS_SIZE = struct.calcsize("<QQQI")
+# Size of the length of a record, or of a chunk's compressed content [bytes].
+_LENGTH_SIZE = struct.calcsize("<Q")
+# Size of the longest name of a compression, with its length before it [bytes].
+_LONGEST_COMPRESSION = 4 + len("zstd")
+# The beginning of a chunk: the record's opcode and length, fields, compression,
+# length of the compressed content. A lookahead, so that a false beginning hides
+# no true one.
 _CHUNK_START = re.compile(
-    rb"(?=\x06(?P<length>.{8}).{28}"
+    rb"(?=\x06(?P<length>.{%d}).{%d}"
     rb"(?P<compression>\x04\0{3}zstd|\x03\0{3}lz4|\0{4})"
-    rb"(?P<content_length>.{8}))",
+    rb"(?P<content_length>.{%d}))"
+    % (_LENGTH_SIZE, _CHUNK_FIELDS_SIZE, _LENGTH_SIZE),
     re.DOTALL,
 )
-# Length of that beginning, with the longest name of a compression [bytes].
-_LONGEST_CHUNK_START = 9 + 28 + 8 + 8
+# Greatest length of that beginning [bytes].
+_LONGEST_CHUNK_START = (
+    RECORD_HEADER.size
+    + _CHUNK_FIELDS_SIZE
+    + _LONGEST_COMPRESSION
+    + _LENGTH_SIZE
+)
 # Blocks in which a file is searched grow from the first to the last size
 # [bytes].
 _FIRST_SEARCH_BLOCK = 4096
@@ -282,7 +295,10 @@ def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
 
 
 def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
-    """Returns the position of the next bytes that look like a chunk."""
+    """Returns the position of the next bytes that look like a chunk.
+
+    The result is None if there is no further chunk.
+    """
     block_size = _FIRST_SEARCH_BLOCK
     while start < size:
         stream.seek(start)
@@ -293,7 +309,7 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
                 match.group, ("length", "compression", "content_length")
             )
             # The record ends with the chunk's content.
-            fields = 28 + len(compression) + 8
+            fields = _CHUNK_FIELDS_SIZE + len(compression) + _LENGTH_SIZE
             if (
                 int.from_bytes(length, "little")
                 == int.from_bytes(content_length, "little") + fields
