@@ -11,7 +11,9 @@ from cns_drake.base.repetitions import repeated
 _DEEPEST = 50
 _STRING = re.compile(rb'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _NO_BRACKET = re.compile(rb"[^][{}]+")
-# Escapes of a zero, or of half a pair of surrogates.
+# An escape of a zero, or of a surrogate, which may lack its other half. JSON in
+# UTF-8 can write these characters only as escapes, and neither a zero nor half
+# of a pair is text.
 _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 
 
@@ -40,16 +42,26 @@ def parse_json(data: bytes) -> Any:
     steps = (1 if bracket in b"[{" else -1 for bracket in brackets)
     if max(itertools.accumulate(steps), default=0) > _DEEPEST:
         raise ValueError(f"nested more than {_DEEPEST} deep")
+    # The strings are read one by one only if there is a suspect escape.
     if _SUSPECT.search(data):
-        # Both can be written only as escapes, and neither is text.
-        for string in _STRING.findall(data):
-            if "\0" in (word := json.loads(string)):
-                raise ValueError("a zero in a text")
-            try:
-                word.encode()
-            except UnicodeEncodeError:
-                raise ValueError("half of a pair of surrogates") from None
+        _check_strings(data)
     return json.loads(text, object_pairs_hook=_without_doubles)
+
+
+def _check_strings(data: bytes) -> None:
+    """Checks that no string of JSON has a zero or half a pair of surrogates.
+
+    Raises:
+        ValueError: a string has one of them.
+    """
+    for string in _STRING.findall(data):
+        text = json.loads(string)
+        if "\0" in text:
+            raise ValueError("a zero in a text")
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            raise ValueError("half of a pair of surrogates") from None
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
