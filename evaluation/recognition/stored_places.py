@@ -67,18 +67,28 @@ class StoredDrives:
     ) -> DescribedScans:
         """Returns places with their descriptors, and with clouds if kept.
 
+        If the places are of several groups, their descriptors are read only
+        when they are used, and there are no clouds.
+
         Args:
             places: D places of these drives without descriptors.
             drive_of: (D,) number of the drive of each place, non-decreasing.
             rows: (D,) number of each place among the places of its drive.
         """
         stored = StoredDescriptors(self, drive_of, rows)
+        # The descriptors of several groups do not fit into memory together, so
+        # that a search reads one group after the other. Clouds would fit even
+        # less; only a method's second stage needs them.
         if len(stored.groups) > 1:
             return replace(places, descriptors=stored)
+        kept = [self.drive(k).places.clouds for k in drive_of.tolist()]
         clouds = []
-        for k, row in zip(drive_of.tolist(), rows.tolist(), strict=True):
-            if known := self.drive(k).places.clouds:
-                clouds.append(known[row])
+        # Either each place has a cloud, or none has.
+        if all(kept):
+            clouds = [
+                of_drive[row]
+                for of_drive, row in zip(kept, rows.tolist(), strict=True)
+            ]
         return replace(places, descriptors=stored[:], clouds=clouds)
 
     def undescribed(self, number: int) -> DescribedScans:
