@@ -309,6 +309,20 @@ def test_legends_of_charts_have_their_markers(tmp_path):
         assert f"{shape}</svg>{name}</span>" in text
 
 
+def test_means_without_intervals_are_explained(tmp_path):
+    content = make_content(tmp_path)
+    for low, is_told in ((0.0, False), (nan, True)):
+        rows = [
+            replace(row, low=low, high=low) if row.metric == "auc" else row
+            for row in content.results.rows
+        ]
+        changed = make_content(tmp_path, results=Results.of(rows))
+        write_page(tmp_path / "report.html", changed)
+        text = (tmp_path / "report.html").read_text()
+        assert ("The means have no intervals" in text) == is_told
+        assert ("95&nbsp;% intervals" in text) != is_told
+
+
 def test_recordings_are_linked(tmp_path):
     content = make_content(tmp_path, pages=PAGES)
     write_page(tmp_path / "report.html", content)
