@@ -55,7 +55,7 @@ _RANGES = (
     ),
     (r"mean_reciprocal_rank|(match_)?auroc\w*|(\w+_)?m?iou\w*|p", _SHARE),
     (r"(\w+_)?kept\w*|retained\w*|\w+_retained", _NOT_NEGATIVE),
-    (r"with_match|n_with_a_match|queries|wrong|tp?_of_[\w@]+", _COUNT),
+    (r"with_match|n_with_a_match|queries|wrong|(tp|fp_fn)_of_[\w@]+", _COUNT),
     (r"(of_)?places|scans_a_place|first_right_rank", _COUNT),
     (r"accepted_matches", _COUNT),
     (r"no_\w+|just_too_far|other_\w+|too_far|twin|elsewhere", _COUNT),
