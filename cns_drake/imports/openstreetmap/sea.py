@@ -83,8 +83,8 @@ def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
     """Returns whether an area is on the right of most of its coastline."""
     shapely.prepare(area)
     # Length of coast that has the area on its right, minus the length that has
-    # it on its left.
-    right = 0.0
+    # it on its left [m].
+    balance = 0.0
     for coast in coasts:
         points = np.array(coast.coords)
         steps = np.diff(points, axis=0)
@@ -97,5 +97,6 @@ def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
         )
         for side in (1.0, -1.0):
             places = shapely.points(middles + side * aside)
-            right += side * float(length[shapely.contains(area, places)].sum())
-    return right > 0.0
+            beside = length[shapely.contains(area, places)]
+            balance += side * float(beside.sum())
+    return balance > 0.0
