@@ -10,6 +10,14 @@ from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.random_numbers import cell_number
 
+# Unit vectors along the axes of the hash cells, as the rows of a rotation
+# matrix. The axes are oblique to those of a surface's frame, so that walls and
+# floors do not cut the cells along their faces.
+_AXES = (
+    (0.7071, 0.5417, 0.4545),
+    (-0.6124, 0.7899, 0.0113),
+    (-0.3529, -0.2863, 0.8908),
+)
 # Edge of large cells of equal albedo, such as repaired areas [m].
 _AREA_SIZE = 5.0
 # Edge of middle-sized cells of equal albedo (patches) [m].
@@ -18,8 +26,22 @@ _PATCH_SIZE = 0.35
 _GRAIN_SIZE = 0.06
 # How much the brightness varies between large cells.
 _AREA_CONTRAST = 0.15
+# How much brighter the brightest patch is.
+_BRIGHTEST_PATCH = 0.4
+# How fast the brightness decreases towards the darkest patch.
+_PATCH_DECREASE = 0.085
 # How much darker the darkest stain is.
 _DARKEST_STAIN = 1.15
+# Factor of the stained part of an area. Its product with the mean of the square
+# that distributes stains among areas, 4 / 3, is 2: the range of `patch`.
+_STAIN_FACTOR = 1.5
+# Height of tufts, as a share of the greatest height: the mean, and the
+# amplitudes from patch to patch and from grain to grain.
+_TUFT_MEAN = 0.5
+_TUFT_OF_PATCH = 0.35
+_TUFT_OF_GRAIN = 0.15
+# Least slope of a beam that ends on tufts or swell.
+_LEAST_SLOPE = 0.01
 # Height of a wall's courses [m].
 _COURSE_HEIGHT = 0.3
 # How far a wall's courses protrude, as a share of the objects on the wall.
@@ -57,8 +79,7 @@ def with_texture(
     Each spot of a surface has an albedo and a height above the mean surface.
     Albedo and height are hashes of the spot's position in the surface's own
     frame, so that all scans of all drives find the same values at a spot.
-    Bright spots are higher than dark spots, so their distances are shorter. The
-    axes of the hash cells are not parallel to walls or floors.
+    Bright spots are higher than dark spots, so their distances are shorter.
 
     Args:
         light: the light that smooth, uniform surfaces would return.
@@ -85,16 +106,14 @@ def with_texture(
         ray = row[beam[k]]
         frame = frame_of[geometry[k]]
         place = ray % len(p_WSset) if len(p_WSset) > 1 else 0
-        x = y = z = 0.0
-        for i in range(3):
-            away = p_WSset[place, i] - p_WLset[frame, i]
-            away += distance[k] * d_Wset[ray, i]
-            x += normal_matrices[frame, i, 0] * away
-            y += normal_matrices[frame, i, 1] * away
-            z += normal_matrices[frame, i, 2] * away
-        a = 0.7071 * x + 0.5417 * y + 0.4545 * z
-        b = -0.6124 * x + 0.7899 * y + 0.0113 * z
-        c = -0.3529 * x - 0.2863 * y + 0.8908 * z
+        x, y, z = _position_on_surface(
+            p_WSset[place],
+            d_Wset[ray],
+            distance[k],
+            normal_matrices[frame],
+            p_WLset[frame],
+        )
+        a, b, c = _along_cells(x, y, z)
         grain = cell_number(a / _GRAIN_SIZE, b / _GRAIN_SIZE, c / _GRAIN_SIZE)
         patch = cell_number(a / _PATCH_SIZE, b / _PATCH_SIZE, c / _PATCH_SIZE)
         area = cell_number(a / _AREA_SIZE, b / _AREA_SIZE, c / _AREA_SIZE)
@@ -102,24 +121,94 @@ def with_texture(
         energy[k] *= (1.0 + share) / (1.0 - share)
         distance[k] -= relief[geometry[k]] * grain
         if tufts[geometry[k]] + swell[geometry[k]] > 0.0:
-            # A tall blade stops a flat beam far in front of the blade's foot.
-            down = max(-d_Wset[ray, 2], 0.01)
-            height = 0.5 + 0.35 * patch + 0.15 * grain
-            height *= tufts[geometry[k]]
+            height = tufts[geometry[k]] * _tuft_share(patch, grain)
             if swell[geometry[k]] > 0.0:
                 height += swell[geometry[k]] * _swell(a, b)
             height += _MEAN_HEIGHT_ERROR * distance[k] * grain
+            # A tall blade stops a flat beam far in front of the blade's foot.
+            down = max(-d_Wset[ray, 2], _LEAST_SLOPE)
             distance[k] -= max(min(height / down, _MOST_SHIFT), -_MOST_SHIFT)
         out = fittings[geometry[k]]
         if out > 0.0:
-            course = cell_number(0.0, 0.0, z / _COURSE_HEIGHT)
-            distance[k] -= _COURSE_SHARE * out * course
-            fitting = cell_number(
-                a / _FITTING_WIDTH, b / _FITTING_WIDTH, z / _FITTING_HEIGHT
-            )
-            if fitting > 1.0 - 2.0 * _FITTING_SHARE:
-                distance[k] -= out * (0.5 + 0.5 * patch)
+            distance[k] -= _course(out, z)
+            distance[k] -= _fitting(out, a, b, z, patch)
     return Light(light.beam, distance, energy, light.geometry)
+
+
+@compiled
+def _position_on_surface(
+    p_WS: np.ndarray,
+    d_W: np.ndarray,
+    distance: float,
+    normal_matrix: np.ndarray,
+    p_WL: np.ndarray,
+) -> tuple[float, float, float]:
+    """Returns the end of a beam in the frame of the surface that it meets [m].
+
+    Args:
+        p_WS: (3,) position of the sensor in the world [m].
+        d_W: (3,) unit direction of the beam in the world.
+        distance: length of the beam [m].
+        normal_matrix, p_WL: row of the surface's frame in the arrays of
+            `SurfaceFrames`.
+    """
+    x = y = z = 0.0
+    for i in range(3):
+        away = p_WS[i] - p_WL[i]
+        away += distance * d_W[i]
+        x += normal_matrix[i, 0] * away
+        y += normal_matrix[i, 1] * away
+        z += normal_matrix[i, 2] * away
+    return x, y, z
+
+
+@compiled
+def _along_cells(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Converts a position to coordinates along the axes of the hash cells."""
+    first, second, third = _AXES
+    return (
+        first[0] * x + first[1] * y + first[2] * z,
+        second[0] * x + second[1] * y + second[2] * z,
+        third[0] * x + third[1] * y + third[2] * z,
+    )
+
+
+@compiled
+def _tuft_share(patch: float, grain: float) -> float:
+    """Returns the height of a tuft as a share, 0 to 1, of the greatest height.
+
+    `patch` and `grain` are as in `_albedo_share`.
+    """
+    return _TUFT_MEAN + _TUFT_OF_PATCH * patch + _TUFT_OF_GRAIN * grain
+
+
+@compiled
+def _course(out: float, z: float) -> float:
+    """Returns how far a wall's course protrudes [m]; less than 0: recedes.
+
+    Args:
+        out: greatest reach of the objects on the wall [m].
+        z: height in the wall's frame [m].
+    """
+    return _COURSE_SHARE * out * cell_number(0.0, 0.0, z / _COURSE_HEIGHT)
+
+
+@compiled
+def _fitting(out: float, a: float, b: float, z: float, patch: float) -> float:
+    """Returns how far an object on a wall protrudes [m]; 0 without an object.
+
+    Args:
+        out: greatest reach of the objects [m].
+        a, b: first two coordinates along the axes of the hash cells [m].
+        z: height in the wall's frame [m].
+        patch: as in `_albedo_share`.
+    """
+    fitting = cell_number(
+        a / _FITTING_WIDTH, b / _FITTING_WIDTH, z / _FITTING_HEIGHT
+    )
+    if fitting > 1.0 - 2.0 * _FITTING_SHARE:
+        return out * (0.5 + 0.5 * patch)
+    return 0.0
 
 
 @compiled
@@ -135,10 +224,10 @@ def _albedo_share(
             large cell.
     """
     # Most patches are a little brighter than the mean, few much darker.
-    dull = 0.4 - 0.085 * (1.0 - patch) ** 4
+    dull = _BRIGHTEST_PATCH - _PATCH_DECREASE * (1.0 - patch) ** 4
     share = contrast * (dull + grain * grain * grain) + _AREA_CONTRAST * area
-    # Stains lie in dark areas, most of all; the square has a mean of 4 / 3.
-    stain = 1.5 * stains * (1.0 - area) ** 2
+    # Stains lie in dark areas, most of all.
+    stain = _STAIN_FACTOR * stains * (1.0 - area) ** 2
     if patch + 1.0 < stain:
         share -= _DARKEST_STAIN * (1.0 - (patch + 1.0) / stain)
     return min(max(share, _DARKEST), -_DARKEST)
