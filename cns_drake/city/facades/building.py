@@ -38,20 +38,31 @@ class Building(Assembly, abc.ABC):
         self.kind = kind
         self.height = height
         self.draw()
-        self.colours: dict[str, Finish] = {}
-        for part, finishes in kind.colours.items():
-            if isinstance(finishes, str):
-                self.colours[part] = self.colours[finishes]
-            else:
-                several = len(finishes) > 1
-                drawn = self.pick(finishes) if several else finishes[0]
-                self.colours[part] = drawn
+        self.colours = self._draw_colours()
         if self.walls is None and self.colours:
             self.walls = next(iter(self.colours.values()))
         self.glass = self.colours.setdefault("glass", self.glass)
         self.declare_materials(
             **{part: self.colours[part] for part in kind.materials}
         )
+
+    def _draw_colours(self) -> dict[str, Finish]:
+        """Returns a random finish of each part with an entry in the archetype.
+
+        A part whose entry is the name of an earlier part has that part's
+        finish.
+        """
+        colours: dict[str, Finish] = {}
+        for part, finishes in self.kind.colours.items():
+            if isinstance(finishes, str):
+                colours[part] = colours[finishes]
+            elif len(finishes) == 1:
+                # No random number is used up for a choice of one: it would
+                # change all later random numbers of the building.
+                colours[part] = finishes[0]
+            else:
+                colours[part] = self.pick(finishes)
+        return colours
 
     @abc.abstractmethod
     def draw(self) -> None:
