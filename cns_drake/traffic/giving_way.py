@@ -33,7 +33,9 @@ def is_walked(traffic: Traffic, c: int, way: int, is_large: bool) -> bool:
 
 
 @compiled
-def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
+def first_lane_at_crossing(
+    streets: Streets, car: Any, c: int
+) -> tuple[int, float, float]:
     """Returns where a vehicle's path along lanes meets an unmarked crossing.
 
     Args:
@@ -48,12 +50,15 @@ def lane_over(streets: Streets, car: Any, c: int) -> tuple[int, float, float]:
         crossing [m]. Without such a lane, the result is -1, inf and inf.
     """
     begin = -car.s
+    # Crossings are numbered after all pieces in the arrays of conflicts.
     number = len(streets.pieces) + c
     for column in range(CURRENT, NUM_PIECES):
         piece = car.path[column]
         if piece < 0:
             break
         row = streets.pieces[piece]
+        # On a lane, large vehicles (index 1) meet a crossing at the same places
+        # as small ones (index 0).
         enters = streets.begin[0, piece, number]
         if enters < np.inf and not row.is_way:
             leaves = streets.clear[0, piece, number] + car.length
@@ -91,7 +96,7 @@ def find_prior(traffic: Traffic, i: int) -> tuple[float, float, float]:
     pieces = streets.pieces
     for c in range(len(crossings)):
         if crossings[c].order > 0 and not crossings[c].marked:
-            lane, enters, _ = lane_over(streets, car, c)
+            lane, enters, _ = first_lane_at_crossing(streets, car, c)
             if enters >= 0.0 and is_walked(traffic, c, lane, car.large):
                 line = min(line, enters)
     way = car.held

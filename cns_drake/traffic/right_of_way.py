@@ -16,7 +16,11 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.traffic.conflicts import MERGE, SPLIT
 from cns_drake.traffic.ego_car import STEP
-from cns_drake.traffic.giving_way import is_walked, lane_over, rear_on_way
+from cns_drake.traffic.giving_way import (
+    first_lane_at_crossing,
+    is_walked,
+    rear_on_way,
+)
 from cns_drake.traffic.streets import WAIT, Streets, is_ego_far
 from cns_drake.traffic.vehicle_records import CURRENT, Traffic
 from cns_drake.traffic.vehicle_steps import choose_way
@@ -425,7 +429,7 @@ def _is_gap(traffic: Traffic, c: int) -> bool:
     """Returns whether the c-th crossing is free of vehicles for some time."""
     for i in range(len(traffic.cars)):
         car = traffic.cars[i]
-        _, enters, leaves = lane_over(traffic.streets, car, c)
+        _, enters, leaves = first_lane_at_crossing(traffic.streets, car, c)
         reach = max(_stops_within(car), _WALKERS_GAP * car.v)
         if enters < reach and leaves > 0.0:
             return False
