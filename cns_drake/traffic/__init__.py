@@ -9,8 +9,8 @@ seed. During the drive, the poses are interpolated from this plan.
 - Streets as arrays: `streets` with `conflicts`, `signals`, `traffic_flow`, and
   the `ego_car` on them.
 - Vehicles: `vehicle_kinds`, `vehicle_records`, `vehicle_placement`; in each
-  step, `right_of_way`, `giving_way`, `car_following`, `lane_changes` and
-  `vehicle_steps`; then `vehicle_poses`.
+  step, `occupants`, `right_of_way`, `giving_way`, `car_following`,
+  `lane_changes` and `vehicle_steps`; then `vehicle_poses`.
 - The ego car among them: `follower`, `path_runs`.
 - Pedestrians: `walkers`, `social_force`.
 - Plans: `traffic_plan`, made by `traffic_planning` and `traffic_trial`;

@@ -10,9 +10,10 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 from cns_drake.traffic.giving_way import find_prior
+from cns_drake.traffic.occupants import find_ahead
 from cns_drake.traffic.streets import speed_on
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
-from cns_drake.traffic.vehicle_records import CURRENT, Traffic, find_ahead
+from cns_drake.traffic.vehicle_records import CURRENT, Traffic
 
 # Greatest braking [m/s^2].
 HARDEST_BRAKING = 3.2

@@ -16,6 +16,7 @@ from cns_drake.traffic.car_following import (
 from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.giving_way import find_prior
 from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.occupants import find_ahead
 from cns_drake.traffic.path_runs import (
     IN_BOTH_LANES,
     POINT_SPACING,
@@ -24,12 +25,7 @@ from cns_drake.traffic.path_runs import (
 )
 from cns_drake.traffic.streets import Streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
-from cns_drake.traffic.vehicle_records import (
-    CURRENT,
-    VEHICLE,
-    Traffic,
-    find_ahead,
-)
+from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE, Traffic
 
 # Acceleration of the Intelligent Driver Model [m/s^2].
 _ACCELERATION = 1.5

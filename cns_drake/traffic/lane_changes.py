@@ -12,8 +12,9 @@ from cns_drake.traffic.car_following import (
     free_acceleration,
     interaction,
 )
+from cns_drake.traffic.occupants import EGO, find_ahead
 from cns_drake.traffic.streets import is_ego_far, speed_on
-from cns_drake.traffic.vehicle_records import CURRENT, EGO, Traffic, find_ahead
+from cns_drake.traffic.vehicle_records import CURRENT, Traffic
 
 # A driver considers a change of lanes once in this many steps.
 _THINKS = 10

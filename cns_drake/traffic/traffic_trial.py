@@ -13,6 +13,7 @@ from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.follower import Follower
 from cns_drake.traffic.lane_changes import change_lanes
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
+from cns_drake.traffic.occupants import find_occupants
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
@@ -28,7 +29,6 @@ from cns_drake.traffic.vehicle_poses import vehicle_poses
 from cns_drake.traffic.vehicle_records import (
     Traffic,
     begin_traffic,
-    find_occupants,
     make_crossings,
 )
 from cns_drake.traffic.vehicle_steps import advance

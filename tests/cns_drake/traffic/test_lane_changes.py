@@ -7,17 +7,12 @@ import pytest
 from cns_drake.traffic.ego_car import EgoBox
 from cns_drake.traffic.lane_changes import change_lanes
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.occupants import find_ahead, find_occupants
 from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.vehicle_kinds import KINDS, STANDSTILL_GAP
 from cns_drake.traffic.vehicle_placement import place_vehicles
-from cns_drake.traffic.vehicle_records import (
-    CROSSING,
-    CURRENT,
-    begin_traffic,
-    find_ahead,
-    find_occupants,
-)
+from cns_drake.traffic.vehicle_records import CROSSING, CURRENT, begin_traffic
 from cns_drake.traffic.vehicle_steps import choose_way
 
 # Acceleration, deceleration and headway of the drivers [m/s^2, m/s^2, s].

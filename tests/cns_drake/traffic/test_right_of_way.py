@@ -12,12 +12,12 @@ from cns_drake.traffic.conflicts import MERGE, SPLIT
 from cns_drake.traffic.ego_car import STEP, EgoBox
 from cns_drake.traffic.giving_way import find_prior
 from cns_drake.traffic.lane_graph import LaneGraph, Piece, make_crossing
+from cns_drake.traffic.occupants import find_occupants
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.vehicle_records import (
     CURRENT,
     begin_traffic,
-    find_occupants,
     make_crossings,
 )
 from cns_drake.traffic.vehicle_steps import advance

@@ -17,6 +17,7 @@ from cns_drake.traffic.lane_graph import (
     Walkway,
     make_crossing,
 )
+from cns_drake.traffic.occupants import find_occupants
 from cns_drake.traffic.right_of_way import grant_ways
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.road_walkways import make_walkways
@@ -24,11 +25,7 @@ from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.traffic_motion import WALKER_SIZE
 from cns_drake.traffic.traffic_planning import plan_traffic
 from cns_drake.traffic.unmarked_crossings import with_unmarked_crossings
-from cns_drake.traffic.vehicle_records import (
-    begin_traffic,
-    find_occupants,
-    make_crossings,
-)
+from cns_drake.traffic.vehicle_records import begin_traffic, make_crossings
 from cns_drake.traffic.vehicle_steps import advance
 
 BOX = EgoBox(-1.05, 3.75, 1.03)
