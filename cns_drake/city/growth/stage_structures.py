@@ -22,6 +22,10 @@ from cns_drake.city.plants.plant_sizes import younger_plant
 class GrowingCity:
     """A city in all of its stages.
 
+    The lot of a building is the ground below it. Until the building exists, the
+    lot has another use, such as a car park, whose objects stand in the
+    building's place.
+
     The attribute `structures` lists the structures of the whole city, and then
     the objects on lots whose buildings are absent in some stage. The instance
     id of a structure is its number in this list, counted from 1, and is the
@@ -43,6 +47,8 @@ class GrowingCity:
         self._permanent = list(structures)
         uses = {name: u for u, names in stages.lots.items() for name in names}
         absent = set[str]().union(*map(stages.absent, stages.stages))
+        # Name of a building that is absent in some stage -> the objects on its
+        # lot, which replace the building in these stages.
         self._lots: dict[str, list[Structure]] = {}
         for s in structures:
             if s.name in absent and s.semantic_class == "building":
@@ -62,26 +68,45 @@ class GrowingCity:
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)
         sites = self._stages.sites(stage)
-        standing = []
-        for structure in self._permanent:
-            name = structure.name
-            if name in sites:
-                if structure.semantic_class != "building":
-                    raise ValueError(f"sites: {name} is no building")
-                model = building_site(
-                    structure.model, sites[name], name, _seed(name)
-                )
-                standing.append(replace(structure, model=model))
-            elif name in absent:
-                continue
-            elif name in heights:
-                standing.append(_at_height(structure, heights[name]))
-            else:
-                standing.append(structure)
+        # A building under construction takes its lot, even if it is listed as
+        # absent as well.
+        missing = absent - sites.keys()
+        standing = [
+            _in_stage(structure, heights, sites)
+            for structure in self._permanent
+            if structure.name not in missing
+        ]
         for name, lot in self._lots.items():
-            if name in absent and name not in sites:
+            if name in missing:
                 standing += lot
         return standing
+
+
+def _in_stage(
+    structure: Structure,
+    heights: Mapping[str, float],
+    sites: Mapping[str, float],
+) -> Structure:
+    """Returns the version of a structure in a stage in which it is not absent.
+
+    Args:
+        structure: the structure in the last stage.
+        heights: names of lower structures -> their heights [m].
+        sites: names of buildings under construction -> the heights of their
+            frames [m].
+
+    Raises:
+        ValueError: the structure cannot be lower or under construction.
+    """
+    name = structure.name
+    if name in sites:
+        if structure.semantic_class != "building":
+            raise ValueError(f"sites: {name} is no building")
+        model = building_site(structure.model, sites[name], name, _seed(name))
+        return replace(structure, model=model)
+    if name in heights:
+        return _at_height(structure, heights[name])
+    return structure
 
 
 def _at_height(structure: Structure, height: float) -> Structure:
