@@ -67,7 +67,11 @@ def _are_near(
 def _cropped_terrain(
     terrain: ImportedObject, paths: BaseGeometry, distance: float
 ) -> ImportedObject:
-    """Returns the part of a terrain that is within `distance` of paths [m]."""
+    """Returns the part of a terrain that is within `distance` of paths [m].
+
+    Meshes are cut by whole triangles. Parts of another shape, which no format
+    has for terrain, are kept as they are.
+    """
     model = terrain.structure.model
     meshes = {}
     for name, mesh in model.meshes.items():
@@ -79,7 +83,8 @@ def _cropped_terrain(
     parts = tuple(
         part
         for part in model.parts
-        if isinstance(part.shape, MeshShape) and meshes[part.shape.mesh].faces
+        if not isinstance(part.shape, MeshShape)
+        or meshes[part.shape.mesh].faces
     )
     filled = {name: mesh for name, mesh in meshes.items() if mesh.faces}
     structure = replace(
