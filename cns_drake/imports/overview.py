@@ -52,7 +52,7 @@ def draw_overview(
         path: image file to write.
         objects: the objects.
         space: the free space; None to draw none.
-        drives: the drives, at most two.
+        drives: the drives, at most two; any further drive is left out.
     """
     corners = joined_triangles(imported.triangles for imported in objects)
     xy = corners.reshape(-1, 3)[:, :2]
@@ -149,7 +149,10 @@ def _draw_room(
 def _draw_drives(
     axes: Axes, drives: Sequence[WaypointRoute]
 ) -> dict[str, Artist]:
-    """Draws drives with their starts and ends; returns the legend."""
+    """Draws at most two drives with their starts and ends; returns the legend.
+
+    The names `a` and `b` and the two line styles leave out any further drive.
+    """
     legend: dict[str, Artist] = {}
     for letter, drive, rgb, width in zip(
         "ab", drives, _ROUTE_COLOURS, _ROUTE_WIDTHS, strict=False
