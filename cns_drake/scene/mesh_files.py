@@ -171,6 +171,18 @@ def _read_hull(shape: Convex) -> TriangleSurface:
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the surface of an OBJ file; small files come from a cache.
+
+    The key of the cache is the path with the size, the time of change and the
+    inode number of the file, so that a file that was written again is read
+    again.
+
+    Returns:
+        Vertices (N, 3), float64 [m], and triangles (M, 3), int32.
+
+    Raises:
+        RuntimeError, ValueError: the file is not a valid OBJ file.
+    """
     status = path.stat()
     if status.st_size > _SMALL_BYTES:
         return _parse_obj(path)
@@ -185,7 +197,9 @@ def _parse_small_obj(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the vertices and triangles of a file, from a cache.
 
-    The stages of a city share most of their files.
+    The stages of a city share most of their files. The arrays are read-only,
+    because all callers share them. `identity` is only part of the key of the
+    cache; see `_read_obj`.
     """
     p_GVset, triangles = _parse_obj(path)
     for array in (p_GVset, triangles):
