@@ -35,6 +35,9 @@ _LEAST_SAG = 0.004
 # On slopes, edging stones of sidewalks reach this deep, so that no gap opens
 # towards the coarser mesh of the ground beside them [m].
 _EDGING = 0.4
+# Edging stones stand on the inner edges of a rim of this width around a tile's
+# polygons, whatever the width [m].
+_RIM = 1.0
 # A tile whose heights differ by less than this is level [m].
 _LEVEL = 1e-4
 # Edges that two polygons share are found within this distance [m].
@@ -153,7 +156,10 @@ def _surface_with_edging(
 ) -> Structure:
     """Returns the upper side of streets, with edging stones on slopes.
 
-    The stones stand along the line `edge` in W [m].
+    Args:
+        ground: the area of the streets.
+        height: height of the upper side [m], or a function of x and y.
+        edge: line in W along which the stones stand [m]; None for no stones.
     """
     pieces = {}
     for part, piece, top, spacing in _street_tiles(ground, height):
@@ -167,8 +173,18 @@ def _surface_with_edging(
 def _edging(
     piece: BaseGeometry, top: HeightMap, spacing: float, edge: BaseGeometry
 ) -> Mesh:
-    """Returns the edging stones along the part of `edge` beside a piece."""
-    rim = piece.buffer(1.0, join_style="mitre").difference(piece)
+    """Returns the outer sides of the edging stones around a piece of a tile.
+
+    Args:
+        piece: the polygons in W [m].
+        top: height of the upper side, as a function of x and y [m].
+        spacing: distance between vertices along the stones [m].
+        edge: line in W [m]; only outlines of the polygons on this line have
+            stones.
+    """
+    # Walls face into their polygons. Those of the rim therefore face away from
+    # the piece; `along` leaves out the walls on the rim's outer edges.
+    rim = piece.buffer(_RIM, join_style="mitre").difference(piece)
     return wall_mesh(
         shapely.segmentize(rim, spacing),
         lambda x, y: top(x, y) - _EDGING,
@@ -199,7 +215,12 @@ def _kerb_structure(
 def _street_tiles(
     ground: Covering, height: HeightMap | float
 ) -> Iterator[tuple[str, BaseGeometry, HeightMap | float, float]]:
-    """Yields the name, polygons, height and mesh spacing [m] of each tile."""
+    """Yields the name, polygons, height and mesh spacing of each tile.
+
+    The height is one number for a level tile, and otherwise `height` itself
+    [m]. The spacing is the distance between the vertices of the mesh [m]; 0, on
+    level tiles, means the vertices of the outline alone.
+    """
     for name, piece in ground.tiles():
         if not callable(height):
             yield name, piece, height, 0.0
