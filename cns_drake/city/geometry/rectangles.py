@@ -7,6 +7,13 @@ from shapely.geometry.base import BaseGeometry
 
 # A rectangle is chosen between at most this many lines in each direction.
 _MOST_LINES = 12
+# The footprint is simplified by at most this much to find its corners [m].
+_SIMPLIFY = 0.05
+# A rectangle may extend beyond the footprint by this much, because its corners
+# are rounded [m].
+_TOLERANCE = 0.01
+# Half the side of the square that stands for a rectangle if none fits [m].
+_HALF_SMALLEST = 0.1
 
 
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
@@ -15,20 +22,22 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     The sides of the rectangle pass through corners of the footprint. The result
     is the largest such rectangle, unless the footprint has so many corners that
     only some corners are tried. If no such rectangle lies within the footprint,
-    the result is tiny.
+    the result is a tiny square around a point of the footprint; the square can
+    extend beyond a narrow footprint.
     """
-    corners = shapely.get_coordinates(footprint.simplify(0.05))
+    corners = shapely.get_coordinates(footprint.simplify(_SIMPLIFY))
     xs, ys = (_evenly_chosen(np.unique(np.round(c, 3))) for c in corners.T)
     x0, x1 = (xs[k] for k in np.triu_indices(len(xs), 1))
     y0, y1 = (ys[k] for k in np.triu_indices(len(ys), 1))
     sides = x0[:, None], y0[None], x1[:, None], y1[None]
     boxes = shapely.box(*sides).reshape(-1)
-    room = footprint.buffer(0.01)
+    room = footprint.buffer(_TOLERANCE)
     shapely.prepare(room)
     inside = boxes[shapely.covers(room, boxes)]
     if len(inside) == 0:
         x, y = footprint.representative_point().coords[0]
-        return box(x - 0.1, y - 0.1, x + 0.1, y + 0.1)
+        half = _HALF_SMALLEST
+        return box(x - half, y - half, x + half, y + half)
     return max(inside, key=lambda one: one.area)
 
 
