@@ -21,6 +21,8 @@ _FRIEZE_M = 1.4
 _END_M = 0.9
 # How far the details of windows (ledges and hoods) protrude [m].
 _DETAIL_REACH_M = 0.12
+# Distance of the outermost shops, and so of their awnings, from a corner [m].
+_SHOP_END_M = 0.6
 # Depth of the shop windows [m].
 _SHOP_RECESS_M = 0.35
 # Width of the stretch of the front for the door [m].
@@ -174,7 +176,7 @@ def _add_shops(block: BrickBlock) -> float:
     shops = bays.rhythm(
         shop_pitch,
         [bays.shop_front(head=height - 1.1, depth=_SHOP_RECESS_M)],
-        margin=0.6,
+        margin=_SHOP_END_M,
     )
     entrance = bays.entrance(width=1.8, height=3.0)
     front = bays.with_middle(shops, entrance, width=_DOOR_BAY_M)
@@ -206,7 +208,9 @@ def _add_awnings(block: BrickBlock, pitch: float) -> None:
     middle, half = front.length / 2, _DOOR_BAY_M / 2
     shops = [
         (start, end)
-        for start, end in bays.stretches(front.length, pitch=pitch, margin=0.6)
+        for start, end in bays.stretches(
+            front.length, pitch=pitch, margin=_SHOP_END_M
+        )
         if end < middle - half or start > middle + half
     ]
     shape = canopies.AwningShape(
