@@ -22,8 +22,8 @@ class StandingStructures:
         year: the year; today is 0.
         by_name: name of each existing structure -> the structure, or None if it
             is the same as today.
-        new: name -> structure, for all structures that are not the same as
-            today, in the order in which they were built.
+        new: name -> structure as it was first put up, for all structures that
+            are not the same as today, in the order in which they were built.
         events: all events since today.
     """
 
@@ -65,11 +65,12 @@ class StandingStructures:
             one: the structure.
             footprint: area in W [m] that the structure takes; by default its
                 own footprint.
-            because: event that causes the structure to be put up, if the
-                event's own record does not name the structure. A further record
-                then states this cause; by default there is no further record.
+            because: cause of the structure, which gets a record `PUT_UP`; empty
+                if another record names the structure.
         """
         self.by_name[one.name] = one
+        # The frame and the scaffold of a building site are put up every year
+        # anew. Their row of the structure table stays that of the first year.
         self.new.setdefault(one.name, one)
         self._entries[one.name] = one.entry()
         self._added[one.name] = (
@@ -79,7 +80,11 @@ class StandingStructures:
             self.record(PUT_UP, one.name, detail=because)
 
     def remove(self, name: str, *, because: str = "") -> None:
-        """Removes a structure, if it stands; for `because`, see `put`."""
+        """Removes a structure, if it stands.
+
+        `because` is the cause, which gets a record `TAKEN_DOWN`; empty if
+        another record names the structure.
+        """
         is_there = name in self.by_name
         self.by_name.pop(name, None)
         self._added.pop(name, None)
