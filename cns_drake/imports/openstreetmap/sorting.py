@@ -62,9 +62,10 @@ def sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
     Raises:
         RuntimeError, ValueError: the file is not an OpenStreetMap file.
     """
-    import osmium
+    import osmium  # Here and below only where used: the import takes long.
 
-    deleted = _marked_as_deleted(path, faults)
+    deleted = _marked_as_deleted(path)
+    _report_remark(path, faults)
     if not deleted and _is_sorted(path):
         return path
     versions = _newest_versions(path, deleted, faults)
@@ -189,22 +190,31 @@ def _is_sorted(path: Path) -> bool:
     return True
 
 
-def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
-    """Returns the objects that an editor has marked as deleted (XML only).
-
-    A remark by Overpass, such as that it ran out of time, is counted as a
-    fault.
-    """
+def _marked_as_deleted(path: Path) -> set[_Key]:
+    """Returns the objects that an editor has marked as deleted (XML only)."""
     deleted: set[_Key] = set()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        kind = tag.capitalize()
+        if kind in _KINDS and attributes.get("action") == "delete":
+            deleted.add((_KINDS.index(kind), int(attributes.get("id", "0"))))
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    return deleted if _is_parsed(path, parser, b"action=") else set()
+
+
+def _report_remark(path: Path, faults: ImportFaults) -> None:
+    """Counts a remark by Overpass, such as that it ran out of time, as a fault.
+
+    Only files of Overpass in XML have remarks.
+    """
     remark: list[str] = []
     is_open = False
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal is_open
         is_open = tag == "remark"
-        kind = tag.capitalize()
-        if kind in _KINDS and attributes.get("action") == "delete":
-            deleted.add((_KINDS.index(kind), int(attributes.get("id", "0"))))
 
     def end(tag: str) -> None:
         nonlocal is_open
@@ -214,31 +224,38 @@ def _marked_as_deleted(path: Path, faults: ImportFaults) -> set[_Key]:
         if is_open:
             remark.append(data)
 
-    if path.suffix == ".osm" and _has_any_word(path, b"action=", b"<remark"):
-        parser = expat.ParserCreate()
-        parser.StartElementHandler, parser.EndElementHandler = start, end
-        parser.CharacterDataHandler = text
-        try:
-            with path.open("rb") as stream:
-                parser.ParseFile(stream)
-        except expat.ExpatError:
-            # Reading the file reports what is wrong.
-            return set()
-    if remark:
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = text
+    if _is_parsed(path, parser, b"<remark") and remark:
         words = " ".join("".join(remark).split())
         faults.add(f"the file may be cut off: {words}", "its remark")
-    return deleted
 
 
-def _has_any_word(path: Path, *words: bytes) -> bool:
-    """Returns whether a file contains any of `words`.
+def _is_parsed(path: Path, parser: expat.XMLParserType, word: bytes) -> bool:
+    """Parses an XML file that contains a word; returns whether this worked.
 
-    Each word has at most `_LONGEST_WORD` bytes.
+    Other files are not parsed, because parsing takes far longer than the search
+    for the word. In a file with a fault, the handlers of `parser` may have been
+    called for a part of the file.
     """
+    if path.suffix != ".osm" or not _has_word(path, word):
+        return False
+    try:
+        with path.open("rb") as stream:
+            parser.ParseFile(stream)
+    except expat.ExpatError:
+        # Reading the file reports what is wrong.
+        return False
+    return True
+
+
+def _has_word(path: Path, word: bytes) -> bool:
+    """Returns whether a file contains a word, at most `_LONGEST_WORD` bytes."""
     rest = b""
     with path.open("rb") as stream:
         while chunk := stream.read(_CHUNK_SIZE):
-            if any(word in rest + chunk for word in words):
+            if word in rest + chunk:
                 return True
             rest = chunk[-_LONGEST_WORD:]
     return False
