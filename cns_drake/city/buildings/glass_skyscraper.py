@@ -39,6 +39,16 @@ _LOBBY_LINTEL_M = 0.8
 _COLUMN_PITCH_M = 7.0
 # Width of the stretch of the front for the door [m].
 _DOOR_BAY_M = 7.0
+# Height of the lower side of a wedge, as a share of the crown's height.
+_WEDGE_LOW = 0.35
+# Height of the lower step of a crown, as a share of the crown's height.
+_LOW_STEP = 0.45
+# How far the upper step stands back, as a share of the plan's shortest side.
+_STEP_INSET = 0.12
+# Height of a parapet that is no screen [m].
+_PARAPET_M = 1.0
+# Height of a screen above the roof, as a share of the crown's height.
+_SCREEN_SHARE = 0.7
 
 
 class _Setback(NamedTuple):
@@ -141,7 +151,12 @@ class GlassSkyscraper(Building):
             rim = Band(z0=0.8, z1=_TERRACE_M, depth=-0.1)
             terrace = Facade(_TERRACE_M, bands=(rim,))
             tiers.add_crown(
-                self, plan, terrace, z0=top, parapet=1.0, part=f"terrace_{k}"
+                self,
+                plan,
+                terrace,
+                z0=top,
+                parapet=_PARAPET_M,
+                part=f"terrace_{k}",
             )
             total = total + np.round(setback.share * reach, 1)
             plan = _with_cut_corners(self, outlines.inset(base, total))
@@ -206,28 +221,77 @@ def _add_lobby(tower: GlassSkyscraper, plan: np.ndarray) -> float:
 
 
 def _add_crown(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
-    """Adds the crown: a wedge, a smaller storey on a terrace, or a screen."""
-    height = round(tower.height - z0, 3)
+    """Adds the crown: a wedge, a smaller storey on a terrace, or a screen.
+
+    Args:
+        tower: the skyscraper.
+        plan: (N, 2) outline of the topmost tier [m].
+        z0: height of the crown's foot [m].
+    """
     if tower.crown == "wedge":
-        wedge = solids.sloped_prism(plan, z0=z0, height=height, low=0.35)
-        tower.add("crown", wedge)
-        return
-    if tower.crown == "stepped":
-        low = round(0.45 * height, 2)
-        parapet = 1.0
-        walls = Facade(low, bands=(top_band(low, height=0.5, reach=0.3),))
-        tiers.add_crown(
-            tower, plan, walls, z0=z0, parapet=parapet, part="crown_low"
-        )
-        inset = 0.12 * outlines.shortest_side(plan)
-        plan = outlines.inset(plan, min(inset, outlines.inset_limit(plan)))
-        z0 = round(z0 + low - parapet, 3)
-        height = round(height - low + parapet, 3)
+        _add_wedge(tower, plan, z0)
+    elif tower.crown == "stepped":
+        _add_stepped_crown(tower, plan, z0)
+    else:
+        _add_screen(tower, plan, z0)
+
+
+def _add_wedge(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
+    """Adds a crown with a sloped top; for the arguments, see `_add_crown`."""
+    height = round(tower.height - z0, 3)
+    wedge = solids.sloped_prism(plan, z0=z0, height=height, low=_WEDGE_LOW)
+    tower.add("crown", wedge)
+
+
+def _add_stepped_crown(
+    tower: GlassSkyscraper, plan: np.ndarray, z0: float
+) -> None:
+    """Adds a terrace with a smaller storey; for arguments, see `_add_crown`."""
+    height = round(tower.height - z0, 3)
+    low = round(_LOW_STEP * height, 2)
+    walls = Facade(low, bands=(top_band(low, height=0.5, reach=0.3),))
+    tiers.add_crown(
+        tower, plan, walls, z0=z0, parapet=_PARAPET_M, part="crown_low"
+    )
+    inset = _STEP_INSET * outlines.shortest_side(plan)
+    _add_louvred_storey(
+        tower,
+        outlines.inset(plan, min(inset, outlines.inset_limit(plan))),
+        z0=round(z0 + low - _PARAPET_M, 3),
+        height=round(height - low + _PARAPET_M, 3),
+        parapet=_PARAPET_M,
+    )
+
+
+def _add_screen(tower: GlassSkyscraper, plan: np.ndarray, z0: float) -> None:
+    """Adds high walls around the roof; for the arguments, see `_add_crown`."""
+    height = round(tower.height - z0, 3)
+    _add_louvred_storey(
+        tower, plan, z0=z0, height=height, parapet=_SCREEN_SHARE * height
+    )
+
+
+def _add_louvred_storey(
+    tower: GlassSkyscraper,
+    plan: np.ndarray,
+    *,
+    z0: float,
+    height: float,
+    parapet: float,
+) -> None:
+    """Adds the topmost walls, with louvres, and the equipped roof.
+
+    Args:
+        tower: the skyscraper.
+        plan: (N, 2) outline of the walls [m].
+        z0: height of the foot of the walls [m].
+        height: height of the walls [m].
+        parapet: height of the walls above the roof [m].
+    """
     louvres = tuple(
         Band(z0=z, z1=z + 0.5, depth=0.2)
         for z in np.arange(0.8, height - 1.5, 1.0).tolist()
     )
-    parapet = 0.7 * height if tower.crown == "screen" else 1.0
     walls = Facade(height, bands=louvres)
     tiers.add_crown(
         tower, plan, walls, z0=z0, parapet=parapet, items=_ROOF_ITEMS
