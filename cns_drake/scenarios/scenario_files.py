@@ -241,22 +241,28 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the fields that are set in a scenario, ready for JSON.
 
     The field `imu.kalibr` becomes `imu.yaml`: a recording contains the noise of
-    its IMU in a file of this name.
+    its IMU in a file of this name. The name of a shipped map stays as it is.
 
     Args:
+        scenario: the scenario.
         folder: folder to which the paths of map, world, waypoints and SUMO
             trace are made relative. None keeps only the names of these files.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
-    for fields, field in (
-        *((values, field) for field in ("map", "world", "waypoints")),
-        (values.get("traffic", {}), "fcd"),
-    ):
-        place = fields.get(field)
-        if place is not None and place not in shipped_maps():
-            fields[field] = Path(place).name
-            if folder is not None:
-                fields[field] = os.path.relpath(place, folder.resolve())
+
+    def moved(path: str) -> str:
+        if path in shipped_maps():
+            return path
+        if folder is None:
+            return Path(path).name
+        return os.path.relpath(path, folder.resolve())
+
+    for field in ("map", "world", "waypoints"):
+        if field in values:
+            values[field] = moved(values[field])
+    traffic = values.get("traffic", {})
+    if "fcd" in traffic:
+        traffic["fcd"] = moved(traffic["fcd"])
     if scenario.imu.kalibr is not None:
         values["imu"]["kalibr"] = KALIBR_FILE
     return values
