@@ -11,7 +11,7 @@ from evaluation.results.keys import CAUSE, LAST, OWN, STAGE
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.recordings.recorded_pairs import (
     RecordedCondition,
-    chosen_sessions,
+    chosen_recordings,
 )
 
 # Fields of a database of several recordings.
@@ -40,7 +40,7 @@ def recorded_conditions(
             one.changes.get("both", {}).get("stage", OWN),
             one.is_baseline,
             condition_protocol(one, source),
-            _sessions(city, one, source),
+            _database(city, one, source),
             checked_keep(
                 one.changes.get("database", {}).get("keep", KEEP_ALL),
                 f"{source}: database.keep",
@@ -50,7 +50,7 @@ def recorded_conditions(
     ]
 
 
-def _sessions(
+def _database(
     city: MapDrives, condition: Condition, source: str
 ) -> tuple[RecordingInfo, ...]:
     """Returns the recordings of a database of several recordings."""
@@ -61,7 +61,7 @@ def _sessions(
     is_list = isinstance(names, list) and bool(names)
     if not (is_list and all(isinstance(one, str) for one in names)):
         raise InputError(f"{where}: not a list of names of recordings")
-    return chosen_sessions(city, names, where)
+    return chosen_recordings(city, names, where)
 
 
 def _check_recordable(

@@ -24,11 +24,11 @@ class RecordedCondition(NamedTuple):
 
     Attributes:
         factors: name -> value of each factor of the condition.
-        stage: `own` if each drive goes through its own stage; `last` for the
-            control, in which both drives go through the stage of the query.
+        stage: `own` if each recording is of its own stage; `last` for the
+            control, in which both recordings are of the stage of the query.
         is_baseline: whether other conditions are compared with this one.
         protocol: protocol of place recognition.
-        sessions: the recordings of the database, if there are several.
+        database: the recordings of the database, if there are several.
         keep: which places of these recordings are kept, see
             `evaluation.recognition.kept_places.kept_places`.
     """
@@ -37,7 +37,7 @@ class RecordedCondition(NamedTuple):
     stage: str
     is_baseline: bool
     protocol: RetrievalProtocol
-    sessions: tuple[RecordingInfo, ...] = ()
+    database: tuple[RecordingInfo, ...] = ()
     keep: str | int = KEEP_ALL
 
 
@@ -57,22 +57,22 @@ def recorded_pairs(
         conditions: the conditions.
         seed: seed of the experiment.
         on_note: is called with a note on each pair without a control.
-        both_ways: whether the two drives of a map are compared both ways.
-        with_itself: whether each drive is compared with itself, too.
+        both_ways: whether the two recordings of a pair are compared both ways.
+        with_itself: whether each recording is compared with itself, too.
     """
     conditions = list(conditions)
     pairs = city.recognition_pairs() if both_ways else city.change_pairs()
     if with_itself:
         pairs += [(one, one) for one in city.stages.values()]
-    composed = [one for one in conditions if one.sessions]
+    composed = [one for one in conditions if one.database]
     if composed:
-        conditions = [one for one in conditions if not one.sessions]
-        yield from _session_pairs(city, composed, seed)
+        conditions = [one for one in conditions if not one.database]
+        yield from _composed_pairs(city, composed, seed)
     for pair in pairs if conditions else ():
         control = city.unchanged_pair(*pair)
         for condition in conditions:
-            drives = pair if condition.stage == OWN else control
-            if drives is None:
+            recordings = pair if condition.stage == OWN else control
+            if recordings is None:
                 if pair[0] is pair[1]:
                     continue
                 on_note(
@@ -80,7 +80,7 @@ def recorded_pairs(
                     f" the stage of {pair[1].name}"
                 )
                 continue
-            database, query = (one.named for one in drives)
+            database, query = (one.named for one in recordings)
             # Queries are scored once for all radii.
             asked = condition.protocol.to_json() | {"radius": None}
             yield Pair(
@@ -98,7 +98,7 @@ def recorded_pairs(
             )
 
 
-def chosen_sessions(
+def chosen_recordings(
     city: MapDrives, names: Sequence[str], where: str
 ) -> tuple[RecordingInfo, ...]:
     """Returns the recordings of a database, from older to newer.
@@ -126,11 +126,12 @@ def chosen_sessions(
             )
         if name == query.name:
             raise InputError(f"{where}: {name}: this drive is the query")
-        drive = known[name].source()
+        recording = known[name].source()
         with errors_at(where):
-            check_same_world(drive, placed)
-        is_dated = drive.stamps_ns[0] > _DATED_NS < placed.stamps_ns[0]
-        if is_dated and drive.stamps_ns[0] > placed.stamps_ns[0]:
+            check_same_world(recording, placed)
+        start_ns, query_start_ns = recording.stamps_ns[0], placed.stamps_ns[0]
+        is_dated = start_ns > _DATED_NS and query_start_ns > _DATED_NS
+        if is_dated and start_ns > query_start_ns:
             raise InputError(
                 f"{where}: {name}: this drive is later than the query"
                 f" {query.name}"
@@ -143,18 +144,18 @@ def chosen_sessions(
     )
 
 
-def _session_pairs(
+def _composed_pairs(
     city: MapDrives, conditions: Iterable[RecordedCondition], seed: int
 ) -> Iterator[Pair]:
     """Yields the pairs of databases of several recordings and the query."""
     query = city.last
     for one in conditions:
-        drives = [session.named for session in one.sessions]
+        named = [recording.named for recording in one.database]
         digest = fingerprint(
             {
                 **one.protocol.to_json(),
                 "radius": None,
-                "drives": [drive.name for drive in drives],
+                "drives": [recording.name for recording in named],
                 "keep": one.keep,
             }
         )[:8]
@@ -165,11 +166,11 @@ def _session_pairs(
             seed=seed,
             is_baseline=one.is_baseline,
             stated=one.protocol,
-            key=f"{drives[0].name} {query.name} {digest}",
-            database=drives[0],
+            key=f"{named[0].name} {query.name} {digest}",
+            database=named[0],
             query=query.named,
-            way=drives[0],
+            way=named[0],
             protocol=one.protocol,
-            beside=tuple(drives[1:]),
+            beside=tuple(named[1:]),
             keep=one.keep,
         )
