@@ -39,11 +39,12 @@ def from_least_to_greatest(
     known = {n: value for n, value in found.items() if not math.isnan(value)}
     if not known:
         return "unknown"
-    ends = [f(known, key=known.__getitem__) for f in (min, max)]
-    least, greatest = (form.format(known[name]) for name in ends)
+    lowest = min(known, key=known.__getitem__)
+    highest = max(known, key=known.__getitem__)
+    least, greatest = form.format(known[lowest]), form.format(known[highest])
     if least == greatest:
         return least
-    return f"from {least} ({ends[0]}) to {greatest} ({ends[1]})"
+    return f"from {least} ({lowest}) to {greatest} ({highest})"
 
 
 def by_significance(
@@ -59,12 +60,18 @@ def by_significance(
     Returns:
         The methods that differ significantly, and all other methods.
     """
-    found: tuple[list[str], list[str]] = ([], [])
-    for pair, p in p_values.items():
-        if best in pair:
-            other = pair[1 - pair.index(best)]
-            found[not p < SIGNIFICANT].append(title(other))
-    return found
+    apart: list[str] = []
+    rest: list[str] = []
+    for (one, another), p in p_values.items():
+        if best not in (one, another):
+            continue
+        other = title(another if one == best else one)
+        # The difference may be unknown: NaN is not below the limit.
+        if p < SIGNIFICANT:
+            apart.append(other)
+        else:
+            rest.append(other)
+    return apart, rest
 
 
 def survival_sentences(rows: Sequence[Row]) -> str:
@@ -88,12 +95,7 @@ def survival_sentences(rows: Sequence[Row]) -> str:
     decided = number >= LEAST_UNITS
     if decided:
         over += f", with a 95 % t interval over {number} cities"
-    shares = ", ".join(
-        f"{title(mean.method)} {_percent(mean.value)}"
-        + decided
-        * f" ({_percent(mean.interval.low)} to {_percent(mean.interval.high)})"
-        for mean in ranked
-    )
+    shares = ", ".join(_share(mean, with_interval=decided) for mean in ranked)
     text = (
         "Retained AUC strict, relative to the AUC strict without change"
         f" ({over}): {shares}."
@@ -121,6 +123,15 @@ def survivors(ranked: Iterable[Ranked]) -> list[str]:
     return [mean.method for mean in ranked if mean.interval.low >= SURVIVES]
 
 
+def _share(mean: Ranked, *, with_interval: bool) -> str:
+    """Returns a method with its mean share of AUC, as text."""
+    text = f"{title(mean.method)} {_percent(mean.value)}"
+    if not with_interval:
+        return text
+    low, high = _percent(mean.interval.low), _percent(mean.interval.high)
+    return f"{text} ({low} to {high})"
+
+
 def _percent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
@@ -135,20 +146,9 @@ def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     Returns:
         A clause; empty if there is one method, or the answers are unknown.
     """
-    asked = (
-        {answers.identity: answers for answers in queries.answers}
-        if queries
-        else {}
-    )
-    table: dict[tuple, dict[str, tuple[float, Answers]]] = {}
-    for row in rows:
-        if row.identity in asked:
-            by_label = table.setdefault(row.without("method"), {})
-            by_label[row.label] = row.value, asked[row.identity]
-    labels = {row.label: None for row in rows}
-    common = [
-        by_label for by_label in table.values() if len(by_label) == len(labels)
-    ]
+    # Each label once, in the order of the rows.
+    labels = list(dict.fromkeys(row.label for row in rows))
+    common = _common_conditions(rows, labels, queries)
     if len(labels) < 2 or not common:
         return ""
     compared = compared_answers(
@@ -156,7 +156,43 @@ def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:
     )
     best = max(labels, key=lambda n: sum(by_label[n][0] for by_label in common))
     p_values = {pair: p for pair, (_, p) in compared.items()}
-    apart, rest = by_significance(best, p_values)
+    return _lead(best, *by_significance(best, p_values))
+
+
+def _common_conditions(
+    rows: Sequence[Row], labels: Sequence[str], queries: QueryRows | None
+) -> list[dict[str, tuple[float, Answers]]]:
+    """Returns the conditions in which the answers of all methods are known.
+
+    Args:
+        rows: rows of the metric `auc`.
+        labels: labels of all methods.
+        queries: the answers from which the rows were computed.
+
+    Returns:
+        For each condition: label -> AUC, and the answers.
+    """
+    if queries is None:
+        return []
+    asked = {answers.identity: answers for answers in queries.answers}
+    table: dict[tuple, dict[str, tuple[float, Answers]]] = {}
+    for row in rows:
+        if row.identity in asked:
+            by_label = table.setdefault(row.without("method"), {})
+            by_label[row.label] = row.value, asked[row.identity]
+    return [
+        by_label for by_label in table.values() if len(by_label) == len(labels)
+    ]
+
+
+def _lead(best: str, apart: Sequence[str], rest: Sequence[str]) -> str:
+    """Returns the clause of `lead_by_auc`.
+
+    Args:
+        best: label of the method with the greatest AUC.
+        apart: titles of the methods that differ significantly from it.
+        rest: titles of all other methods.
+    """
     text = f"the greatest AUC, of {title(best)}, "
     if not rest:
         return f"{text}differs significantly from all others"
