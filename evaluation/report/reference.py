@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.metrics import Mode
@@ -170,20 +169,39 @@ class Reference:
 
     def to_results(self) -> Results:
         """Returns the published AUC and TCR_sym of all pairs as a table."""
-        rows = []
-        for key, value in self.recognitions.items():
-            city, *stages, method, _ = key
-            where: dict[str, Any] = {
-                **dict(zip(("database", "query"), stages, strict=True)),
-                **{"experiment": self.title, "map": city, "seed": 0},
-                **{"factors": {}, "gate": False, "protocol": ""},
-            }
-            place: dict[str, Any] = {"task": "place", "method": method}
-            rows.append(Row(**where, **place, metric="auc", value=value.auc))
-            if (change := self.change(city, stages)) is not None:
-                whole: dict[str, Any] = {"task": "change", "method": ""}
-                whole |= {"metric": "tcr_sym", "value": change}
-                rows.append(Row(**where, **whole))
+        rows: list[Row] = []
+        changed: set[tuple[str, str, str]] = set()
+        for key, published in self.recognitions.items():
+            city, database, query, method, _ = key
+            row = Row(
+                experiment=self.title,
+                map=city,
+                database=database,
+                query=query,
+                seed=0,
+                factors={},
+                task="place",
+                method=method,
+                gate=False,
+                protocol="",
+                metric="auc",
+                value=published.auc,
+            )
+            rows.append(row)
+            # The change of a pair does not depend on the method.
+            change = self.change(city, (database, query))
+            pair = city, database, query
+            if change is not None and pair not in changed:
+                changed.add(pair)
+                rows.append(
+                    replace(
+                        row,
+                        task="change",
+                        method="",
+                        metric="tcr_sym",
+                        value=change,
+                    )
+                )
         return Results.of(rows)
 
     def _ran(self, result: PlaceOutcome) -> bool:
