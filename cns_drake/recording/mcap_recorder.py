@@ -35,6 +35,7 @@ from cns_drake.drives.sensor_names import (
 from cns_drake.recording import messages, object_messages, recorded_topics
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.cloud_messages import encode_point_cloud
 from cns_drake.recording.recorded_topics import (
     IMU_TOPIC,
     ODOMETRY_TOPIC,
@@ -317,7 +318,7 @@ class McapRecorder(LeafSystem):
             return {
                 recorded_topics.OBJECTS_TOPIC: detections.encode(objects, ns),
                 recorded_topics.BOXES_TOPIC: boxes.encode(objects, ns),
-                recorded_topics.MOTION_TOPIC: messages.encode_point_cloud(
+                recorded_topics.MOTION_TOPIC: encode_point_cloud(
                     table, MAP_FRAME, ns
                 ),
             }
@@ -328,13 +329,12 @@ class McapRecorder(LeafSystem):
         self, name: str, convert: Callable[[np.ndarray], np.ndarray]
     ) -> None:
         topic = recorded_topics.points_topic(name)
-        encode = messages.encode_point_cloud
 
         def make(scan: np.ndarray, stamp_ns: int) -> dict:
             points = convert(scan)
-            made = {topic: encode(points, name, stamp_ns)}
+            made = {topic: encode_point_cloud(points, name, stamp_ns)}
             if points is not scan:
-                labels = encode(to_labels(scan), name, stamp_ns)
+                labels = encode_point_cloud(to_labels(scan), name, stamp_ns)
                 made[recorded_topics.labels_topic(name)] = labels
             return made
 

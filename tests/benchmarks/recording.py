@@ -34,7 +34,7 @@ from cns_drake.base.process import num_cores
 from cns_drake.drives import ros_types
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.recording import messages
+from cns_drake.recording import mcap_recorder, messages
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.schedule import FRAME_PERIOD
@@ -59,7 +59,7 @@ STEPS = {
     "cast": ((RayCastingScene, "cast_rays"),),
     "points": ((Lidar, "_calc_measured"),),
     "messages": (
-        (messages, "encode_point_cloud"),
+        (mcap_recorder, "encode_point_cloud"),
         (messages, "make_imu"),
         (messages, "make_odometry"),
         (messages, "make_tf"),

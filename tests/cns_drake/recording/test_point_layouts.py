@@ -10,7 +10,7 @@ from cns_drake.drives.point_layouts import (
     to_layout,
 )
 from cns_drake.drives.ros_types import POINT_CLOUD, deserialize
-from cns_drake.recording.messages import encode_point_cloud
+from cns_drake.recording.cloud_messages import encode_point_cloud
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
