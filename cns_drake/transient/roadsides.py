@@ -1,17 +1,19 @@
 """Fills free places beside kerbs near a drive, such as with parked cars."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.scene.semantics import GROUND_CLASSES
 from cns_drake.transient.kerb_stretches import straight_kerbs
+from cns_drake.transient.obstacles import Obstacles
 from cns_drake.transient.surroundings import Surroundings, change_rng
 
 # Cell size of the grid, in W, of kerb stretches [m].
@@ -57,8 +59,8 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
     """
     stretches = straight_kerbs(around, "roadsides", _CELL, _SHORTEST)
     standing = around.obstacles_except(GROUND_CLASSES)
-    areas = [around.ground.carriageway]
-    shapely.prepare(areas[0])
+    taken = [around.ground.carriageway]
+    shapely.prepare(taken[0])
     for name, row in _ROWS.items():
         seed = around.seed if row.moves else 0
         for stretch in stretches:
@@ -73,23 +75,48 @@ def fill_roadsides(around: Surroundings, share: float) -> None:
             turn = float(rng.choice(row.turns))
             first = float(rng.uniform(*row.nearest))
             places = product(np.arange(first, row.farthest, _STEP), row.along)
-            for y, x in places:
-                area = stretch.footprint(model, x, y, turn)
-                if not standing.is_free(area) or (
-                    shapely.intersects(areas, area).any()
-                ):
-                    continue
-                # Objects that a smaller share leaves out take up room as well.
-                areas.append(area)
-                if is_put_up:
-                    stretch.put(
-                        around,
-                        name,
-                        builder.semantic_class,
-                        model,
-                        x,
-                        y,
-                        turn,
-                        length,
-                    )
-                break
+            found = _first_free(
+                (
+                    (x, y, stretch.footprint(model, x, y, turn))
+                    for y, x in places
+                ),
+                standing,
+                taken,
+            )
+            if found is None:
+                continue
+            x, y, area = found
+            # Objects that a smaller share leaves out take up room as well.
+            taken.append(area)
+            if is_put_up:
+                stretch.put(
+                    around,
+                    suffix=name,
+                    semantic_class=builder.semantic_class,
+                    model=model,
+                    x=x,
+                    y=y,
+                    turn=turn,
+                    length=length,
+                )
+
+
+def _first_free(
+    places: Iterable[tuple[float, float, BaseGeometry]],
+    standing: Obstacles,
+    taken: Sequence[BaseGeometry],
+) -> tuple[float, float, BaseGeometry] | None:
+    """Returns the first place whose area is free; None if there is none.
+
+    Args:
+        places: x and y of each place in the frame of the stretch, and the area
+            in W that the object would take there [m].
+        standing: structures of the world, which the area must not touch.
+        taken: further areas in W that the area must not touch.
+    """
+    for x, y, area in places:
+        if standing.is_free(area) and not (
+            shapely.intersects(taken, area).any()
+        ):
+            return x, y, area
+    return None
