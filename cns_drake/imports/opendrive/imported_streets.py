@@ -13,7 +13,12 @@ from cns_drake.city.geometry import polygons_of, snap
 from cns_drake.city.ground.coverings import TILE, Covering
 from cns_drake.city.ground.streets import kerb_area, parking_bays
 from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
-from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_class
+from cns_drake.imports.opendrive.lanes import (
+    LaneBand,
+    is_raised,
+    lane_class,
+    lane_polygon,
+)
 from cns_drake.roads.carriageway import Areas, union_without_slits
 
 # Slits between lanes are closed up to twice this width [m].
@@ -25,8 +30,6 @@ _SIMPLIFY = 0.005
 _LARGEST_GAP = 60.0
 # Classes of lanes at road level. Where lanes overlap, the first class counts.
 _LEVEL_CLASSES = ("road", "parking", "sidewalk", "other-ground")
-# Lanes with less area are left out [m^2].
-_LEAST_AREA = 1e-6
 _NOWHERE = Polygon()
 _ISLAND_RGB = (0.55, 0.53, 0.50)
 _PATH_RGB = (0.52, 0.42, 0.38)
@@ -61,19 +64,11 @@ class ImportedStreets:
             road, [by_kind[kind] for kind in _LEVEL_CLASSES[1:]]
         )
         paved = road.union(parking).union(path)
-        whole = _simplified(union_without_slits([paved, other], _SEAM))
-        tapers = kerb_tapers(whole)
-        whole = _simplified(union_without_slits([whole, *tapers], _SEAM))
-        carriageway = _cut_at_tiles(_without_slivers(whole))
-        medians = _simplified(shapely.union_all(by_kind["median"]))
-        medians = _without_slivers(medians.difference(carriageway))
-        walks = _simplified(shapely.union_all(by_kind["walk"]))
-        taken = carriageway.union(medians)
-        # A carriageway without a sidewalk, as in junctions, has a kerb that
-        # takes ground, too.
-        kerbs = kerb_area(carriageway.difference(medians))
-        walks = walks.union(snap(kerbs.difference(kerbless)))
-        sidewalks = _without_slivers(snap(walks.difference(taken)))
+        carriageway = _carriageway(paved, other)
+        medians = _medians(by_kind["median"], carriageway)
+        kerbed = carriageway.difference(medians)
+        streets = carriageway.union(medians)
+        sidewalks = _sidewalks(by_kind["walk"], kerbed, kerbless, streets)
         self.areas = Areas(
             carriageway, _without_slivers(road), sidewalks, medians
         )
@@ -83,9 +78,56 @@ class ImportedStreets:
             Covering("paths", "sidewalk", snap(path), _PATH_RGB),
             Covering("islands", "other-ground", snap(other), _ISLAND_RGB),
         ]
-        taken = taken.union(sidewalks)
-        margins = shapely.union_all(by_kind["margins"]).difference(taken)
-        self.margins = _without_slivers(snap(margins))
+        self.margins = _margins(by_kind["margins"], streets.union(sidewalks))
+
+
+def _carriageway(paved: BaseGeometry, other: BaseGeometry) -> MultiPolygon:
+    """Returns everything at road level, with tapers where lanes end.
+
+    `paved` is the area of road, parking and paths, and `other` the area of
+    other ground at road level.
+    """
+    level = _simplified(union_without_slits([paved, other], _SEAM))
+    tapered = union_without_slits([level, *kerb_tapers(level)], _SEAM)
+    return _cut_at_tiles(_without_slivers(_simplified(tapered)))
+
+
+def _medians(
+    areas: Sequence[BaseGeometry], carriageway: BaseGeometry
+) -> MultiPolygon:
+    """Returns the medians outside the carriageway, from the areas of lanes."""
+    medians = _simplified(shapely.union_all(areas))
+    return _without_slivers(medians.difference(carriageway))
+
+
+def _sidewalks(
+    areas: Sequence[BaseGeometry],
+    kerbed: BaseGeometry,
+    kerbless: BaseGeometry,
+    streets: BaseGeometry,
+) -> MultiPolygon:
+    """Returns the sidewalks, with kerbs where there is no lane for walking.
+
+    Args:
+        areas: areas of the lanes for walking.
+        kerbed: the area along which kerbs stand.
+        kerbless: area without kerbs.
+        streets: area of the carriageway and the medians.
+    """
+    walks = _simplified(shapely.union_all(areas))
+    # A carriageway without a sidewalk, as in junctions, has a kerb that takes
+    # ground, too.
+    kerbs = kerb_area(kerbed)
+    walks = walks.union(snap(kerbs.difference(kerbless)))
+    return _without_slivers(snap(walks.difference(streets)))
+
+
+def _margins(
+    areas: Sequence[BaseGeometry], taken: BaseGeometry
+) -> MultiPolygon:
+    """Returns the lanes without a use, outside the area `taken`."""
+    margins = shapely.union_all(areas).difference(taken)
+    return _without_slivers(snap(margins))
 
 
 def _areas_by_kind(
@@ -141,23 +183,6 @@ def _areas_beside(
         area = _simplified(shapely.union_all(areas).difference(paved))
         yield area
         paved = paved.union(area)
-
-
-def lane_polygon(band: LaneBand) -> BaseGeometry:
-    """Returns the area of a lane in W [m]; empty for a lane without width."""
-    inner, outer = band.inner[:, :2], band.outer[:, :2]
-    outline = Polygon(np.concatenate([inner, outer[::-1]]))
-    if outline.is_valid:
-        return outline if outline.area > _LEAST_AREA else Polygon()
-    # In a bend tighter than the width of the lane, its edge folds over.
-    corners = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
-    pieces = [
-        shapely.make_valid(Polygon(quad), method="structure")
-        for quad in corners
-    ]
-    return shapely.union_all(
-        [piece for piece in pieces if piece.area > _LEAST_AREA]
-    )
 
 
 def _enclosed_gaps(lanes: BaseGeometry) -> list[Polygon]:

@@ -1,4 +1,4 @@
-"""The lanes of roads: kinds and edges.
+"""The lanes of roads: kinds, edges and areas.
 
 Edges are sampled densely enough for simulated LiDARs.
 """
@@ -10,6 +10,9 @@ import math
 from pathlib import Path
 
 import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.opendrive.road_model import (
@@ -33,6 +36,8 @@ _SPACING = 2.0
 SAG = 0.002
 # A lane counts as absent where it is narrower than this [m].
 LEAST_WIDTH = 0.1
+# Lanes with less area are left out [m^2].
+_LEAST_AREA = 1e-6
 # Greatest number of places on the edges of a road.
 _MOST_STATIONS = 200_000
 # No lane is farther from the origin of W than this along x or y [m].
@@ -169,6 +174,23 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                     )
                 )
                 t, inner = beyond, outer
+
+
+def lane_polygon(band: LaneBand) -> BaseGeometry:
+    """Returns the area of a lane in W [m]; empty for a lane without width."""
+    inner, outer = band.inner[:, :2], band.outer[:, :2]
+    outline = Polygon(np.concatenate([inner, outer[::-1]]))
+    if outline.is_valid:
+        return outline if outline.area > _LEAST_AREA else Polygon()
+    # In a bend tighter than the width of the lane, its edge folds over.
+    corners = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
+    pieces = [
+        shapely.make_valid(Polygon(quad), method="structure")
+        for quad in corners
+    ]
+    return shapely.union_all(
+        [piece for piece in pieces if piece.area > _LEAST_AREA]
+    )
 
 
 def _across(

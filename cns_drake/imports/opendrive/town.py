@@ -29,11 +29,16 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.drives import search, steerable_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.opendrive import bridges, imported_streets
+from cns_drake.imports.opendrive import bridges
 from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
-from cns_drake.imports.opendrive.lanes import LaneBand, is_raised, lane_bands
+from cns_drake.imports.opendrive.lanes import (
+    LaneBand,
+    is_raised,
+    lane_bands,
+    lane_polygon,
+)
 from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_marks import road_marks
@@ -308,7 +313,7 @@ def _reserved_area(
     """Returns the area in W that stays free: below bridges and things [m]."""
     return shapely.union_all(
         [
-            *(imported_streets.lane_polygon(band) for band in raised),
+            *(lane_polygon(band) for band in raised),
             *(one.footprint_W for one in things),
         ]
     )

@@ -28,12 +28,9 @@ from cns_drake.imports.drives.search import find_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.band_graph import BandGraph
-from cns_drake.imports.opendrive.imported_streets import (
-    ImportedStreets,
-    lane_polygon,
-)
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
-from cns_drake.imports.opendrive.lanes import lane_bands
+from cns_drake.imports.opendrive.lanes import lane_bands, lane_polygon
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
