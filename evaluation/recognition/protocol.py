@@ -32,6 +32,26 @@ _DIGEST_LENGTH = 12
 _QUERY_CHANGES = ("turn_queries", "tilt_queries", "hide_sector")
 
 
+class ProtocolFieldError(InputError):
+    """A field of a protocol is out of range.
+
+    The message names the command-line option of the field.
+
+    Attributes:
+        field: name of the field.
+        fault: the field's value, and what is wrong with it.
+    """
+
+    def __init__(self, field: str, fault: str):
+        super().__init__(f"--{field.replace('_', '-')}: {fault}")
+        self.field = field
+        self.fault = fault
+
+    def __reduce__(self) -> tuple[type[ProtocolFieldError], tuple[str, str]]:
+        # Errors in jobs are sent to another process.
+        return type(self), (self.field, self.fault)
+
+
 @dataclass(frozen=True)
 class RetrievalProtocol:
     """The protocol of place recognition: how two drives are compared.
@@ -120,13 +140,12 @@ class RetrievalProtocol:
         """Refuses a value that is out of range.
 
         Args:
-            name: name of the field, from which that of the option follows.
+            name: name of the field.
             is_valid: whether its value is in range.
             fault: what the value is otherwise, for the message.
         """
         if not is_valid:
-            option = name.replace("_", "-")
-            raise InputError(f"--{option}: {getattr(self, name)} is {fault}")
+            raise ProtocolFieldError(name, f"{getattr(self, name)} is {fault}")
 
     def scans(self, method: Method) -> int:
         """Returns how many scans are merged for one place.

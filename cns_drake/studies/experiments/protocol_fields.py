@@ -8,7 +8,11 @@ from pydantic import ConfigDict, create_model
 from cns_drake.base.errors import InputError, validated
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.nested_fields import Changes
-from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
+from evaluation.recognition.protocol import (
+    PROTOCOLS,
+    ProtocolFieldError,
+    RetrievalProtocol,
+)
 
 # The fields of a protocol that a study can vary. Both settings of geometric
 # verification are measured in any case; matches are by distance, and drives
@@ -50,10 +54,9 @@ def protocol_from_fields(
     validated(_ProtocolFields, values, f"{source}: {place}")
     try:
         return replace(PROTOCOLS[base], **values)
-    except InputError as error:
-        option, _, fault = str(error).removeprefix("--").partition(":")
-        name = option.replace("-", "_")
-        raise InputError(f"{source}: {place}.{name}:{fault}") from None
+    except ProtocolFieldError as error:
+        where = f"{source}: {place}.{error.field}"
+        raise InputError(f"{where}: {error.fault}") from None
 
 
 def condition_protocol(

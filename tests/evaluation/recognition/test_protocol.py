@@ -1,6 +1,7 @@
 """The user chooses queries, places and matches."""
 
 from dataclasses import replace
+import pickle
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from helpers.measured_pairs import place_outcome
@@ -13,6 +14,7 @@ from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     PROTOCOL_COLUMNS,
+    ProtocolFieldError,
     RetrievalProtocol,
 )
 from evaluation.recognition.retrieval import retrieve
@@ -134,6 +136,17 @@ def test_what_is_not_positive_is_refused(name, value):
     option = name.replace("_", "-")
     with pytest.raises(InputError, match=f"--{option}: .* is not positive"):
         RetrievalProtocol(**{name: value})
+
+
+def test_an_error_says_which_field_is_wrong_also_in_another_process():
+    with pytest.raises(ProtocolFieldError) as raised:
+        RetrievalProtocol(query_spacing=-1)
+    for error in (raised.value, pickle.loads(pickle.dumps(raised.value))):
+        assert (error.field, error.fault) == (
+            "query_spacing",
+            "-1 is not positive",
+        )
+        assert str(error) == "--query-spacing: -1 is not positive"
 
 
 def test_it_is_part_of_every_number():
