@@ -18,23 +18,19 @@ class JoinedDrive(Drive):
     Attributes:
         starts: (P + 1,) first frame of each of the P drives; the last entry is
             the number of frames of all drives.
-        keep: which frames are kept in a map, see
-            `evaluation.recognition.kept_places.kept_places`.
     """
 
-    def __init__(self, sources: Sequence[Callable[[], Drive]], keep: str | int):
+    def __init__(self, sources: Sequence[Callable[[], Drive]]):
         """Opens each drive once, for its poses.
 
         Args:
             sources: functions that open the drives, from older to newer.
-            keep: which frames are kept in a map.
 
         Raises:
             InputError: a drive cannot be opened, or drives are in different
                 worlds.
         """
         self._sources = sources
-        self.keep = keep
         stamps, poses = [], []
         for number in range(len(sources)):
             drive = self._open(number)

@@ -24,7 +24,7 @@ from evaluation.localisation.settings import (
     Settings,
 )
 from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.recognition.kept_places import kept_places
+from evaluation.recognition.kept_places import KEEP_ALL, kept_places
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
@@ -100,6 +100,7 @@ def make_map(
     settings: Settings,
     columns: int | None = None,
     on_note: OnNote = no_note,
+    keep: str | int = KEEP_ALL,
 ) -> LocalisationMap:
     """Returns the localisation map of a drive or of a cloud in W.
 
@@ -111,12 +112,13 @@ def make_map(
         columns: number of columns of a `.bin` file; by default guessed from the
             values.
         on_note: is called with notes on how a cloud's file was read.
+        keep: which frames of a `JoinedDrive` are used, see `map_frames`.
 
     Raises:
         InputError: the source cannot be read, or has too few points.
     """
     if isinstance(source, Drive):
-        blocks = _scans_of_map(source)
+        blocks = _scans_of_map(source, keep)
     else:
         parts = read_blocks(source, columns, on_note)
         blocks = ((part, None) for part in parts)
@@ -133,27 +135,29 @@ def make_map(
 
 
 def _scans_of_map(
-    drive: Drive,
+    drive: Drive, keep: str | int
 ) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
     """Yields the cropped scans of which a map is made, each with its X_WS."""
-    frames = map_frames(drive).tolist()
+    frames = map_frames(drive, keep).tolist()
     for frame in track(frames, f"mapping {drive.name}", len(frames), "scans"):
         scan = drive.scan(frame)
         near = within_range(clouds.xyz(scan), MAX_RANGE)
         yield scan[near], drive.X_WS[frame]
 
 
-def map_frames(drive: Drive) -> np.ndarray:
+def map_frames(drive: Drive, keep: str | int = KEEP_ALL) -> np.ndarray:
     """Returns the frames (K,) of a drive that are used for its map.
 
-    If the drive is a `JoinedDrive`, frames that its attribute `keep` excludes
-    are left out.
+    Args:
+        drive: the drive.
+        keep: which frames are used if the drive is a `JoinedDrive`, see
+            `evaluation.recognition.kept_places.kept_places`.
     """
     if not isinstance(drive, JoinedDrive):
         return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)
     frames = drive.sampled(_MAP_SPACING)
     p_WSs = drive.X_WS[frames, :3, 3]
-    kept = kept_places(p_WSs, drive.drive_of(frames), drive.keep, _MAP_SPACING)
+    kept = kept_places(p_WSs, drive.drive_of(frames), keep, _MAP_SPACING)
     return frames[kept]
 
 

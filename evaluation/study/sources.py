@@ -81,7 +81,7 @@ class JoinedSource:
 
     Attributes:
         sources: the sources of the drives, from older to newer.
-        keep: which frames are kept in a map, see
+        keep: which frames are kept in a map of the database, see
             `evaluation.recognition.kept_places.kept_places`.
     """
 
@@ -89,7 +89,7 @@ class JoinedSource:
     keep: str | int
 
     def __call__(self) -> JoinedDrive:
-        return JoinedDrive(self.sources, self.keep)
+        return JoinedDrive(self.sources)
 
     def identity(self) -> list[object]:
         """Returns the identities of the drives, and what is kept."""

@@ -26,6 +26,7 @@ from evaluation.localisation.settings import (
     default_settings,
 )
 from evaluation.maps.voxel_maps import map_drive
+from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.place_numbers import kept_share
 from evaluation.recognition.result_number import Number
 from evaluation.study.sources import (
@@ -232,6 +233,7 @@ def measure_localisation(
     mapped = database()
     asked = query()
     columns = getattr(database, "columns", None)
+    keep = database.keep if isinstance(database, JoinedSource) else KEEP_ALL
     maps: dict[tuple[float, int], LocalisationMap] = {}
     localisers = []
     for method in map(str, methods):
@@ -242,7 +244,7 @@ def measure_localisation(
         if key not in maps:
             # The drive is opened anew for each other map.
             source = mapped if not maps else database()
-            maps[key] = make_map(source, settings, columns, reporter.note)
+            maps[key] = make_map(source, settings, columns, reporter.note, keep)
         localisers.append(localise.Localiser(maps[key], estimator, settings))
     try:
         is_mapped = localise.mapped_frames(

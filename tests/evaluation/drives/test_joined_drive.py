@@ -43,8 +43,8 @@ class Straight(Drive):
         return from_xyz(rng.uniform(-5.0, 5.0, (30, 3)))
 
 
-def joined(*drives, keep="all"):
-    return JoinedDrive([partial(Straight, *one) for one in drives], keep)
+def joined(*drives):
+    return JoinedDrive([partial(Straight, *one) for one in drives])
 
 
 def test_two_halves_are_the_whole():
@@ -70,11 +70,11 @@ def test_each_drive_is_sampled_from_its_start():
 
 @pytest.mark.parametrize("keep", ["latest", 1])
 def test_the_map_is_made_of_the_scans_that_are_kept(keep):
-    both = joined((0, 8), (0, 5), keep=keep)
-    frames = map_frames(both)
+    both = joined((0, 8), (0, 5))
+    frames = map_frames(both, keep)
     # The second drive covers the first 5 m anew.
     assert frames.tolist() == [5, 6, 7, 8, 9, 10, 11, 12]
-    assert map_frames(joined((0, 8), (0, 5))).tolist() == [*range(13)]
+    assert map_frames(both).tolist() == [*range(13)]
 
 
 def test_drives_of_other_worlds_are_refused():
