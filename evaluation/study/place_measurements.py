@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 import math
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -221,19 +221,15 @@ def measure_places(
         leaves_out_slow: whether to leave out a method that would take more than
             an hour for all queries.
     """
-    place_scans, places = _scans_and_descriptors(
-        database, "places", methods, protocol, reporter
-    )
-    query_scans, queries = _scans_and_descriptors(
-        query, "queries", methods, protocol, reporter
-    )
+    places = _described_drive(database, "places", methods, protocol)
+    queries = _described_drive(query, "queries", methods, protocol)
     overlaps: dict[float, np.ndarray] = {}
     outcomes = []
     for k, choice in enumerate(
         track(methods, "comparing", len(methods), "methods")
     ):
         method = choice.make()
-        mapped, asked = places(k), queries(k)
+        mapped, asked = places.take(k), queries.take(k)
         outcomes += _method_outcomes(
             choice,
             method,
@@ -249,8 +245,8 @@ def measure_places(
             partial(
                 _overlaps_of_matches,
                 overlaps,
-                place_scans,
-                query_scans,
+                places.scans,
+                queries.scans,
                 mapped,
                 asked,
             ),
@@ -381,21 +377,78 @@ def _takes_long(
     return one_ms * len(query.queries.frames) > _LONGEST_MS
 
 
-def _scans_and_descriptors(
+class _DescribedDrive(Protocol):
+    """The scans of a drive's places or queries, and their descriptors.
+
+    Attributes:
+        scans: the scans, in the order of the places or queries.
+    """
+
+    scans: list[np.ndarray]
+
+    def take(self, number: int) -> DriveDescriptors:
+        """Returns the descriptors by one method, and keeps no copy of them.
+
+        Only the descriptors of a method that is compared should be in memory.
+        Call this function only once for each method.
+
+        Args:
+            number: number of the method.
+        """
+
+
+class _StoredDrive:
+    """A drive whose scans and descriptors are in files."""
+
+    def __init__(self, scans: Part, *described: Part):
+        """Reads the scans.
+
+        Args:
+            scans: file with the scans.
+            described: for each method, the file with its descriptors.
+        """
+        self.scans: list[np.ndarray] = scans.read()
+        self._described = described
+
+    def take(self, number: int) -> DriveDescriptors:
+        return self._described[number].read()[1]
+
+
+class _ReadDrive:
+    """A drive whose scans are read and described at once."""
+
+    def __init__(
+        self,
+        source: DriveSource,
+        role: Role,
+        methods: tuple[MethodChoice, ...],
+        protocol: RetrievalProtocol,
+    ):
+        """Reads and describes the scans.
+
+        Args:
+            source: opens the drive.
+            role: role of the scans.
+            methods: the methods that describe the scans.
+            protocol: the protocol of the comparison.
+        """
+        asked = {one.key: (one.make(), {role}, protocol) for one in methods}
+        found = describe_recording(source(), {role}, asked, protocol)
+        self.scans = found.shown_scans
+        self._described = found.described
+        self._methods = methods
+
+    def take(self, number: int) -> DriveDescriptors:
+        return self._described.pop(self._methods[number].key)
+
+
+def _described_drive(
     drive: DescribedSource,
     role: Role,
     methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-    reporter: Reporter,
-) -> tuple[list[np.ndarray], Callable[[int], DriveDescriptors]]:
-    """Returns a drive's scans, and a function that returns its descriptors.
-
-    The function takes the number of a method. Call it only once for each
-    method, because it frees the descriptor.
-    """
+) -> _DescribedDrive:
+    """Returns a drive's scans and descriptors, from files if there are any."""
     if isinstance(drive, tuple):
-        scans, *parts = drive
-        return scans.read(), lambda k: parts[k].read()[1]
-    asked = {one.key: (one.make(), {role}, protocol) for one in methods}
-    found = describe_recording(drive(), {role}, asked, protocol)
-    return found.shown_scans, lambda k: found.described.pop(methods[k].key)
+        return _StoredDrive(*drive)
+    return _ReadDrive(drive, role, methods, protocol)
