@@ -79,7 +79,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             compares by their points; 0 without a second stage.
         divides: whether a database that is too large for the memory can be
             searched part by part. If so, the score and the pose of a place must
-            not depend on other places, except through `shortlist`.
+            not depend on other places, except through `shortlist`. A method
+            with a second stage cannot divide.
         describe_time: typical CPU time to describe a cloud [s], from which a
             study forecasts its own duration.
         config: the parameters in use.

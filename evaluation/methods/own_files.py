@@ -95,6 +95,11 @@ def _registered_method(module: ModuleType, path: Path) -> type[Method]:
             f"{path}: {method.__name__}: scans_per_place: {scans!r} is not a"
             " positive whole number"
         )
+    if method.divides and method.rerank_best:
+        raise InputError(
+            f"{path}: {method.__name__}: divides: a database that is searched "
+            "part by part keeps no clouds for rerank_best; set one of the two"
+        )
     return method
 
 

@@ -131,6 +131,11 @@ class Own(Method):
         ("    def desc", "    scans_per_place = 0\n    def desc", "0 is not a"),
         (
             "    def desc",
+            "    divides = True\n    rerank_best = 5\n    def desc",
+            "Own: divides: ",
+        ),
+        (
+            "    def desc",
             "    def __init__(self, config=None):\n        exit(0)\n"
             "    def desc",
             "line 10: SystemExit",
