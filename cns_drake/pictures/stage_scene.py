@@ -157,7 +157,7 @@ def _shade(
     facing = normal @ _SUN_W
     sun = np.broadcast_to(_SUN_W, p_W.shape)
     lit = ~np.isfinite(scene.cast_rays(p_W, sun, _FAR).ranges)
-    # Walls get half of the sky's light; roofs and streets get all of it. Two
+    # Walls get 65 % of the sky's light; roofs and streets get all of it. Two
     # short rays approximate the shade between surfaces.
     sky = 0.65 + 0.35 * normal[:, 2]
     sky *= 0.55 + 0.45 * _openness(scene, p_W, normal)

@@ -174,7 +174,11 @@ class Trial:
         return self._follower.arrived and u[num_steps - _AFTER] == u[-1]
 
     def _kept(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the vehicles and pedestrians that overlap no other body."""
+        """Returns which bodies are in the plan, as indices of their kind.
+
+        The result has the vehicles, and then the pedestrians, that remain when
+        no two bodies overlap any more, up to the requested numbers.
+        """
         kept = np.ones(len(self._half_sizes), bool)
         kept[whom_to_leave_out(self._overlaps, 1)] = False
         vehicles, walkers = (
@@ -194,10 +198,9 @@ class Trial:
 
     def plan(self) -> TrafficPlan:
         """Returns the plan that results from all time steps so far."""
-        vehicles_at = self._vehicles[: self._num_steps]
+        vehicles_at = self._vehicles[: self._num_steps].copy()
+        vehicles_at[:, :, 3] = np.unwrap(vehicles_at[:, :, 3], axis=0)
         walkers_at = self._walkers[: self._num_steps]
-        yaw = vehicles_at[:, :, 3]
-        yaw[:] = np.unwrap(yaw, axis=0)
         vehicles, walkers = self._kept()
         return TrafficPlan(
             tuple(self._kinds[k] for k in vehicles),

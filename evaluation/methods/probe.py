@@ -144,6 +144,8 @@ class ProbeMethod(Method[Probe, ProbeDatabase]):
         np.maximum.at(heights, cell, z[near])
         occupied = np.isfinite(heights).reshape(shape)
         heights = np.where(occupied, heights.reshape(shape), 0.0)
+        # The heights of a cloud without points nearby become NaN, and so does
+        # its similarity to any place.
         length = float(np.linalg.norm(heights)) or math.nan
         return Probe(heights / length, self._blurred(occupied))
 

@@ -41,9 +41,9 @@ class ExtractionJobs(Jobs):
         super().expect(pair)
         if self._protocol is None:
             self._protocol = pair.protocol
-        further: list[tuple[NamedDrive, Role]]
-        further = [(drive, "places") for drive in pair.beside]
-        for drive, role in (*pair.roles, *further):
+        beside: list[tuple[NamedDrive, Role]]
+        beside = [(drive, "places") for drive in pair.beside]
+        for drive, role in (*pair.roles, *beside):
             if self._is_extracted(pair.protocol):
                 self._roles.setdefault(drive.name, set()).add(role)
 
