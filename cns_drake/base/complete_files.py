@@ -170,13 +170,15 @@ def check_writable(path: Path) -> None:
 def check_folder_writable(folder: Path) -> None:
     """Checks before a long run that files can be written to a folder.
 
-    Creates the folder if necessary, and leaves nothing else behind.
+    The folder need not exist; nothing is left behind.
 
     Raises:
         InputError: if no file could be written.
     """
-    make_folder(folder)
-    with user_errors(folder), tempfile.TemporaryFile(dir=folder):
+    existing = folder
+    while not os.path.lexists(existing):
+        existing = existing.parent
+    with user_errors(folder), tempfile.TemporaryFile(dir=existing):
         pass
 
 

@@ -177,7 +177,8 @@ def test_two_writers_of_one_file(tmp_path):
 def test_a_folder_is_checked_before_it_is_filled(tmp_path):
     folder = tmp_path / "a" / "b"
     check_folder_writable(folder)
-    assert list(folder.iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
+    folder.mkdir(parents=True)
     (folder / "file").write_text("")
     check_folder_writable(folder)
     for wrong in (folder / "file", Path("/proc/cns-drake")):

@@ -231,5 +231,5 @@ def test_reasons_are_counted(judged):
     table = fault_table([result], known)
     (shown,) = table.rows
     assert shown[3:5] == (8, "12 %")
-    assert shown[-2:] == ("25 %", "1 car")
+    assert shown[-2:] == ("25 %", "car (1)")
     assert fault_table([result], {}).rows == ()
