@@ -279,31 +279,29 @@ def _ranked_entries(
                     f"{name}: left out, with {has} of {len(common)} conditions"
                 )
                 continue
-            same = [
-                other.name
+            others = [
+                (other.name, _deviations(method, other, table, common))
                 for other, name in kept
                 if name == method
-                and all(
-                    abs(
-                        other.rows[method, condition].value
-                        - table.rows[method, condition].value
-                    )
-                    <= _ALIKE
-                    for condition in common
-                )
+            ]
+            same = [
+                name
+                for name, deviations in others
+                if all(deviation <= _ALIKE for deviation in deviations)
             ]
             if same:
                 notes.append(
                     f"{method}: the same in {same[0]} and {table.name}; shown"
                     " once"
                 )
-            else:
+                continue
+            if table is tables[0]:
                 notes += [
-                    _difference_note(method, other, table, common)
-                    for other, name in kept
-                    if name == method and table is tables[0]
+                    f"{method}: other values in {name} and {table.name} "
+                    f"{_extent(deviations)}"
+                    for name, deviations in others
                 ]
-                kept.append((table, method))
+            kept.append((table, method))
     counts = Counter(method for _, method in kept)
     # In the order of the tables, as ties are shown.
     kept.sort(key=lambda entry: tables.index(entry[0]))
@@ -315,31 +313,35 @@ def _ranked_entries(
     }, notes
 
 
-def _difference_note(
+def _deviations(
     method: str,
-    own: MetricTable,
-    other: MetricTable,
+    first: MetricTable,
+    second: MetricTable,
     common: Sequence[Condition],
-) -> str:
-    """Returns a note on how far a method's values in two tables differ."""
-    differences = [
+) -> list[float]:
+    """Returns how far the values of a method differ, in each condition."""
+    return [
         abs(
-            own.rows[method, condition].value
-            - other.rows[method, condition].value
+            first.rows[method, condition].value
+            - second.rows[method, condition].value
         )
         for condition in common
     ]
-    number = sum(difference > _ALIKE for difference in differences)
-    note = (
-        f"{method}: other values in {own.name} and {other.name} in {number} of "
-        f"{len(common)} conditions, by up to {max(differences):.4f}"
+
+
+def _extent(deviations: Sequence[float]) -> str:
+    """Returns in how many conditions values differ, and by how much."""
+    number = sum(deviation > _ALIKE for deviation in deviations)
+    extent = (
+        f"in {number} of {len(deviations)} conditions, by up to "
+        f"{max(deviations):.4f}"
     )
-    if max(differences) <= _ROUNDED:
-        note += (
+    if max(deviations) <= _ROUNDED:
+        extent += (
             "; rounding on another processor, or by other versions of "
             "packages, can change single answers"
         )
-    return note
+    return extent
 
 
 def _mismatch_notes(
