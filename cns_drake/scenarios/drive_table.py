@@ -142,7 +142,6 @@ def _measured_row(
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.planning import plan_drive
 
-    scenario_files.check_files(scenario)
     trajectory = plan_drive(scenario)
     frames = frames_within(trajectory.duration, scenario.frame_period)
     structures, triangles = size or _stage_size(scenario)
