@@ -9,11 +9,11 @@ import struct
 
 import numpy as np
 
+from cns_drake.base.time_units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.point_cloud2 import point_field_datatype
 from cns_drake.recording import messages
 
-_NS_PER_S = 1_000_000_000
 # Placeholder for the numbers that change in a message that is made once. It is
 # a valid number of nanoseconds, and cannot occur in a text.
 _PLACEHOLDER = 0x3A17C0DE
@@ -41,7 +41,7 @@ def encode_point_cloud(
         for column in padding:
             rows[:, column] = 0
     start, middle, steps, end = _cloud_frame(points.dtype, frame_id)
-    stamp = struct.pack("=iI", *divmod(stamp_ns, _NS_PER_S))
+    stamp = struct.pack("=iI", *divmod(stamp_ns, NS_PER_S))
     width, length = (struct.pack("=I", n) for n in (len(rows), rows.nbytes))
     # The data follow their length twice: of a row, and of the whole. Records
     # are copied once here, and three times by the serialiser.
@@ -60,7 +60,7 @@ def _cloud_frame(dtype: np.dtype, frame_id: str) -> list[bytes]:
         ros_types.make_message(
             ros_types.POINT_CLOUD,
             header=messages.make_header(
-                frame_id, _PLACEHOLDER * _NS_PER_S + _PLACEHOLDER
+                frame_id, _PLACEHOLDER * NS_PER_S + _PLACEHOLDER
             ),
             height=1,
             width=_PLACEHOLDER,

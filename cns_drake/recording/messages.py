@@ -13,6 +13,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.jpeg_images import to_jpeg
+from cns_drake.base.time_units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 
@@ -29,8 +30,6 @@ _JPEG_QUALITY = 90
 _EXACT = 1e-12
 # The covariance of an exact pose or twist, row by row: (36,).
 EXACT_COVARIANCE = _EXACT * np.eye(6).ravel()
-
-_NS_PER_S = 1_000_000_000
 
 
 def make_imu(
@@ -138,7 +137,7 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:
     """Returns the header of a message."""
-    stamp = divmod(stamp_ns, _NS_PER_S)
+    stamp = divmod(stamp_ns, NS_PER_S)
     return ros_types.make_message(
         "std_msgs/msg/Header", stamp=stamp, frame_id=frame_id
     )

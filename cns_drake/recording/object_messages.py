@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cns_drake.base.time_units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.sensor_names import MAP_FRAME
 from cns_drake.recording import messages
@@ -12,10 +13,9 @@ from cns_drake.recording import messages
 # Placeholders of numbers in a message: this and the following integers, which
 # are exact in double precision and larger than any measurement.
 _FIRST_MARK = 2.0**52
-_NS_PER_S = 1_000_000_000
 # Placeholder of the stamp: seconds and nanoseconds.
 _STAMP_MARK = (0x5A17C0DE, 0x3A17C0DE)
-_STAMP_MARK_NS = _STAMP_MARK[0] * _NS_PER_S + _STAMP_MARK[1]
+_STAMP_MARK_NS = _STAMP_MARK[0] * NS_PER_S + _STAMP_MARK[1]
 # CDR begins with the encoding; alignment is counted from the byte after it.
 _ENCAPSULATION = 4
 # Numbers of a box: position, orientation and size.
@@ -95,7 +95,7 @@ class BoxMessages:
         floats, words = _number_views(data)
         floats[self._number_places] = numbers.ravel()[self._number_order]
         words[self._stamp_places], words[self._stamp_places + 1] = divmod(
-            stamp_ns, _NS_PER_S
+            stamp_ns, NS_PER_S
         )
         return data.tobytes()
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 import math
 
+from cns_drake.base.time_units import NS_PER_S
+
 # Time between frames [s] if the first LiDAR has the paper's rate, 20 Hz.
 FRAME_PERIOD = 0.05
 # Stamp of frame 0 [ns]. Zero would mean "latest" to tf2. The clock's time would
 # give other bytes at each run.
 START_NS = 1_700_000_000_000_000_000
-_NS_PER_S = 1_000_000_000
 # Largest denominator of a period in seconds: large enough to recover fractions
 # such as 1/30 from a double.
 _FINEST = 10**9
@@ -84,7 +85,7 @@ class Schedule:
         """Returns the time of a tick since the start [ns]."""
         # Integer arithmetic: fractions would take longer than a message.
         numerator, denominator = self.exact_period.as_integer_ratio()
-        doubled = 2 * tick * numerator * _NS_PER_S + denominator
+        doubled = 2 * tick * numerator * NS_PER_S + denominator
         return doubled // (2 * denominator)
 
 

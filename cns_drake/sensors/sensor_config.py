@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from cns_drake.base.input_models import InputModel
+from cns_drake.base.time_units import NS_PER_S
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 # Greatest rate of a sensor [1/s].
 HIGHEST_RATE = 1000
-_NS_PER_S = 1_000_000_000
 
 # Greatest distance of a sensor from the vehicle's origin [m]; rays are cast in
 # single precision.
@@ -145,7 +145,7 @@ def check_rate(
     allowed = [
         candidate
         for candidate in range(lowest, HIGHEST_RATE + 1)
-        if _NS_PER_S % candidate == 0 and candidate % multiple_of == 0
+        if NS_PER_S % candidate == 0 and candidate % multiple_of == 0
     ]
     if rate in allowed:
         return

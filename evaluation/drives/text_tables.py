@@ -11,9 +11,9 @@ import numpy as np
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
 from cns_drake.base.number_text import is_number, parse_rows, pick_columns
+from cns_drake.base.time_units import NS_PER_S
 from evaluation.drives.table_headers import find_columns, split_header
 
-_NS_PER_S = 1_000_000_000
 _NS_PER_US = 1000
 # Largest table [bytes]: enough for hours of an IMU.
 _TABLE_LIMIT_BYTES = 1 << 26
@@ -222,7 +222,7 @@ def _is_fraction(text: str) -> bool:
 
 
 def _seconds_to_ns(text: str) -> int:
-    return _to_ns(text, _NS_PER_S)
+    return _to_ns(text, NS_PER_S)
 
 
 def _to_ns(text: str, unit_ns: int) -> int:
