@@ -1,0 +1,26 @@
+"""What the programs do at their edges is what the pins say.
+
+`python tests/edges/refresh.py NAME` writes the pins of an edge anew.
+"""
+
+import pytest
+
+from edges.measured import BY_NIGHT, EDGES, PINS, differences
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("name", EDGES)
+def test_an_edge_is_as_pinned(name, tmp_path):
+    found = EDGES[name](tmp_path)
+    changed = {
+        file: differences(file, (PINS / file).read_text(), text)
+        for file, text in found.items()
+    }
+    assert not {file: lines for file, lines in changed.items() if lines}
+
+
+@pytest.mark.night
+@pytest.mark.parametrize("name", BY_NIGHT)
+def test_an_edge_by_night(name, tmp_path):
+    BY_NIGHT[name](tmp_path)
