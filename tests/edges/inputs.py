@@ -46,7 +46,7 @@ _RECORDINGS = {
 _EXPERIMENT = {
     "about": "What do missing houses cost?",
     "maps": ["town"],
-    "database": {"stage": ["last", "earlier 1"]},
+    "database": {"stage": ["last", "first"]},
     "tasks": ["place", "pose", "change"],
     "methods": ["scan-context++", "solid", "layered-overlap", "ring++", "btc"],
     "protocol": {"base": "fair", "query_spacing": 8.0},
