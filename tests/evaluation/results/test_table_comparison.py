@@ -503,7 +503,6 @@ def test_faults_are_one_line(tmp_path, capsys):
     pair = ["compare", one, other, "--rankings"]
     assert_refused(capsys, pair, "fewer than two methods")
     assert_refused(capsys, ["compare", tmp_path / "none.csv"], "none.csv")
-    assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
 
 
 def test_queries_without_blocks_are_noted(tmp_path):
