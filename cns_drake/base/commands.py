@@ -1,8 +1,6 @@
 """Commands made from functions, with help from their docstrings."""
 
-from collections.abc import Callable, Collection, Mapping
-import functools
-import inspect
+from collections.abc import Collection, Mapping
 import math
 import re
 import textwrap
@@ -12,9 +10,6 @@ import typer
 from typer.core import TyperCommand
 
 from cns_drake.base.errors import InputError
-
-# Parameter name -> its type, annotated with the option, and its default.
-Options = Mapping[str, tuple[Any, Any]]
 
 
 class Command(TyperCommand):
@@ -41,15 +36,6 @@ class Command(TyperCommand):
             param.help = helps.get(param.name, param.help)
         super().__init__(*args, help=text, params=params, **settings)
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Reads the command line; refuses options of earlier versions first."""
-        former = getattr(self.callback, "former_options", {})
-        for word in args[: args.index("--")] if "--" in args else args:
-            option = word.partition("=")[0]
-            if option in former:
-                raise InputError(f"{option}: is now {former[option]}")
-        return super().parse_args(ctx, args)
-
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, after checking that its numbers are finite."""
         # Only options with a lower limit are checked here; others are checked
@@ -64,24 +50,6 @@ class Command(TyperCommand):
             }
         )
         return super().invoke(ctx)
-
-
-def former_options(
-    replaced: Mapping[str, str],
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator for a command some of whose options were replaced.
-
-    Args:
-        replaced: maps an option of an earlier version to the option that
-            replaces it, such as `--lidar`. If a user gives the earlier option,
-            an error names the new option.
-    """
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        command.former_options = replaced  # type: ignore[attr-defined]
-        return command
-
-    return decorate
 
 
 def check_finite(values: Mapping[str, object]) -> None:
@@ -142,52 +110,3 @@ def check_only_with(
             raise InputError(
                 f"{shown}: not together with --{chosen.replace('_', '-')}"
             )
-
-
-def with_options(
-    keyword: str, options: Options, make: Callable[..., Any]
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that adds a group of options to a command.
-
-    The decorated function has one parameter for the whole group. On the command
-    line, the parameter is replaced by the options of the group.
-
-    Args:
-        keyword: name of the parameter for the whole group.
-        options: name -> (type, default) of each option of the group.
-        make: function that is called with the options' values as keyword
-            arguments. The result of this function is passed to the command as
-            `keyword`.
-    """
-    added = [
-        inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=default,
-            annotation=kind,
-        )
-        for name, (kind, default) in options.items()
-    ]
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(command)
-        def run(**values: Any) -> None:
-            chosen = {name: values.pop(name) for name in options}
-            command(**values, **{keyword: make(**chosen)})
-
-        own = inspect.signature(command, eval_str=True).parameters.values()
-        parameters = [
-            *(
-                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-                for parameter in own
-                if parameter.name != keyword
-            ),
-            *added,
-        ]
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {
-            parameter.name: parameter.annotation for parameter in parameters
-        }
-        return run
-
-    return decorate

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numba
 
-from cns_drake.base.file_names import cache_folder
+from cns_drake.base.files import cache_folder
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.progress import interlude
 

@@ -167,7 +167,7 @@ def describe_validation_error(
         source: name of the file or argument, with which the line begins.
         error: what pydantic raised.
         model: the model that was validated. If given, the line suggests a name
-            for an unknown field.
+            for an unknown field, or lists the known fields.
     """
     fault = min(error.errors(), key=_urgency)
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
@@ -187,23 +187,14 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
     """Returns advice on how to mend a fault; "" if no remedy is obvious."""
     place, given = fault["loc"], fault["input"]
     if fault["type"] == "extra_forbidden" and model is not None and place:
-        name = nearest_field(model, place)
-        return f"; did you mean {name}?" if name else ""
+        names = list(dict.fromkeys(_fields_at(model, place[:-1])))
+        if names:
+            near = did_you_mean(place[-1], sorted(names))
+            return near or f"; there are: {', '.join(names)}"
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
     if fault["type"] == "string_type" and is_number and place:
         return f'; quote it: {place[-1]}: "{given}"'
     return ""
-
-
-def nearest_field(
-    model: type[BaseModel], place: Sequence[str | int]
-) -> str | None:
-    """Returns the known field whose spelling is closest to an unknown field.
-
-    `place` lists the keys and indices that lead to the unknown field, and ends
-    with the field's name.
-    """
-    return _nearest(place[-1], sorted(set(_fields_at(model, place[:-1]))))
 
 
 def did_you_mean(given: object, names: Iterable[str]) -> str:
@@ -213,13 +204,8 @@ def did_you_mean(given: object, names: Iterable[str]) -> str:
         given: the misspelt name.
         names: the known names. If no known name is similar, the result is "".
     """
-    near = _nearest(given, names)
-    return f"; did you mean {near}?" if near else ""
-
-
-def _nearest(given: object, names: Iterable[str]) -> str | None:
     close = difflib.get_close_matches(str(given), list(names), n=1)
-    return close[0] if close else None
+    return f"; did you mean {close[0]}?" if close else ""
 
 
 def _fields_at(kind: Any, place: Sequence[str | int]) -> Iterator[str]:

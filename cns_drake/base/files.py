@@ -1,16 +1,18 @@
-"""Checks files that a user names, and reads files up to a size limit."""
+"""Files that a user names: checks, order, and reading up to a size limit."""
 
 import codecs
 from collections.abc import Iterator
 import contextlib
 import os
 from pathlib import Path
+import re
 import stat
 
 from cns_drake.base.errors import InputError
 
 # Files written by hand are far smaller [bytes].
 _WRITTEN_BYTES = 1 << 26
+_NUMBERS = re.compile(r"([0-9]+)")
 
 
 @contextlib.contextmanager
@@ -108,3 +110,45 @@ def make_folder(path: Path) -> None:
             path.mkdir(parents=True, exist_ok=True)
         except FileExistsError:
             raise InputError(f"{path}: not a folder") from None
+
+
+def cache_folder() -> Path:
+    """Returns cns-drake's folder in the cache of the user.
+
+    Source: the XDG base directory specification. The folder may not exist.
+    """
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
+    return Path(os.path.expanduser(folder)) / "cns-drake"
+
+
+def natural_key(text: str) -> tuple:
+    """Returns the key by which names are sorted in natural order.
+
+    Digits in a name count as whole numbers: 9 comes before 10, `v9` before
+    `v10`, and `2012-2-4` before `2012-10-28`. Names that differ only in leading
+    zeros are in the order of text.
+    """
+    # Text and numbers alternate. Of two numbers, the longer one is greater.
+    return tuple(
+        (len(part.lstrip("0")), part.lstrip("0")) if k % 2 else part
+        for k, part in enumerate(_NUMBERS.split(text))
+    ), text
+
+
+def listed(folder: Path, pattern: str = "*") -> list[Path]:
+    """Returns the files and folders in a folder, in natural order.
+
+    Hidden files are left out: editors and macOS write files such as
+    `._000001.bin` next to the user's files.
+
+    Args:
+        folder: the folder. If the folder does not exist, the result is empty.
+        pattern: pattern of the names, as for `Path.glob`.
+    """
+    found = [path for path in folder.glob(pattern) if not _is_hidden(path)]
+    return sorted(found, key=lambda path: natural_key(str(path)))
+
+
+def _is_hidden(path: Path) -> bool:
+    return path.name.startswith(".")

@@ -58,36 +58,6 @@ def parse_rows(
         ) from error
 
 
-def pick_columns(
-    lines: Sequence[str],
-    places: Sequence[int],
-    width: int,
-    separator: str | None = None,
-) -> list[str]:
-    """Returns rows with some of their columns, in a given order.
-
-    Args:
-        lines: N rows.
-        places: place of each wanted column, from 0.
-        width: number of columns of a row.
-        separator: text between columns; None for white space.
-
-    Raises:
-        ValueError: a row has another number of columns; the message names the
-            first such row.
-    """
-    picked = []
-    for row, line in enumerate(lines, start=1):
-        words = line.split(separator)
-        if len(words) != width:
-            fault = f"{len(words)} columns instead of {width}"
-            raise ValueError(
-                f"row {row}: {other_separator(line, separator) or fault}"
-            )
-        picked.append((separator or " ").join(words[k] for k in places))
-    return picked
-
-
 def _first_fault(
     lines: Iterable[str | bytes],
     dtype: np.dtype,

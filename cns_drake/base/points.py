@@ -65,35 +65,6 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
     return contiguous.view(dtype).reshape(len(coordinates))
 
 
-def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
-    """Writes values to a field of points, after checking that they fit.
-
-    Args:
-        points: (N,) structured array, changed in place.
-        name: name of the field.
-        values: (N,) or, for a field of K numbers, (N, K); float64, or integers
-            of 8 bytes for a field of such integers.
-
-    Raises:
-        ValueError: if a number does not fit the field's type: it is out of
-            range, or not whole for a field of integers.
-    """
-    dtype = points.dtype[name].base
-    fault = f"{name}: a number does not fit {dtype}"
-    # NumPy notices only some numbers that are out of range: as a byte, 300.0
-    # would become 44.
-    if dtype.kind in "iu":
-        limits = np.iinfo(dtype)
-        fits = (values >= limits.min) & (values <= limits.max)
-        if not (fits & (values == np.trunc(values))).all():
-            raise ValueError(fault)
-    with np.errstate(over="raise", invalid="raise"):
-        try:
-            points[name] = values
-        except FloatingPointError as error:
-            raise ValueError(fault) from error
-
-
 def to_xyzi(scan: np.ndarray) -> np.ndarray:
     """Returns x, y, z and intensity of a scan as (N, 4) little-endian float32.
 
@@ -122,15 +93,6 @@ def encode_pcd(scan: np.ndarray) -> bytes:
         f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(scan)}\nDATA binary\n"
     )
     return header.encode() + encode_bin(scan)
-
-
-def encode_labels(scan: np.ndarray) -> bytes:
-    """Returns a scan's labels as SemanticKITTI stores them.
-
-    Each point is a uint32: label + 2^16 * instance.
-    """
-    label = scan["label"].astype("<u4")
-    return (label | scan["instance"].astype("<u4") << 16).tobytes()
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from cns_drake.base import interrupts
 from cns_drake.base.errors import (
     TRACEBACK_OPTION,
     InputError,
+    did_you_mean,
     one_line,
     shows_traceback,
 )
@@ -49,7 +50,6 @@ def make_program(
     name: str,
     summary: str,
     epilog: str,
-    renamed: Mapping[str, str] | None = None,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> typer.Typer:
     """Returns an empty command-line program, to which commands are added.
@@ -61,23 +61,20 @@ def make_program(
         name: name of the program, as it is typed.
         summary: text at the beginning of the program's help.
         epilog: text at the end of the program's help.
-        renamed: name of a former command -> the command that replaces it, such
-            as `simulate`, or `cns-eval pr --scores` if the command belongs to
-            another program. Calling a former command is an error whose message
-            names the new command.
         groups: heading -> commands that the help lists under it; by default
             there is a single heading for all commands.
     """
 
     class Program(TyperGroup):
         def get_command(self, ctx: Any, cmd_name: str) -> Any:
-            if renamed is not None and cmd_name in renamed:
-                new = renamed[cmd_name]
-                if not new.startswith("cns-"):
-                    new = f"{name} {new}"
-                # Typer adds a similar command to errors of usage.
-                raise InputError(f"'{name} {cmd_name}' is now '{new}'")
-            return super().get_command(ctx, cmd_name)
+            command = super().get_command(ctx, cmd_name)
+            if command is None:
+                raise InputError(
+                    f"unknown command '{cmd_name}'; there are: "
+                    f"{', '.join(self.commands)}"
+                    f"{did_you_mean(cmd_name, self.commands)}"
+                )
+            return command
 
         def format_commands(self, ctx: Any, formatter: Any) -> None:
             if groups is None:

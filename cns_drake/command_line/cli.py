@@ -57,20 +57,6 @@ app = program.make_program(
         "Study what change costs": ("study", "reproduce", "train"),
         "Convert for other programs": ("export",),
     },
-    renamed={
-        "ladder": "study ladder",
-        "levels": "study levels",
-        "size": "study size",
-        "years": "study years",
-        "fresh": "study fresh",
-        "trend": "study trend",
-        "map-pairs": "study map-pairs",
-        "overlap": "export A B --format overlap-table",
-        "export-pairs": "export DRIVE ... --format pointnetvlad|overlap",
-        "map-truth": "export A B --format map-truth",
-        "film": "export DRIVE --format film",
-        "repair": "export FILE.mcap --format mcap",
-    },
 )
 for _command, (_first, *_rest) in _EXAMPLES.items():
     app.command(

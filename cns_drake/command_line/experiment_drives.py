@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cns_drake.base.errors import InputError
 from cns_drake.base.terminal import note
 
 if TYPE_CHECKING:
@@ -27,24 +26,15 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     Raises:
         InputError: the experiment cannot be used.
     """
-    from cns_drake.base.yaml_files import read_yaml
     from cns_drake.scenarios.scenario_files import write_scenarios
     from cns_drake.studies.experiments.experiment_files import (
         load_experiment,
-        shipped_experiments,
     )
     from cns_drake.studies.study import Study
 
-    if vary not in shipped_experiments():
-        values = read_yaml(Path(vary))
-        if isinstance(values, dict) and "base" in values:
-            raise InputError(
-                f"{vary}: base: --vary reads an experiment now, with `maps`,"
-                " and the fields that vary below `database` and `query`"
-            )
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
-    experiment = load_experiment(vary, list(unused.items()), on_note=note)
+    experiment = load_experiment(vary, list(unused.items()))
     study = Study(experiment, output.absolute(), vary, cluster, note)
     members = study.drives()
     write_scenarios(members, output / "scenarios")

@@ -78,9 +78,6 @@ _OVERLAP_RANGE = 100.0
 _MAP_SPACING = 1.0
 
 
-@commands.former_options(
-    {"--sensor": "--lidar", "--start": "--start-time"},
-)
 def export(
     context: typer.Context,
     drives: Annotated[

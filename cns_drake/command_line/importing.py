@@ -11,8 +11,8 @@ import typer
 
 from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError, errors_at_option
+from cns_drake.base.files import natural_key
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.listing import natural_key
 from cns_drake.base.number_text import whole_number
 from cns_drake.base.terminal import note, show
 from cns_drake.imports.options import DriveOn, ImportOptions, Undated

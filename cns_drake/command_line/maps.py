@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands, shared_options
+from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, show
@@ -115,7 +115,6 @@ def table_lines(rows: list[DriveRow], width: int | None) -> Iterator[str]:
         ).rstrip()
 
 
-@commands.former_options({"--start": "--new"})
 def city(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER")],
     new: Annotated[bool, typer.Option("--new")] = False,

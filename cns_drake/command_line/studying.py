@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cns_drake.base import commands, shared_options
+from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, resumable
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from cns_drake.studies.experiments.experiment import Experiment
 
 
-@commands.former_options({"--quick": "--no-recordings"})
 @with_protocol
 def reproduce(
     maps: options.Maps = None,
@@ -215,7 +214,7 @@ def _chosen_experiment(
         )
         from evaluation.study.chosen_methods import expanded_names
 
-    experiment = load_experiment(name, overrides, quick=quick, on_note=note)
+    experiment = load_experiment(name, overrides, quick=quick)
     chosen: list[str | tuple[str, Any]] = list(overrides)
     for field, names in (
         ("tasks", tasks),

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from cns_drake.base import poses
-from cns_drake.base.points import encode_bin, encode_labels
+from cns_drake.base.points import encode_bin
 from cns_drake.drives.mcap_drive import McapDrive
 from cns_drake.export.layout import (
     Layout,
@@ -130,3 +130,12 @@ def kitti_layout(number: str | None = None) -> Layout:
 
 
 KITTI = kitti_layout()
+
+
+def encode_labels(scan: np.ndarray) -> bytes:
+    """Returns a scan's labels as SemanticKITTI stores them.
+
+    Each point is a uint32: label + 2^16 * instance.
+    """
+    label = scan["label"].astype("<u4")
+    return (label | scan["instance"].astype("<u4") << 16).tobytes()

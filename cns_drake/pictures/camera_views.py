@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,13 +40,6 @@ class View(BaseModel):
     position: Place
     target: Place
     fov_y_deg: float = Field(default=50.0, ge=0.1, le=179.0)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _refuse_former_name(cls, values: Any) -> Any:
-        if isinstance(values, dict) and "fov_y" in values:
-            raise ValueError("fov_y: this field is now fov_y_deg")
-        return values
 
     @model_validator(mode="after")
     def _check_direction(self) -> View:

@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from cns_drake.base.time_units import NS_PER_S
+from cns_drake.base.units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.point_cloud2 import point_field_datatype
 from cns_drake.recording import messages

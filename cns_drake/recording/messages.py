@@ -13,7 +13,7 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.sensors import CameraInfo
 
 from cns_drake.base.jpeg_images import to_jpeg
-from cns_drake.base.time_units import NS_PER_S
+from cns_drake.base.units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.sensor_names import BASE_FRAME, IMU_FRAME, MAP_FRAME
 

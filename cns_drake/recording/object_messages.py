@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cns_drake.base.time_units import NS_PER_S
+from cns_drake.base.units import NS_PER_S
 from cns_drake.drives import ros_types
 from cns_drake.drives.sensor_names import MAP_FRAME
 from cns_drake.recording import messages

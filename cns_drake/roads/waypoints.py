@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.base.angles import wrapped
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
+from cns_drake.base.units import wrapped
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import (
     DENSE_SPACING,

@@ -1,10 +1,9 @@
 """Scenario files, and the files that a scenario names."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 import os
 from pathlib import Path
 import re
-from typing import Any
 
 import yaml
 
@@ -16,12 +15,10 @@ from cns_drake.base.errors import (
     value_errors,
 )
 from cns_drake.base.files import make_folder
-from cns_drake.base.terminal import note
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_drives, shipped_maps
 from cns_drake.scene.map_folder import MapFolder, drive_name
-from cns_drake.sensors.camera.config import FORMER_ANGLES
 from cns_drake.sensors.imu.config import KALIBR_FILE
 
 
@@ -121,20 +118,7 @@ def _read_fields(file: Path) -> dict:
             " digits and underscores; give a name"
         )
     make_paths_absolute(values, file)
-    _note_radians(values, file)
     return values
-
-
-def _note_radians(values: Mapping[str, Any], file: Path) -> None:
-    """Notes angles of cameras that have the unit of earlier versions."""
-    cameras = values.get("cameras")
-    for name, fields in cameras.items() if isinstance(cameras, dict) else ():
-        for old, new in FORMER_ANGLES.items():
-            if isinstance(fields, dict) and old in fields:
-                note(
-                    f"{file}: cameras.{name}.{old}: read in radians; this field"
-                    f" is now {new}, in degrees"
-                )
 
 
 def _find_base(

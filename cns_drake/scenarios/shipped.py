@@ -13,7 +13,7 @@ import tempfile
 from types import MappingProxyType
 
 from cns_drake.base.errors import InputError, did_you_mean
-from cns_drake.base.file_names import cache_folder
+from cns_drake.base.files import cache_folder
 from cns_drake.scene.map_folder import MapFolder, drive_name, no_drives
 
 

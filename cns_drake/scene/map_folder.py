@@ -5,8 +5,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import check_regular
-from cns_drake.base.listing import listed
+from cns_drake.base.files import check_regular, listed
 
 ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import ConfigDict, Field
 
 from cns_drake.base.input_models import InputModel
-from cns_drake.base.time_units import NS_PER_S
+from cns_drake.base.units import NS_PER_S
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph

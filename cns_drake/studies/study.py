@@ -65,17 +65,6 @@ TASKS: Mapping[str, type[Task]] = {
         SeenTask,
     )
 }
-# Tables that earlier versions wrote.
-_FORMER = (
-    "ladder.csv",
-    "years.csv",
-    "lifetimes.csv",
-    "size.csv",
-    "trend.csv",
-    "map_pairs.csv",
-    "map_update.csv",
-    "localisation.csv",
-)
 # Files of `cns-eval report`, and the folder of `cns-drake reproduce`.
 _OF_REPORTS = ("report.html", "report")
 
@@ -177,12 +166,6 @@ class Study:
         Raises:
             InputError: a map or the folder cannot be used, or a step failed.
         """
-        for name in _FORMER:
-            if (self.output / name).exists():
-                raise InputError(
-                    f"{self.output / name}: results of an older version; give"
-                    " another folder"
-                )
         for name in _OF_REPORTS:
             if (self.output / name).exists():
                 raise InputError(

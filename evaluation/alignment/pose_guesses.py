@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.angles import wrapped
 from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track
+from cns_drake.base.units import wrapped
 from evaluation.alignment.submaps import Submaps
 from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.scan_context import ScanContext

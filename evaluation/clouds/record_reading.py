@@ -10,7 +10,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from cns_drake.base.number_text import parse_rows
-from cns_drake.base.points import store
 from cns_drake.base.repetitions import repeated
 
 # Room for some tens of numbers with some tens of characters each.
@@ -138,3 +137,32 @@ def record_type(fields: list[tuple], where: str) -> np.dtype:
     for name in repeated(names):
         raise ValueError(f"{where} {name} is there twice")
     return np.dtype(fields)
+
+
+def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
+    """Writes values to a field of points, after checking that they fit.
+
+    Args:
+        points: (N,) structured array, changed in place.
+        name: name of the field.
+        values: (N,) or, for a field of K numbers, (N, K); float64, or integers
+            of 8 bytes for a field of such integers.
+
+    Raises:
+        ValueError: if a number does not fit the field's type: it is out of
+            range, or not whole for a field of integers.
+    """
+    dtype = points.dtype[name].base
+    fault = f"{name}: a number does not fit {dtype}"
+    # NumPy notices only some numbers that are out of range: as a byte, 300.0
+    # would become 44.
+    if dtype.kind in "iu":
+        limits = np.iinfo(dtype)
+        fits = (values >= limits.min) & (values <= limits.max)
+        if not (fits & (values == np.trunc(values))).all():
+            raise ValueError(fault)
+    with np.errstate(over="raise", invalid="raise"):
+        try:
+            points[name] = values
+        except FloatingPointError as error:
+            raise ValueError(fault) from error

@@ -16,16 +16,6 @@ from evaluation.command_line.real import real
 from evaluation.command_line.report import report
 from evaluation.command_line.tcr import tcr
 
-# Command of an earlier version -> the command that replaces it.
-RENAMED = {
-    "ranking": "compare --rankings",
-    "scores": "pr DATABASE QUERY --method METHOD --scores FILE.csv",
-    "drives": "tcr A B --paths",
-    "trajectory": "localise DRIVE --estimate FILE.tum",
-    "map-sessions": "cns-drake export A B --format map-sessions",
-    "trend": "cns-drake study FILE.yaml FOLDER",
-}
-
 app = program.make_program(
     "cns-eval",
     "Structural change and place recognition on LiDAR drives.",
@@ -35,7 +25,6 @@ app = program.make_program(
         "Recognise places": ("pr", "report", "compare", "real"),
         "Localise, and keep maps": ("localise", "map-update"),
     },
-    renamed=RENAMED,
 )
 app.command(
     cls=Command,

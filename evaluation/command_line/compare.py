@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cns_drake.base import commands, shared_options, terminal
+from cns_drake.base import shared_options, terminal
 from cns_drake.base.terminal import number_text
 from evaluation.command_line.printed_text import interval_text
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from evaluation.recognition.bootstrap import Interval
 
 
-@commands.former_options({"--gate": "--verified"})
 def compare(
     tables: Annotated[list[Path], typer.Argument(metavar="RESULTS")],
     metric: str = "auc",

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.listing import listed
+from cns_drake.base.files import listed
 from cns_drake.base.progress import doing
 from cns_drake.drives.drive import Drive
 from cns_drake.drives.same_world import (

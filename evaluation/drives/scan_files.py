@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.files import read_bytes, user_errors
-from cns_drake.base.listing import listed
+from cns_drake.base.files import listed, read_bytes, user_errors
 from cns_drake.base.points import FARTHEST_RETURN, check_range
 from cns_drake.drives.drive import Drive
 from cns_drake.drives.lidar_fields import LidarField, lidar_field

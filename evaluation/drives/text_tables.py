@@ -10,8 +10,8 @@ import numpy as np
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
-from cns_drake.base.number_text import is_number, parse_rows, pick_columns
-from cns_drake.base.time_units import NS_PER_S
+from cns_drake.base.number_text import is_number, other_separator, parse_rows
+from cns_drake.base.units import NS_PER_S
 from evaluation.drives.table_headers import find_columns, split_header
 
 _NS_PER_US = 1000
@@ -101,7 +101,7 @@ def read_numbers(
                 header or before, lines[0], separator, names
             )
             if places != list(range(width)):
-                lines = pick_columns(lines, places, width, separator)
+                lines = _pick_columns(lines, places, width, separator)
         return parse_rows(lines, np.dtype(columns), separator)
 
 
@@ -235,3 +235,33 @@ def _to_ns(text: str, unit_ns: int) -> int:
     if not -(2**63) <= stamp_ns < 2**63:
         raise ValueError(f"{text!r} is no time")
     return stamp_ns
+
+
+def _pick_columns(
+    lines: Sequence[str],
+    places: Sequence[int],
+    width: int,
+    separator: str | None = None,
+) -> list[str]:
+    """Returns rows with some of their columns, in a given order.
+
+    Args:
+        lines: N rows.
+        places: place of each wanted column, from 0.
+        width: number of columns of a row.
+        separator: text between columns; None for white space.
+
+    Raises:
+        ValueError: a row has another number of columns; the message names the
+            first such row.
+    """
+    picked = []
+    for row, line in enumerate(lines, start=1):
+        words = line.split(separator)
+        if len(words) != width:
+            fault = f"{len(words)} columns instead of {width}"
+            raise ValueError(
+                f"row {row}: {other_separator(line, separator) or fault}"
+            )
+        picked.append((separator or " ").join(words[k] for k in places))
+    return picked

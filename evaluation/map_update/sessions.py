@@ -26,8 +26,7 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.complete_files import completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import is_there, user_errors
-from cns_drake.base.listing import listed
+from cns_drake.base.files import is_there, listed, user_errors
 from cns_drake.base.points import encode_pcd, xyz
 from cns_drake.base.progress import track
 from cns_drake.drives.drive import Drive

@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import read_bytes
+from cns_drake.base.files import listed, read_bytes
 from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.base.listing import listed
 from cns_drake.drives.lidar_fields import lidar_field
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.clouds.notes import OnNote

@@ -19,9 +19,8 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
+from cns_drake.base.files import listed, user_errors
 from cns_drake.base.jobs.file_digests import file_digests
-from cns_drake.base.listing import listed
 from cns_drake.base.points import from_xyz, xyz
 from cns_drake.base.poses import yaw_pose
 from cns_drake.base.progress import track

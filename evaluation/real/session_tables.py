@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from cns_drake.base.listing import listed
+from cns_drake.base.files import listed
 from cns_drake.base.number_text import number_within
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
 from evaluation.results.figure_files import save_figure

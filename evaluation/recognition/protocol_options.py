@@ -1,18 +1,23 @@
 """The options of the commands that compare two drives by a protocol."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+import functools
+import inspect
 from typing import Annotated, Any, Literal
 
 import typer
 
-from cns_drake.base.commands import Options, with_options
 from evaluation.recognition.protocol import (
     PROTOCOLS,
     RECORDED_PROTOCOL,
     RetrievalProtocol,
 )
 
-_NAMED: Options = {
+# Parameter name -> its type, annotated with the option, and its default.
+_Options = Mapping[str, tuple[Any, Any]]
+
+_NAMED: _Options = {
     "named_protocol": (
         Annotated[
             Literal["fair", "paper", "recorded"],
@@ -27,7 +32,7 @@ _NAMED: Options = {
         "fair",
     )
 }
-_FIELDS: Options = {
+_FIELDS: _Options = {
     name: (Annotated[kind, typer.Option(help=text, metavar=metavar)], default)
     for name, kind, default, text, metavar in (
         (
@@ -84,7 +89,7 @@ _FIELDS: Options = {
         ),
     )
 }
-_GATE: Options = {
+_GATE: _Options = {
     "gate": (
         Annotated[
             bool,
@@ -101,10 +106,61 @@ _GATE: Options = {
 }
 
 
+def _with_options(
+    keyword: str, options: _Options, make: Callable[..., Any]
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator that adds a group of options to a command.
+
+    The decorated function has one parameter for the whole group. On the command
+    line, the parameter is replaced by the options of the group.
+
+    Args:
+        keyword: name of the parameter for the whole group.
+        options: name -> (type, default) of each option of the group.
+        make: function that is called with the options' values as keyword
+            arguments. The result of this function is passed to the command as
+            `keyword`.
+    """
+    added = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=default,
+            annotation=kind,
+        )
+        for name, (kind, default) in options.items()
+    ]
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(**values: Any) -> None:
+            chosen = {name: values.pop(name) for name in options}
+            command(**values, **{keyword: make(**chosen)})
+
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        parameters = [
+            *(
+                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+                for parameter in own
+                if parameter.name != keyword
+            ),
+            *added,
+        ]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {
+            parameter.name: parameter.annotation for parameter in parameters
+        }
+        return run
+
+    return decorate
+
+
 def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
     return replace(PROTOCOLS[named_protocol], **fields)
 
 
 # Decorator: the command gets the protocol's options in place of its keyword
 # `protocol`.
-with_protocol = with_options("protocol", {**_NAMED, **_FIELDS, **_GATE}, _named)
+with_protocol = _with_options(
+    "protocol", {**_NAMED, **_FIELDS, **_GATE}, _named
+)

@@ -8,7 +8,7 @@ import numpy as np
 from cns_drake.base import points as point_arrays
 from cns_drake.base.complete_files import completing
 from cns_drake.base.errors import InputError
-from cns_drake.base.listing import listed
+from cns_drake.base.files import listed
 from cns_drake.base.progress import track
 from evaluation.clouds.bin_columns import find_layout
 from evaluation.clouds.cloud_files import is_cloud, read_cloud

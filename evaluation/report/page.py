@@ -15,7 +15,7 @@ import jinja2
 from markupsafe import Markup
 
 from cns_drake.base.complete_files import write_text
-from cns_drake.base.listing import natural_key
+from cns_drake.base.files import natural_key
 from evaluation.change.drive_change import symmetric_changes
 from evaluation.recognition.fault_kinds import FAULT_KINDS, fault_words
 from evaluation.recognition.metrics import MODES, Mode

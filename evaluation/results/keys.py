@@ -23,9 +23,9 @@ _BEFORE_FACTORS = ("experiment", "map", "database", "query", "seed")
 _AFTER_FACTORS = ("task", "method", "gate", "protocol")
 # Columns of a key that every table has.
 NEEDED_KEYS = (*_BEFORE_FACTORS, *_AFTER_FACTORS)
-# Columns that tables of earlier versions lack; their values are then unknown.
-LATER_KEYS = ("protocol_digest", "version")
-KEYS = (*NEEDED_KEYS, *LATER_KEYS)
+# Columns that a table may lack; their values are then unknown.
+OPTIONAL_KEYS = ("protocol_digest", "version")
+KEYS = (*NEEDED_KEYS, *OPTIONAL_KEYS)
 # Columns of a row behind its key.
 MEASURED = ("metric", "value", "low", "high", "n")
 # Factor: the stage of the city in which both drives are.
@@ -47,7 +47,7 @@ RESERVED = frozenset(("label", *KEYS, *MEASURED))
 
 def key_columns(factors: Iterable[str]) -> tuple[str, ...]:
     """Returns all columns of a key in the order of tables."""
-    return (*_BEFORE_FACTORS, *factors, *_AFTER_FACTORS, *LATER_KEYS)
+    return (*_BEFORE_FACTORS, *factors, *_AFTER_FACTORS, *OPTIONAL_KEYS)
 
 
 @dataclass(frozen=True)

@@ -161,10 +161,9 @@ class Results:
         order; unknown columns are factors.
 
         Raises:
-            InputError: the file cannot be read, is a table of an earlier
-                version, lacks a column, has a column twice, or contains an
-                impossible value. The error names the line, the column and the
-                fault.
+            InputError: the file cannot be read, lacks a column, has a column
+                twice, or contains an impossible value. The error names the
+                line, the column and the fault.
         """
         table = TableLines.read(path, RESULTS, MEASURED)
         rows: list[Row] = []

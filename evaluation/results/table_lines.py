@@ -15,19 +15,15 @@ from cns_drake.base.csv_files import check_separator
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.base.repetitions import repeated
-from cns_drake.base.terminal import note
 from evaluation.recognition.protocol import PROTOCOL_NAMES
 from evaluation.results.keys import (
-    FROZEN_REDRAW,
-    LATER_KEYS,
     NEEDED_KEYS,
+    OPTIONAL_KEYS,
     RESERVED,
     Key,
     key_columns,
 )
 
-# Names of columns in tables of earlier versions -> names of now.
-_FORMER_NAMES = {"both.fresh": FROZEN_REDRAW, "radius_told": "gate"}
 # Type -> value that stands for an empty cell.
 _EMPTY: dict[type, object] = {int: -1, float: math.nan, str: ""}
 # Greatest whole number, so that it fits in 64 bits.
@@ -38,18 +34,6 @@ _NUMBER = re.compile(
 # Leading zeros belong to names, as in the stage 01.
 _NAME_OF_DIGITS = re.compile(r"0\d+")
 _TRUTH = {"0": False, "1": True, "false": False, "true": True}
-# Columns of tables of earlier versions -> the command that makes such a table
-# now.
-_FORMER_TABLES = (
-    ({"version", "db", "kept"}, "cns-drake study fresh"),
-    ({"db", "cause", "level"}, "cns-drake study ladder"),
-    ({"year", "seed", "kept"}, "cns-drake study years"),
-    ({"tenth", "half"}, "cns-drake study years"),
-    ({"db", "auc_unchanged"}, "cns-drake study stages"),
-    ({"tcr_sym", "recall_at_1"}, "cns-drake study trend"),
-    ({"others", "places", "query_ms"}, "cns-drake study size"),
-    ({"map", "db", "query"}, "cns-drake study stages"),
-)
 
 
 @dataclass(frozen=True)
@@ -140,7 +124,7 @@ class TableLine:
         }
         for name in ("database", "query", "method", "protocol"):
             values[name] = self.cells[self.columns[name]]
-        for name in filter(self.columns.__contains__, LATER_KEYS):
+        for name in filter(self.columns.__contains__, OPTIONAL_KEYS):
             values[name] = self.cells[self.columns[name]]
         values["seed"] = self.value("seed", int)
         if values["seed"] < 0:
@@ -196,20 +180,15 @@ class TableLines:
             may_be_empty: whether the file may have no rows.
 
         Raises:
-            InputError: the file cannot be read, is a table of an earlier
-                version, lacks a column, has a column twice, or a line has too
-                many or too few cells.
+            InputError: the file cannot be read, lacks a column, has a column
+                twice, or a line has too many or too few cells.
         """
         path = Path(path)
         file = path / usual if path.is_dir() else path
         (_, names), *lines = _csv_lines(file)
-        for former, now in _FORMER_NAMES.items():
-            if former in names and now not in names:
-                note(f"{file}: the column {former} is named {now} now")
-                names[names.index(former)] = now
         needed = (*NEEDED_KEYS, *needed)
         _check_columns(file, names, needed)
-        others = {*needed, *LATER_KEYS, *known}
+        others = {*needed, *OPTIONAL_KEYS, *known}
         factors = tuple(name for name in names if name not in others)
         for name in factors:
             if name in RESERVED:
@@ -290,16 +269,10 @@ def _check_columns(
     """Checks the names of a table's columns.
 
     Raises:
-        InputError: the table is of an earlier version, lacks a column, has a
-            column twice or a column without a name.
+        InputError: the table lacks a column, has a column twice or a column
+            without a name.
     """
     missing = [name for name in needed if name not in names]
-    for former_columns, command in _FORMER_TABLES:
-        if missing and former_columns <= set(names):
-            raise InputError(
-                f"{file}: a table of an earlier version; '{command}' makes"
-                " one with the columns of now"
-            )
     if missing:
         raise InputError(f"{file}: no column '{missing[0]}'")
     if "" in names:

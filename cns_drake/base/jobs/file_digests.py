@@ -16,8 +16,7 @@ from pathlib import Path
 import time
 
 from cns_drake.base.complete_files import write_text
-from cns_drake.base.file_names import cache_folder
-from cns_drake.base.files import check_regular, user_errors
+from cns_drake.base.files import cache_folder, check_regular, user_errors
 
 _BLOCK_BYTES = 1 << 20
 # A file that was changed so recently may change again without another time:

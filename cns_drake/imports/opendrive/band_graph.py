@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cns_drake.base.angles import wrapped
+from cns_drake.base.units import wrapped
 from cns_drake.imports.drives import search, steerable_drives, way_graph
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
 from cns_drake.imports.opendrive.lanes import DRIVEN, LaneBand

@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import LinearRing, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.angles import wrapped
+from cns_drake.base.units import wrapped
 from cns_drake.city.geometry import polygons_of
 
 # Least and greatest width of a step [m].

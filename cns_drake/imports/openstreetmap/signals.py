@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.angles import wrapped
+from cns_drake.base.units import wrapped
 from cns_drake.imports.openstreetmap.street_lanes import StreetTraffic
 from cns_drake.imports.streets import Street
 from cns_drake.traffic import lane_graph

@@ -13,7 +13,7 @@ from scipy.ndimage import uniform_filter1d
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from cns_drake.base.angles import wrapped
+from cns_drake.base.units import wrapped
 from cns_drake.imports.openstreetmap import lane_tags, speed_tags
 from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
 from cns_drake.roads.centreline import blend

@@ -1,17 +1,14 @@
 """The description of a camera."""
 
-from collections.abc import Mapping
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cns_drake.sensors.sensor_config import Angle, Section, Triple
 
 # In Drake, the principal point of a single pixel lies on its edge: an error.
 _Pixels = Annotated[int, Field(ge=2, le=4096)]
-# Field of earlier versions, in radians -> the field that replaces it.
-FORMER_ANGLES: Mapping[str, str] = {"fov_y": "fov_y_deg", "rpy": "rpy_deg"}
 
 
 class CameraSection(Section):
@@ -45,28 +42,3 @@ class CameraSection(Section):
         depth = ("depth",) if self.depth else ()
         label = ("label",) if self.label else ()
         return ("image", *depth, *label, "camera_info")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_radians(cls, values: Any) -> Any:
-        """Reads the fields of earlier versions, whose angles are in radians."""
-        if not isinstance(values, Mapping):
-            return values
-        found = dict(values)
-        for old, new in FORMER_ANGLES.items():
-            if old not in found:
-                continue
-            if new in found:
-                raise ValueError(f"{old}: give only {new}")
-            angle = found.pop(old)
-            if isinstance(angle, list | tuple):
-                found[new] = [_degrees(value) for value in angle]
-            else:
-                found[new] = _degrees(angle)
-        return found
-
-
-def _degrees(angle: Any) -> Any:
-    """Returns an angle [rad] in degrees; returns all but numbers unchanged."""
-    is_number = isinstance(angle, int | float) and not isinstance(angle, bool)
-    return math.degrees(angle) if is_number else angle

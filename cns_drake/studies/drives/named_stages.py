@@ -3,7 +3,7 @@
 from typing import Any
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.listing import natural_key
+from cns_drake.base.files import natural_key
 from cns_drake.scenarios.scenario import Scenario
 from evaluation.results.keys import LAST, OWN
 

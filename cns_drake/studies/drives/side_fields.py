@@ -46,10 +46,6 @@ def check_side(place: str, changes: Changes, source: str) -> None:
             f"{source}: {place}.redraw: give a number, or frozen: it is a field"
             " of both, and of no case"
         )
-    if "version" in changes:
-        raise InputError(
-            f"{source}: {place}.version: this field is now `redraw`"
-        )
     is_query = place == "query"
     right = "database" if is_query else "query"
     for name in DATABASE_FIELDS if is_query else QUERY_FIELDS:

@@ -1,6 +1,6 @@
 """Reads experiments from files, with changes to single fields."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment, in_long_form
 from cns_drake.studies.experiments.method_variants import method_variants
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
-from evaluation.results.keys import FROZEN_REDRAW
 
 _FOLDER = Path(__file__).parent
 
@@ -31,7 +30,6 @@ def load_experiment(
     overrides: Iterable[str | tuple[str, Any]] = (),
     *,
     quick: bool = False,
-    on_note: Callable[[str], None] = lambda text: None,
 ) -> Experiment:
     """Reads an experiment.
 
@@ -42,7 +40,6 @@ def load_experiment(
             separate nested fields, as in `database.years=[0, 5]`.
         quick: whether the fields in the section `quick` of the experiment
             replace its other fields.
-        on_note: is called with a note on each word of an earlier version.
 
     Raises:
         InputError: there is no such experiment, or a field is unknown or not
@@ -62,7 +59,6 @@ def load_experiment(
         values = _chosen_anew(values, values["quick"])
     for one in overrides:
         values = _overridden(values, one)
-    values = _in_words_of_now(values, f"{path}: ", on_note)
     experiment = validated(Experiment, values, path)
     with value_errors(path):
         conditions(experiment)
@@ -137,23 +133,3 @@ def _with_method_setting(values: Changes, override: str) -> dict[str, Any]:
         # One list, as on the command lines without factors.
         fields = {method: nested(setting, [value.split(",")])}
     return merged({**values, "methods": methods}, {"methods": fields})
-
-
-def _in_words_of_now(
-    values: dict[str, Any], place: str, on_note: Callable[[str], None]
-) -> dict[str, Any]:
-    """Returns fields in which words of earlier versions are replaced.
-
-    The field `both.fresh` is now `both.redraw.frozen`.
-    """
-    quick = values.get("quick")
-    if isinstance(quick, dict):
-        inner = _in_words_of_now(quick, f"{place}quick.", on_note)
-        values = {**values, "quick": inner}
-    both = values.get("both")
-    if not (isinstance(both, dict) and "fresh" in both):
-        return values
-    on_note(f"{place}both.fresh: this field is now {FROZEN_REDRAW}")
-    number = {"redraw": {"frozen": both["fresh"]}}
-    left = {name: one for name, one in both.items() if name != "fresh"}
-    return {**values, "both": merged(left, number)}

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import natural_key
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.listing import natural_key
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import (

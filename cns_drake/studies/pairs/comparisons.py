@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 from cns_drake.base.errors import InputError, errors_at
+from cns_drake.base.files import natural_key
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.listing import natural_key
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.drives.changed_drives import (
     Age,

@@ -5,11 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder
+from cns_drake.base.files import make_folder, natural_key
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.forecast import Space, forecast
 from cns_drake.base.jobs.running import run_jobs
-from cns_drake.base.listing import natural_key
 from cns_drake.base.progress import doing
 from cns_drake.drives.drive_scenario import driven_way
 from cns_drake.scenarios import scenario_files

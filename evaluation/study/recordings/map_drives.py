@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.listing import natural_key
+from cns_drake.base.files import natural_key
 from cns_drake.drives.lidar_fields import LidarField
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.tasks.pair import NamedDrive

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from cns_drake.base.errors import InputError, did_you_mean, errors_at
+from cns_drake.base.files import natural_key
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.listing import natural_key
 from cns_drake.base.repetitions import repeated
 from cns_drake.drives.same_world import check_same_world
 from evaluation.recognition.kept_places import KEEP_ALL

@@ -8,7 +8,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base.errors import InputError, one_line
-from cns_drake.base.listing import listed, natural_key
+from cns_drake.base.files import listed, natural_key
 from cns_drake.drives.drive_scenario import SCENARIO, driven_way
 from evaluation.drives import find_readers, open_drive
 from evaluation.drives.cns_folder import holds_cns

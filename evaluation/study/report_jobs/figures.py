@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-from cns_drake.base.file_names import file_name
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter
@@ -24,7 +23,7 @@ from evaluation.study.features import DriveSummary
 from evaluation.study.recordings.map_drives import MapDrives, Recordings
 from evaluation.study.sources import DriveSource, RecordingSource
 from evaluation.study.storage.parts import MakePart, Part
-from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.storage.study_files import StudyFiles, file_name
 from evaluation.study.tasks.jobs import job_name
 
 # Format of pictures on the page.

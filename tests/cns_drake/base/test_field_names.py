@@ -30,7 +30,7 @@ class Plan(BaseModel):
         ({"cornres": {}}, "did you mean corners?"),
         ({"home": {"stage": 2}}, 'quote it: stage: "2"'),
         ({"home": {"stage": 0.1}}, 'quote it: stage: "0.1"'),
-        ({"home": {"colour": 2}}, "Extra inputs are not permitted"),
+        ({"home": {"colour": 2}}, "; there are: kerb_radius, stage"),
     ],
 )
 def test_what_to_write_instead(values, advice):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cns_drake.base.pace import Pace, TimeLeft
+from cns_drake.base.progress_display import Pace, TimeLeft
 
 
 def steps(*seconds):

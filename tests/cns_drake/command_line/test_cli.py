@@ -278,7 +278,7 @@ def test_diagram_script_records_and_makes_a_page(files, tmp_path, capfd):
             "--no-recordings and --pages exclude each other",
         ),
         (["teleport"], "teleport"),
-        (["simulat"], "Did you mean 'simulate'"),
+        (["simulat"], r"did you mean simulate\?"),
         (["simulate", "metropolis_9"], r"mean metropolis_0\d\?"),
         (
             ["simulate", "{files}/drive.yaml", "--lidar", "os1_64"],

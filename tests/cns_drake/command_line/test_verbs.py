@@ -1,4 +1,4 @@
-"""Commands and options: few, each with one meaning; former ones are named."""
+"""Commands and options: few, each with one meaning."""
 
 from helpers.eval_program import run_program
 import pytest
@@ -7,45 +7,12 @@ import typer
 from cns_drake.command_line import cli as simulator
 from cns_drake.command_line import exporting
 from cns_drake.command_line.exporting import Format
-from cns_drake.studies.experiments.experiment_files import shipped_experiments
 from evaluation.command_line import cli as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
 GROUPS = {
     name: typer.main.get_command(program.app)
     for name, program in PROGRAMS.items()
-}
-# Program and former command -> the call that replaces it.
-FORMER = {
-    **{
-        ("cns-drake", name): f"cns-drake study {name}"
-        for name in (
-            "ladder",
-            "levels",
-            "size",
-            "years",
-            "fresh",
-            "trend",
-            "map-pairs",
-        )
-    },
-    ("cns-drake", "overlap"): "cns-drake export A B --format overlap-table",
-    ("cns-drake", "export-pairs"): (
-        "cns-drake export DRIVE ... --format pointnetvlad|overlap"
-    ),
-    ("cns-drake", "map-truth"): "cns-drake export A B --format map-truth",
-    ("cns-drake", "film"): "cns-drake export DRIVE --format film",
-    ("cns-drake", "repair"): "cns-drake export FILE.mcap --format mcap",
-    ("cns-eval", "ranking"): "cns-eval compare --rankings",
-    ("cns-eval", "trend"): "cns-drake study FILE.yaml FOLDER",
-    ("cns-eval", "scores"): (
-        "cns-eval pr DATABASE QUERY --method METHOD --scores FILE.csv"
-    ),
-    ("cns-eval", "drives"): "cns-eval tcr A B --paths",
-    ("cns-eval", "trajectory"): "cns-eval localise DRIVE --estimate FILE.tum",
-    ("cns-eval", "map-sessions"): (
-        "cns-drake export A B --format map-sessions"
-    ),
 }
 
 
@@ -60,39 +27,6 @@ def options(program, command):
 
 def test_there_are_at_most_18_commands():
     assert sum(len(group.commands) for group in GROUPS.values()) <= 18
-
-
-@pytest.mark.parametrize(("program", "old"), FORMER)
-@pytest.mark.parametrize("rest", [(), ("--help",), ("a", "--output", "b")])
-def test_former_commands_name_the_new_call(capsys, program, old, rest):
-    assert old not in GROUPS[program].commands
-    status, out, err = run(capsys, program, old, *rest)
-    assert (status, out) == (2, "")
-    now = FORMER[program, old]
-    assert err == f"{program}: error: '{program} {old}' is now '{now}'\n"
-    new_program, command, *words = now.split()
-    taken = options(new_program, command)
-    for word in words:
-        assert not word.startswith("--") or word in taken
-    if "--format" in words:
-        for one in words[words.index("--format") + 1].split("|"):
-            assert Format(one)
-    if command == "study" and words[0].islower():
-        assert words[0] in shipped_experiments()
-
-
-@pytest.mark.parametrize(
-    ("words", "now"),
-    [
-        (("export", "a", "--sensor", "rear"), "--sensor: is now --lidar"),
-        (("export", "a", "--sensor=rear"), "--sensor: is now --lidar"),
-        (("export", "a", "--start", "3"), "--start: is now --start-time"),
-    ],
-)
-def test_former_options_name_the_new_one(capsys, words, now):
-    status, out, err = run(capsys, "cns-drake", *words)
-    assert (status, out) == (2, "")
-    assert err == f"cns-drake: error: {now}\n"
 
 
 def test_a_word_after_two_dashes_is_no_option(capsys):
@@ -215,7 +149,6 @@ def test_options_of_one_name_have_one_meaning():
         "--start": {"localise"},
         "--quick": {"study"},
         "--recording": {"simulate"},
-        "--sensor": set(),
     }.items():
         found = {
             n
@@ -224,26 +157,3 @@ def test_options_of_one_name_have_one_meaning():
             if o == option
         }
         assert found == commands, option
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "base: riverside_01\nmissing: [0, 0.5]\n",
-        "base: a.yaml\ncity_seeds: 3\n",
-    ],
-)
-@pytest.mark.parametrize("command", ["generate", "export"])
-def test_former_files_of_families_are_named(capsys, tmp_path, command, text):
-    path = tmp_path / "family.yaml"
-    path.write_text(text)
-    words = [command, "--vary", path, "--output", tmp_path / "out"]
-    if command == "export":
-        words += ["--format", "pointnetvlad"]
-    status, out, err = run(capsys, "cns-drake", *words)
-    assert (status, out) == (2, "")
-    assert err.startswith(
-        f"cns-drake: error: {path}: base: --vary reads an experiment now"
-    )
-    assert err.count("\n") == 1
-    assert not (tmp_path / "out").exists()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.points import encode_labels
 from cns_drake.export.exporting import export_drive
+from cns_drake.export.kitti_layout import encode_labels
 from cns_drake.scenarios.shipped import shipped_maps
 from evaluation import drives
 

@@ -91,7 +91,7 @@ def test_stages_are_drawn_side_by_side(small_map, tmp_path):
         ),
         (
             "street: {position: [0, 0, 1], target: [1, 0, 1], fov_y: 50}",
-            "fov_y: this field is now fov_y_deg",
+            "street.fov_y: ",
         ),
         ("street: {position: [0, 0, .inf], target: [1, 0, 1]}", "position.2"),
         ("street: [", "not readable as YAML"),

@@ -10,7 +10,7 @@ import pytest
 
 def test_bad_usage(capsys, towns):
     town = towns / "town_01"
-    assert_refused(capsys, ["evaluate"], "No such command 'evaluate'")
+    assert_refused(capsys, ["evaluate"], "unknown command 'evaluate'")
     assert_refused(capsys, ["tcr", town], "Missing argument 'B'")
     assert_refused(capsys, ["tcr", town, town, "--colour"], "--colour")
     assert_refused(capsys, ["pr", town, town], "Missing option '--method'")

@@ -221,24 +221,6 @@ def test_a_number_twice_is_refused(tmp_path):
         (HEADER + ",", "has no name"),
         (HEADER + ",label", "'label' names no factor"),
         ("", "no column 'experiment'"),
-        (
-            "map,db,query,cause,level,method,gate,auc,r1,kept",
-            "cns-drake study ladder",
-        ),
-        ("map,year,seed,task,method,gate,value,kept", "cns-drake study years"),
-        (
-            "map,db,query,method,auc_unchanged,auc_changed,kept",
-            "cns-drake study stages",
-        ),
-        (
-            "database,method,tcr_sym,auc,auc_low,auc_high,recall_at_1",
-            "cns-drake study trend",
-        ),
-        (
-            "map,method,others,places,queries,auc,r1,query_ms,build_ms",
-            "cns-drake study size",
-        ),
-        ("version,map,db,query,method,auc,kept", "cns-drake study fresh"),
     ],
 )
 def test_tables_with_other_columns(tmp_path, header, words):
@@ -358,27 +340,6 @@ def test_answers_that_cannot_be(tmp_path, column, cell, words):
     with pytest.raises(InputError, match=words) as raised:
         QueryRows.read(path)
     assert str(raised.value).startswith(f"{path}: line 3: ")
-
-
-def test_a_former_name_of_a_column_is_read_with_a_note(tmp_path, capsys):
-    path = tmp_path / "results.csv"
-    now = Results.read(write(path, HEADER, LINE))
-    assert capsys.readouterr().err == ""
-    former = HEADER.replace("gate", "radius_told")
-    assert Results.read(write(path, former, LINE)) == now
-    note = f"{path}: the column radius_told is named gate now\n"
-    assert capsys.readouterr().err == note
-    # Beside the name of now, it is a factor of the user's.
-    both = Results.read(write(path, f"{HEADER},radius_told", f"{LINE},3"))
-    assert both.factors == (FACTOR, "radius_told")
-    assert capsys.readouterr().err == ""
-
-
-def test_former_tables_of_queries(tmp_path):
-    header = "map,db,query,method,correct,has_match,score"
-    path = write(tmp_path / "queries.csv", header, "a,01,02,btc,1,1,0.5")
-    with pytest.raises(InputError, match="earlier version"):
-        QueryRows.read(path)
 
 
 @pytest.mark.parametrize(

@@ -498,14 +498,11 @@ def test_faults_are_one_line(tmp_path, capsys):
     assert_refused(
         capsys, ["compare", one, "--verified"], "with geometric verification"
     )
-    # Of other commands, --gate says how to measure.
-    assert_refused(capsys, ["compare", one, "--gate"], "--verified")
     assert_refused(capsys, ["compare", one, "--protocol", "x"], "--protocol")
     assert_refused(capsys, ["compare", one, "--rankings"], "two tables")
     pair = ["compare", one, other, "--rankings"]
     assert_refused(capsys, pair, "fewer than two methods")
     assert_refused(capsys, ["compare", tmp_path / "none.csv"], "none.csv")
-    assert_refused(capsys, ["ranking", one, other], "cns-eval compare")
 
 
 def test_queries_without_blocks_are_noted(tmp_path):
@@ -524,17 +521,6 @@ def test_queries_without_blocks_are_noted(tmp_path):
     files = [str(folder / "queries.csv") for folder in pair]
     assert [note.split(": ")[0] for note in notes] == files
     assert "column block" in notes[0]
-
-
-def test_queries_of_earlier_reports_are_refused(tmp_path):
-    """Their `query` was a stage."""
-    folder = write_table(tmp_path / "one", {"town": {"x": 0.5}}, queries=True)
-    (folder / "queries.csv").write_text(
-        "map,db,query,method,correct,has_match,score,query_drive,query_frame\n"
-        "town,01,02,x,1,1,0.5,town_02,0\n"
-    )
-    with pytest.raises(InputError, match=r"queries.csv: a table of an ear"):
-        compare_tables([folder])
 
 
 def test_rows_by_another_protocol_are_left_out_and_named(tmp_path):
@@ -619,8 +605,8 @@ def test_other_numbers_of_queries_are_named(tmp_path):
 
 
 def test_what_a_table_does_not_say_is_unknown(tmp_path):
-    """Tables of earlier versions have neither digest nor version."""
-    folder = write_table(tmp_path / "old", {"a": {"x": 0.5, "y": 0.4}})
+    """Tables of other programs have neither digest nor version."""
+    folder = write_table(tmp_path / "theirs", {"a": {"x": 0.5, "y": 0.4}})
     file = folder / "results.csv"
     lines = [line.split(",") for line in file.read_text().splitlines()]
     kept = [
@@ -638,7 +624,7 @@ def test_what_a_table_does_not_say_is_unknown(tmp_path):
     found = compare_tables([folder, new])
     assert len(found.ranked) == 3
     assert any(
-        "old: rows do not say how they were made" in n for n in found.notes
+        "theirs: rows do not say how they were made" in n for n in found.notes
     )
 
 

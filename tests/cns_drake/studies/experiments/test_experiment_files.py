@@ -26,24 +26,6 @@ def test_a_file_of_few_words_is_enough(read):
     assert only.is_baseline
 
 
-def test_words_of_earlier_versions_are_read_with_a_note(tmp_path):
-    path = tmp_path / "mine.yaml"
-    path.write_text(
-        "both: {fresh: [1, 2], stage: [last, own]}\n"
-        "quick: {both: {fresh: [1]}}\n"
-    )
-    for quick, numbers in ((False, [1, 2]), (True, [1])):
-        notes = []
-        found = load_experiment(path, quick=quick, on_note=notes.append)
-        assert found.frozen_redraws == numbers
-        assert "fresh" not in found.both
-        assert f"{path}: both.fresh: this field is now" in notes[-1]
-    # So on the command line.
-    path.write_text("both: {stage: [last, own]}\n")
-    found = load_experiment(path, ["both.fresh=[3]"])
-    assert found.frozen_redraws == [3]
-
-
 def test_overrides_replace_single_fields(read):
     text = """
     database: {years: [0, 5], rates: 2}

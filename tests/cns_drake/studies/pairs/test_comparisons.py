@@ -605,7 +605,6 @@ FAULTS = [
         "{database: {redraw: 3}, query: {years: 5}}",
         "database.redraw: a city drawn anew does not age by query.years",
     ),
-    ("both: {version: 3}", "database.version: this field is now `redraw`"),
     ("query: {without: [nothing]}", "query.without: .*no structure nothing to"),
     ("both: {without: [nothing]}", "database.without: .*no structure nothing"),
     ("query: {map: nowhere}", "query: map: 'nowhere' is neither"),

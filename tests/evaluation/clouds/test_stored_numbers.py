@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.base.points import store
+from evaluation.clouds.record_reading import store
 
 
 def stored(dtype, value):

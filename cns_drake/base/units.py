@@ -1,9 +1,10 @@
-"""Angles in the plane."""
+"""Angles in the plane, and units of time."""
 
 from typing import TypeVar
 
 import numpy as np
 
+NS_PER_S = 1_000_000_000
 Angle = TypeVar("Angle", float, np.ndarray)
 
 
