@@ -153,7 +153,7 @@ def _read_world(
         _parse_models(plant, path)
         return ()
     _check_text(path)
-    doing(f"reading {path.name}")
+    doing(f"parsing {path.name}")
     with _drake_errors(path):
         if ending == ".urdf":
             return _read_urdf(plant, path, model_paths)
@@ -181,7 +181,7 @@ def _read_urdf(
                 missing.append(uri)
                 link.remove(visual)
             else:
-                mesh.set("filename", str(found))
+                mesh.set("filename", f"file://{found}")
     for part in list(robot):
         if part.tag not in ("link", "joint", "material"):
             robot.remove(part)
@@ -238,6 +238,8 @@ def _parse_error(path: Path, *texts: str) -> InputError:
     names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
     faults = [" ".join(text.split()) for text in texts[:2]]
     faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
+    # What is read of a world is a text with other lines than its file.
+    faults = [re.sub(r"^<[^<>]*-string>\S* \w+: ", "", f) for f in faults]
     faults = [
         re.sub(
             rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",
