@@ -468,6 +468,9 @@ class _Reader:
         if shape is None:
             return None
         properties = self._properties(visual)
+        if not properties:
+            self.skip("invisible visuals")
+            return None
         frame, X_FV = self._place(visual, link, model)
         return _Visual(name, frame, X_FV @ X_VG, shape, properties)
 
@@ -573,16 +576,21 @@ class _Reader:
     def _colour(self, material: Element | None) -> Rgba | None:
         if material is None:
             return None
-        for tag in ("script", "pbr"):
+        for tag in ("script", "pbr", "drake:diffuse_map"):
             if material.find(tag) is not None:
                 self.skip("materials by script or texture")
         numbers = _numbers(material.findtext("diffuse"))
         if len(numbers) not in (3, 4):
             return None
+        if not all(0.0 <= number <= 1.0 for number in numbers):
+            text = " ".join((material.findtext("diffuse") or "").split())
+            raise InputError(
+                f"{self._path}: diffuse: {text}: not within 0 to 1"
+            )
         if len(numbers) == 4 and numbers[3] < 1.0:
             self.skip("transparent colours", how="taken as solid")
         # SDF's colours have single precision.
-        return Rgba(*np.clip(np.float32(numbers), 0.0, 1.0).tolist())
+        return Rgba(*np.float32(numbers).tolist())
 
     def _copy_pose(self, source: Element, target: Element) -> None:
         pose = source.find("pose")

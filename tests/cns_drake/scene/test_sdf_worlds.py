@@ -364,6 +364,10 @@ NOTED = {
         "1 transparent colours taken as solid"
     ),
     "<scale>2 2 2</scale>": "1 elements <scale> in <visual> ignored",
+    "<drake:perception_properties enabled='false'/>"
+    "<drake:illustration_properties enabled='false'/>": (
+        "1 invisible visuals ignored"
+    ),
 }
 
 
@@ -638,3 +642,10 @@ def test_poses_of_visuals_are_those_of_drake(tmp_path, numbers):
     np.testing.assert_array_equal(
         found.X_FG.GetAsMatrix34(), expected.X_FG.GetAsMatrix34()
     )
+
+
+def test_a_colour_that_is_none_is_refused(tmp_path):
+    extra = "<material><diffuse>255 0 0 1</diffuse></material>"
+    path = write(tmp_path, f"<model name='m'>{link(extra=extra)}</model>")
+    with pytest.raises(InputError, match="diffuse: 255 0 0 1: not within"):
+        load_world(path)
