@@ -33,6 +33,9 @@ from cns_drake.scene.sdf_worlds import note_of_missing, read_sdf_world
 from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
 
+# Elements of MJCF with shapes that Drake leaves out without a warning.
+_NOT_OF_DRAKE = ("replicate", "attach", "composite", "flexcomp")
+
 
 @dataclass(frozen=True)
 class World:
@@ -149,10 +152,13 @@ def _read_world(
         InputError: the file is missing, cannot be parsed, or has no models.
     """
     ending = path.suffix.lower()
+    _check_text(path)
     if ending == ".xml":
+        for tag in _NOT_OF_DRAKE:
+            if next(read_model(path).iter(tag), None) is not None:
+                raise InputError(f"{path}: <{tag}> of MJCF is not read")
         _parse_models(plant, path)
         return ()
-    _check_text(path)
     doing(f"parsing {path.name}")
     with _drake_errors(path):
         if ending == ".urdf":

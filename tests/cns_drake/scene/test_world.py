@@ -232,3 +232,16 @@ def test_meshes_of_urdf_are_searched_as_those_of_sdf(tmp_path, uri):
     assert np.ptp(box.surface.p_GVset, axis=0).tolist() == [1.0, 1.0, 2.0]
     (note,) = world.notes
     assert f"1 meshes not found, and left out: {uri}" in note
+
+
+def test_mjcf_is_read_or_refused(tmp_path):
+    geom = '<geom type="box" size=".5 .5 .5"/>'
+    path = tmp_path / "w.xml"
+    text = "<mujoco model='m'><worldbody>{}</worldbody></mujoco>"
+    path.write_text(text.format(geom))
+    world = load_world(path)
+    assert len(read_perception_geometry(world.scene_graph.model_inspector()))
+    more = f"<replicate count='3' offset='1 0 0'>{geom}</replicate>"
+    path.write_text(text.format(geom + more))
+    with pytest.raises(InputError, match="<replicate> of MJCF is not read"):
+        load_world(path)
