@@ -640,8 +640,10 @@ def _pose(text: str) -> RigidTransform:
         + turn[2] * turn[2]
         + turn[3] * turn[3]
     )
-    turn = [value / length for value in turn]
-    return RigidTransform(Quaternion(np.array(turn)), numbers[:3])
+    # Adding 0 makes 0 of -0.
+    turn = [value / length + 0.0 for value in turn]
+    p_FV = [value + 0.0 for value in numbers[:3]]
+    return RigidTransform(Quaternion(np.array(turn)), p_FV)
 
 
 def _sizes(shape: Element, default: tuple[float, ...]) -> list[float]:
