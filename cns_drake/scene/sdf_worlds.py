@@ -168,15 +168,15 @@ class _Visual:
 
     Attributes:
         name: its name.
-        frame: name of the frame V of the visual; "" for the frame of the link.
-        X_VG: pose of the shape's frame G in V.
+        frame: name of a frame F of the model; "" for the frame of the link.
+        X_FG: pose of the shape's frame G in F.
         shape: its shape.
         properties: properties for each role.
     """
 
     name: str
     frame: str
-    X_VG: RigidTransform
+    X_FG: RigidTransform
     shape: Shape
     properties: tuple[IllustrationProperties | PerceptionProperties, ...]
 
@@ -240,7 +240,7 @@ class _Reader:
             instance = plant.GetModelInstanceByName(name)
             body = plant.GetBodyByName(link.get("name", ""), instance)
             for visual in visuals:
-                X_LG = visual.X_VG
+                X_LG = visual.X_FG
                 if visual.frame:
                     frame = plant.GetFrameByName(visual.frame, instance)
                     X_LG = frame.GetFixedPoseInBodyFrame() @ X_LG
@@ -453,7 +453,7 @@ class _Reader:
         if self._is_invisible(visual):
             return None
         self._count_unknown(element)
-        X_VG = RigidTransform()
+        X_VG = None
         shape: Shape | None
         if element.tag == "mesh":
             shape = self._mesh(element, folder)
@@ -471,8 +471,10 @@ class _Reader:
         if not properties:
             self.skip("invisible visuals")
             return None
-        frame, X_FV = self._place(visual, link, model)
-        return _Visual(name, frame, X_FV @ X_VG, shape, properties)
+        frame, X_FG = self._place(visual, link, model)
+        if X_VG is not None:
+            X_FG = X_FG @ X_VG
+        return _Visual(name, frame, X_FG, shape, properties)
 
     def _place(
         self, visual: Element, link: Element, model: Element
