@@ -592,7 +592,7 @@ class _Reader:
         if len(numbers) == 4 and numbers[3] < 1.0:
             self.skip("transparent colours", how="taken as solid")
         # SDF's colours have single precision.
-        return Rgba(*np.float32(numbers).tolist())
+        return Rgba(*np.array(numbers, np.float32).tolist())
 
     def _copy_pose(self, source: Element, target: Element) -> None:
         pose = source.find("pose")
