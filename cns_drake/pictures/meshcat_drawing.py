@@ -8,6 +8,7 @@ from pydrake.geometry import Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
+from cns_drake.base.polylines import distances_along
 from cns_drake.pictures.city_parts import DEFAULT_RGB, ColouredPart
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
@@ -124,8 +125,7 @@ def draw_route(
     """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
-    step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(step)])
+    travelled = distances_along(p_WBset)
     fraction = (travelled / max(travelled[-1], 1e-9))[:, None]
     first, last = _ROUTE_HEIGHTS
     p_WBset[:, 2:] += (1.0 - fraction) * first + fraction * last

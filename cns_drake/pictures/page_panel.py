@@ -7,6 +7,7 @@ from importlib import resources
 
 import numpy as np
 
+from cns_drake.base.polylines import length_of
 from cns_drake.pictures import meshcat_drawing as drawing
 from cns_drake.pictures.drive_record import DriveRecord
 from cns_drake.pictures.motion_plots import motion_plots, time_scale
@@ -62,7 +63,7 @@ def make_panel(
     from markupsafe import Markup
 
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
-    length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
+    length = length_of(p_WBset)
     duration = (len(p_WBset) - 1) * drive.period
     minutes, seconds = divmod(round(duration), 60)
     took = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"

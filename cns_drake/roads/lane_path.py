@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.polylines import distances_along
 
 # A path must be longer than this to become a trajectory [m].
 _MIN_LENGTH = 20.0
@@ -87,8 +88,7 @@ def sample_lane_path(
     Raises:
         InputError: the polyline is too short or too long for a drive.
     """
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    travelled = distances_along(points)
     length = float(travelled[-1])
     check_length(length, source)
     count = max(1, round(length / spacing))

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from cns_drake.base.elementary import arctan2, cos, sin, tan
 from cns_drake.base.errors import InputError
+from cns_drake.base.polylines import step_lengths
 from cns_drake.base.units import wrapped
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import (
@@ -89,7 +90,7 @@ def make_waypoint_path(
     waypoints = np.asarray(waypoints, dtype=float)
     if names is None:
         names = [f"{source}: {k}" for k in range(len(waypoints))]
-    steps = np.linalg.norm(np.diff(waypoints[:, :2], axis=0), axis=1)
+    steps = step_lengths(waypoints[:, :2])
     kept = np.flatnonzero(np.concatenate([[True], steps > _SAME_PLACE]))
     waypoints = waypoints[kept]
     if len(waypoints) < 2:

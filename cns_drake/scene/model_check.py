@@ -125,7 +125,12 @@ class _ModelCheck:
                 fault = f"two shapes, {found[0]} and {found[1]}"
                 self._refuse(element, fault)
         elif element.tag == "pose":
-            for number in self._finite_numbers(element, text)[:3]:
+            numbers = self._finite_numbers(element, text)
+            is_quaternion = element.get("rotation_format") == "quat_xyzw"
+            if numbers and len(numbers) != (7 if is_quaternion else 6):
+                fault = f"must have {7 if is_quaternion else 6} values"
+                self._refuse(element, fault)
+            for number in numbers[:3]:
                 if abs(number) > LARGEST_SIZE:
                     fault = f"{number:g} is beyond {LARGEST_SIZE:g} m"
                     self._refuse(element, fault)
@@ -137,7 +142,9 @@ class _ModelCheck:
             if len(numbers) != 3 or not any(numbers):
                 self._refuse(element, f"{text.strip()} is no direction")
         elif (parent, element.tag) in _OTHER_NUMBERS:
-            self._finite_numbers(element, text)
+            numbers = self._finite_numbers(element, text)
+            if element.tag == "scale" and len(numbers) not in (0, 3):
+                self._refuse(element, f"{len(numbers)} numbers, not 3")
         elif element.tag == "uri":
             self._check_uri(text.strip(), parents)
 

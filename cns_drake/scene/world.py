@@ -1,8 +1,11 @@
 """Loads an SDF world, and a vehicle in it, into a SceneGraph."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
+import re
+from xml.etree import ElementTree
 
 from pydrake.geometry import (
     Convex,
@@ -18,13 +21,20 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError, errors_at, value_errors
-from cns_drake.base.files import is_there
+from cns_drake.base.files import is_there, read_bytes
+from cns_drake.base.progress import doing
+from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.map_folder import MapFolder
 from cns_drake.scene.mesh_check import check_mesh_file
-from cns_drake.scene.parsing import parse_models, parse_world
+from cns_drake.scene.model_check import check_model, read_model
+from cns_drake.scene.model_finder import ModelFinder
 from cns_drake.scene.perception_geometry import anchored_frames, check_shape
+from cns_drake.scene.sdf_worlds import note_of_missing, read_sdf_world
 from cns_drake.scene.structure_names import structure_name
 from cns_drake.scene.structure_table import StructureTable, load_structure_table
+
+# Elements of MJCF with shapes that Drake leaves out without a warning.
+_NOT_OF_DRAKE = ("replicate", "attach", "composite", "flexcomp")
 
 
 @dataclass(frozen=True)
@@ -67,19 +77,20 @@ def load_world(
     without: Collection[str] = (),
     model_paths: Collection[Path | str] = (),
 ) -> World:
-    """Parses an SDF world and, if given, a vehicle.
+    """Reads a world and, if given, a vehicle.
 
-    From a world made for Gazebo, only the visuals are kept, at their initial
-    places; the notes list what is left out.
+    From an SDF world, only the visuals are kept, at their initial places, and
+    nothing moves; the notes list what is left out. The visuals of URDF are
+    read by Drake, with all joints at zero; MJCF is read by Drake alone.
 
     Args:
-        sdf: SDF file of the world or model.
+        sdf: SDF, URDF (`.urdf`) or MJCF (`.xml`) file of the world or model.
         vehicle: file of the vehicle's model; None for no vehicle.
         structures: structure table; by default `structures.csv` in the world's
             folder, if it exists.
         without: names of structures to leave out.
-        model_paths: folders in which `model://` is searched, before the folders
-            in GZ_SIM_RESOURCE_PATH and SDF_PATH.
+        model_paths: folders in which `model://` and `package://` are searched,
+            before the folders in GZ_SIM_RESOURCE_PATH and SDF_PATH.
 
     Raises:
         InputError: a file is missing or cannot be parsed, a structure to leave
@@ -97,8 +108,7 @@ def load_world(
     # plant with many models makes Build() slow.
     plant = MultibodyPlant(time_step=0.0)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
-    parser = Parser(plant)
-    notes = parse_world(parser, sdf, [Path(one) for one in model_paths])
+    notes = _read_world(plant, sdf, [Path(one) for one in model_paths])
     _leave_out(scene_graph, source, sdf, without)
     found = _visible_structures(scene_graph)
     if not found:
@@ -111,7 +121,7 @@ def load_world(
     notes += _mesh_notes(scene_graph)
     vehicle_model = None
     if vehicle is not None:
-        vehicle_model = parse_models(parser, Path(vehicle))[0]
+        vehicle_model = _parse_models(plant, Path(vehicle))[0]
     plant.Finalize()
 
     file = Path(structures or MapFolder(sdf.parent).structures)
@@ -131,6 +141,120 @@ def structures_in(world: World) -> set[str]:
         structure_name(inspector.GetName(geometry_id))
         for geometry_id in inspector.GetAllGeometryIds()
     }
+
+
+def _read_world(
+    plant: MultibodyPlant, path: Path, model_paths: Collection[Path]
+) -> tuple[str, ...]:
+    """Adds the models of a world to a plant; returns notes on what is left out.
+
+    Raises:
+        InputError: the file is missing, cannot be parsed, or has no models.
+    """
+    ending = path.suffix.lower()
+    _check_text(path)
+    if ending == ".xml":
+        for tag in _NOT_OF_DRAKE:
+            if next(read_model(path).iter(tag), None) is not None:
+                raise InputError(f"{path}: <{tag}> of MJCF is not read")
+        _parse_models(plant, path)
+        return ()
+    doing(f"parsing {path.name}")
+    with _drake_errors(path):
+        if ending == ".urdf":
+            return _read_urdf(plant, path, model_paths)
+        return read_sdf_world(plant, path, model_paths)
+
+
+def _read_urdf(
+    plant: MultibodyPlant, path: Path, model_paths: Collection[Path]
+) -> tuple[str, ...]:
+    """Adds the visuals of a URDF file to a plant, without what is not seen."""
+    robot = read_model(path)
+    finder = ModelFinder(path, model_paths)
+    missing = []
+    for link in robot.iterfind("link"):
+        for part in list(link):
+            if part.tag != "visual":
+                link.remove(part)
+        for visual in link.findall("visual"):
+            mesh = visual.find("geometry/mesh")
+            if mesh is None:
+                continue
+            uri = mesh.get("filename", "")
+            found = finder.find(uri, path.absolute().parent)
+            if found is None or not found.is_file():
+                missing.append(uri)
+                link.remove(visual)
+            else:
+                mesh.set("filename", f"file://{found}")
+    for part in list(robot):
+        if part.tag not in ("link", "joint", "material"):
+            robot.remove(part)
+    text = ElementTree.tostring(robot, "unicode")
+    Parser(plant).AddModelsFromString(text, "urdf")
+    return note_of_missing(path, "meshes", missing)
+
+
+def _parse_models(
+    plant: MultibodyPlant, path: Path
+) -> list[ModelInstanceIndex]:
+    """Checks a file, lets Drake parse it, and returns its models.
+
+    Raises:
+        InputError: the file is missing, cannot be parsed, or has no models.
+    """
+    _check_text(path)
+    check_model(path)
+    doing(f"parsing {path.name}")
+    with _drake_errors(path):
+        models = Parser(plant).AddModels(str(path))
+    if not models:
+        raise InputError(f"{path}: holds no model")
+    return models
+
+
+@contextlib.contextmanager
+def _drake_errors(path: Path) -> Iterator[None]:
+    """Raises Drake's errors about a file as an InputError."""
+    with collected_errors() as errors:
+        try:
+            yield
+        except PARSER_ERRORS as error:
+            raise _parse_error(path, str(error), *errors) from error
+        if errors:
+            raise _parse_error(path, *errors)
+
+
+def _check_text(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    # Drake would fail when it quotes other text.
+    content = read_bytes(path)
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
+
+
+def _parse_error(path: Path, *texts: str) -> InputError:
+    """Returns an error that contains the first two of Drake's messages."""
+    # Messages of Drake and libsdformat begin with the path, which Drake makes
+    # absolute, a severity and a code.
+    names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
+    faults = [" ".join(text.split()) for text in texts[:2]]
+    faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
+    # What is read of a world is a text with other lines than its file.
+    faults = [re.sub(r"^<[^<>]*-string>\S* \w+: ", "", f) for f in faults]
+    faults = [
+        re.sub(
+            rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",
+            lambda match: f"line {match[1]}: " if match[1] else "",
+            fault,
+        )
+        for fault in faults
+    ]
+    return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")
 
 
 def _leave_out(

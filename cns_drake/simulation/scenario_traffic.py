@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-import functools
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,9 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.elementary import arctan2
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import user_errors
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.schedule import FRAME_PERIOD
-from cns_drake.roads.network import load_road_network
+from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.scenarios.planning import DrivePlan, count_frames
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.sections import TrafficConfig
@@ -80,7 +78,7 @@ def plan_traffic_of_drive(
     """
     scenario = drive.scenario
     wanted = scenario.traffic
-    graph, walkways, _ = load_ways(scenario.folder)
+    graph, walkways, _ = load_ways(scenario.folder, drive.network)
     ego = _ego_path(trajectory)
     if wanted.fcd is not None:
         trace = Path(wanted.fcd)
@@ -185,23 +183,21 @@ def _sidewalk_obstacles(world: World) -> list[BaseGeometry]:
     return [structure.footprint for structure in structures.values()]
 
 
-def load_ways(folder: MapFolder) -> LaneFile:
+def load_ways(
+    folder: MapFolder, network: RoadNetwork | None = None
+) -> LaneFile:
     """Returns the lanes and walkways that traffic follows on a map.
+
+    Args:
+        folder: the map.
+        network: the map's road network, if already loaded.
 
     Raises:
         InputError: the map has neither roads nor lanes.
     """
     if not folder.roads.is_file():
         return read_lanes(folder.lanes)
-    with user_errors(folder.roads):
-        content = folder.roads.read_bytes()
-    return _ways_along(folder.roads, content)
-
-
-@functools.lru_cache(maxsize=1)
-def _ways_along(roads: Path, content: bytes) -> LaneFile:
-    """Returns lanes and walkways along roads; cached for repeated use."""
-    network = load_road_network(roads)
+    network = network or load_road_network(folder.roads)
     graph = make_lane_graph(network)
     return LaneFile(graph, make_walkways(network, graph))
 

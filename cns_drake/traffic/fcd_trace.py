@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.polylines import step_lengths
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.traffic.vehicle_kinds import KINDS
 
@@ -257,9 +258,7 @@ def _without_jumps(
     jumps: list[str] = []
     for traced, kind in zip(objects, kinds, strict=True):
         steps = np.diff(traced.steps)
-        speeds = np.linalg.norm(np.diff(traced.xy, axis=0), axis=1) / np.diff(
-            times[traced.steps]
-        )
+        speeds = step_lengths(traced.xy) / np.diff(times[traced.steps])
         is_jump = (steps == 1) & (speeds > _FASTEST_OF.get(kind, _FASTEST))
         ends = np.flatnonzero(is_jump) + 1
         jumps += [

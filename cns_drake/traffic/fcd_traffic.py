@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.elementary import cos, sin
 from cns_drake.base.errors import InputError
+from cns_drake.base.polylines import step_lengths
 from cns_drake.traffic.ego_car import EgoBox, EgoPath
 from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject, kind_name
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
@@ -194,7 +195,7 @@ def _person_rows(
         heights: heights of lanes and walkways.
         dt: time between two steps [s].
     """
-    steps = np.linalg.norm(np.diff(person.xy, axis=0), axis=1)
+    steps = step_lengths(person.xy)
     turned = dt * gait_rate(steps / dt)
     # A random phase that depends only on the name.
     start = zlib.crc32(person.name.encode()) % 1000 * 2e-3 * np.pi

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cns_drake.base.polylines import length_of
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
-from cns_drake.traffic.polylines import SPACING, length_of, resampled
+from cns_drake.traffic.polylines import SPACING, resampled
 
 # A lane must have room for any vehicle. A shorter lane is part of the ways that
 # lead over it [m].

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from cns_drake.base.polylines import distances_along, length_of
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import ENDS, End, LaneRef, Road
 from cns_drake.traffic import lane_graph
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
-from cns_drake.traffic.polylines import distances_along, length_of, resampled
+from cns_drake.traffic.polylines import resampled
 
 # Distance of stop lines from the end of a road with a crossing [m].
 _STOP_LINE = 4.5

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.polylines import length_of
 from cns_drake.traffic.ego_car import STEP
 from cns_drake.traffic.lane_graph import Walkway
-from cns_drake.traffic.polylines import SPACING, length_of
+from cns_drake.traffic.polylines import SPACING
 from cns_drake.traffic.random_numbers import uniform
 from cns_drake.traffic.right_of_way import WALK_GROUP
 from cns_drake.traffic.social_force import (

@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.polylines import length_of
 from cns_drake.city.geometry import Model, placed
 from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.surroundings import FARTHEST, Surroundings
@@ -160,7 +161,7 @@ def straight_kerbs(
             points = kerb.points[run]
             if len(run) < 2:
                 continue
-            walked = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+            walked = length_of(points)
             x, y = (int(value) for value in cells[run[0]])
             outward = kerb.outwards[run].mean(axis=0)
             stretch = KerbStretch(cause, (x, y), points, outward)

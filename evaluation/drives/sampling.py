@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 
+from cns_drake.base.polylines import step_lengths
+
 # Frames closer than this are at the same place [m].
 _LEAST_SPACING = 1e-6
 # A standing receiver jitters by less than this [m].
@@ -40,12 +42,12 @@ def travelled(positions: np.ndarray) -> np.ndarray:
     the path is divided into parts whose ends lie 0.5 m apart, and a part that
     is much longer than the straight line between its ends counts as that line.
     """
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    steps = step_lengths(positions)
     ends = corners(positions, _LEAST_MOVE)
     if ends[-1] < len(steps):
         ends.append(len(steps))
     parts = np.add.reduceat(steps, ends[:-1]) if len(steps) else steps
-    chords = np.linalg.norm(np.diff(positions[ends], axis=0), axis=1)
+    chords = step_lengths(positions[ends])
     is_jitter = parts > _MOST_BENT * chords
     scale = np.where(is_jitter, chords / np.where(is_jitter, parts, 1.0), 1.0)
     steps *= np.repeat(scale, np.diff(ends))

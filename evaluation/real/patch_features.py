@@ -8,6 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.polylines import step_lengths
+
 # Number of patches of a scan.
 _PATCHES = 16
 # Half the side of a patch [m].
@@ -140,7 +142,7 @@ def _density(
     along, across = np.full((2, 1), np.nan)
     if np.isfinite(ring).all():
         order = np.lexsort((np.arctan2(p[:, 1], p[:, 0]), ring))
-        gap = np.linalg.norm(np.diff(p[order], axis=0), axis=1)
+        gap = step_lengths(p[order])
         gap /= ranges[order][1:]
         along = gap[np.diff(ring[order]) == 0.0]
         rows = tree.query(p, 16)[1] % len(p)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.polylines import distances_along
 from cns_drake.imports.drives.free_space import CELL, FreeSpace
 from cns_drake.imports.drives.steerable_drives import (
     Obstacle,
@@ -54,8 +55,7 @@ class CellGraph(WayGraph):
         super().__init__(np.full(len(row), CELL), start, end, cost)
 
     def along(self, way: Sequence[int]) -> np.ndarray:
-        steps = np.linalg.norm(np.diff(self._xy[list(way)], axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return distances_along(self._xy[list(way)])
 
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
         driven = cKDTree(self._xy[pieces])

@@ -9,6 +9,7 @@ from scipy.interpolate import BSpline
 from shapely.geometry import LineString
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.polylines import distances_along, length_of
 from cns_drake.imports.drives.free_space import FreeSpace
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.roads.lane_path import POINT_SPACING
@@ -64,7 +65,7 @@ class WaypointRoute:
     @property
     def length(self) -> float:
         """Horizontal length of the drive [m]."""
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        return length_of(self.path)
 
 
 def steerable_drive(
@@ -106,8 +107,7 @@ def evenly_spaced(line: np.ndarray, spacing: float) -> np.ndarray:
 
     Ends of the line are kept.
     """
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    along = distances_along(line)
     count = max(1, round(along[-1] / spacing))
     wanted = np.linspace(0.0, along[-1], count + 1)
     return np.column_stack([np.interp(wanted, along, x) for x in line.T])

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from cns_drake.base.polylines import length_of, step_lengths
 from cns_drake.imports.drives.free_space import FreeSpace
 from cns_drake.imports.drives.search import LONGEST
 from cns_drake.imports.drives.steerable_drives import (
@@ -64,7 +65,7 @@ class StreetLane:
     @property
     def length(self) -> float:
         """Length of the lane along the middle of the street [m]."""
-        return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
+        return length_of(self.line)
 
 
 def make_lanes(streets: Sequence[Street]) -> list[StreetLane]:
@@ -129,7 +130,7 @@ def lane_path(lanes: Sequence[StreetLane], spacing: float) -> np.ndarray:
         line = evenly_spaced(lane.line, spacing)
         parts.append(np.column_stack([line, np.full(len(line), lane.aside)]))
     rows = np.concatenate(parts)
-    steps = np.hypot(*np.diff(rows[:, :2], axis=0).T)
+    steps = step_lengths(rows[:, :2])
     return rows[np.append(True, steps > _SAME_PLACE)]
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.polylines import length_of, step_lengths
 from cns_drake.base.units import wrapped
 from cns_drake.imports.drives import search, steerable_drives, way_graph
 from cns_drake.imports.drives.steerable_drives import Obstacle, WaypointRoute
@@ -56,10 +57,7 @@ class BandGraph(way_graph.WayGraph):
     def __init__(self, bands: Sequence[LaneBand]):
         self.bands = [band for band in bands if _is_driven(band)]
         self.lines = [_driven_line(band) for band in self.bands]
-        lengths = [
-            np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-            for line in self.lines
-        ]
+        lengths = [length_of(line) for line in self.lines]
         # A drive may use each road only once. In a junction, each way is a
         # road.
         self._roads = np.array([band.road.name for band in self.bands])
@@ -145,7 +143,7 @@ def _driven_line(band: LaneBand) -> np.ndarray:
     along = (band.lane.number < 0) != band.road.keeps_left
     along ^= band.lane.is_reversed
     line = band.middle if along else band.middle[::-1]
-    steps = np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1)
+    steps = step_lengths(line[:, :2])
     kept = np.concatenate([[True], steps > _SAME_PLACE])
     kept[-1] = True
     return line[kept]

@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry import LinearRing, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.polylines import length_of
 from cns_drake.base.units import wrapped
 from cns_drake.city.geometry import polygons_of
 
@@ -79,7 +80,7 @@ def _tapers(xy: np.ndarray) -> Iterator[np.ndarray]:
         aside = float(lengths[k] * np.sin(turns[k]))
         straight = before[: _num_straight_edges(before, -ahead) + 1]
         chain = _kerb_line(behind, ahead)
-        reach = np.hypot(*np.diff(straight, axis=0).T).sum()
+        reach = length_of(straight)
         if reach < _KERB_BEFORE or len(chain) < 2:
             continue
         longest = min(_LONGEST_TAPER, _TAPER_RATIO * aside)

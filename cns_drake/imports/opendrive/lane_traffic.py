@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cns_drake.base.polylines import length_of
 from cns_drake.imports.opendrive.band_graph import BandGraph, usual_limit_of
 from cns_drake.imports.opendrive.lanes import LaneBand
 from cns_drake.imports.opendrive.road_heights import KerbHeights
@@ -52,8 +53,8 @@ def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
     walkways: list[Walkway] = []
     for band in bands:
         half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
-        steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
-        if half < _LEAST_HALF_WIDTH or steps.sum() < _SHORTEST_WALKWAY:
+        length = length_of(band.middle)
+        if half < _LEAST_HALF_WIDTH or length < _SHORTEST_WALKWAY:
             continue
         first = 2 * len(walkways)
         kerb = kerbs(band.middle[:, :2])

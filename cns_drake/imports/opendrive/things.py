@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.polylines import step_lengths
 from cns_drake.city.geometry import Structure, placed
 from cns_drake.city.geometry.polygons import GRID
 from cns_drake.city.placement.naming import name_stem
@@ -280,9 +281,7 @@ def _swept_object(
         return None
     middle = road.points(s, inside, t)
     # Joints of the road are there twice.
-    is_new = (
-        np.linalg.norm(np.diff(middle[:, :2], axis=0), axis=1) > _SAME_PLACE
-    )
+    is_new = step_lengths(middle[:, :2]) > _SAME_PLACE
     kept = np.append(True, is_new)
     middle, rise, width, height = (
         values[kept] for values in (middle, rise, width, height)

@@ -13,6 +13,7 @@ from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
+from cns_drake.base.polylines import distances_along
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import (
     City,
@@ -420,8 +421,7 @@ def _park_cars(
         rng = draft.task(
             "parking", band.road.name, band.section, band.lane.number
         )
-        steps = np.linalg.norm(np.diff(band.middle, axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
+        along = distances_along(band.middle)
         place = float(rng.uniform(*_BAY_LENGTHS)) / 2.0
         backwards = (band.lane.number > 0) != band.road.keeps_left
         while place < along[-1] - _BAY_LENGTHS[0] / 2.0:

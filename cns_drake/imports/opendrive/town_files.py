@@ -4,10 +4,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from cns_drake.city.generation.rendering import render_stages
-from cns_drake.city.geometry import Structure, polygons_of
+from cns_drake.city.geometry import Structure, surface_mesh
 from cns_drake.imports import map_files, overview
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.opendrive.town import Town
@@ -16,6 +15,8 @@ from cns_drake.scene.map_folder import LANES_NAME, MESH_FOLDER
 
 # About the radius of a tree's crown, in pictures [m].
 _CROWN_RADIUS = 1.5
+# Side of the squares into which footprints are divided, in pictures [m].
+_TILE = 20.0
 # Least and greatest speed of a drive [m/s].
 _SPEEDS = (3.0, 12.0)
 # Classes that the picture from above shows; small things could not be seen.
@@ -126,17 +127,7 @@ def _seen_from_above(
         area = structure.footprint_W
         if structure.semantic_class == "vegetation":
             area = area.buffer(_CROWN_RADIUS)
-        pieces = polygons_of(area)
-        cut = shapely.constrained_delaunay_triangles(
-            shapely.multipolygons(pieces)
-        )
-        corners = [
-            shapely.get_coordinates(triangle)[:3]
-            for triangle in shapely.get_parts(cut)
-        ]
-        if corners:
-            xy = np.array(corners)
-            z = np.zeros((*xy.shape[:2], 1))
-            yield ImportedObject(
-                structure, "", None, np.concatenate([xy, z], axis=2)
-            )
+        mesh = surface_mesh(area, 0.0, _TILE)
+        if mesh.num_triangles:
+            triangles = mesh.vertices[mesh.triangles()]
+            yield ImportedObject(structure, "", None, triangles)

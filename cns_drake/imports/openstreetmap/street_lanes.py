@@ -13,6 +13,7 @@ from scipy.ndimage import uniform_filter1d
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.polylines import length_of
 from cns_drake.base.units import wrapped
 from cns_drake.imports.openstreetmap import lane_tags, speed_tags
 from cns_drake.imports.streets import SHARPEST_TURN_DEG, Street, cut_at_nodes
@@ -66,7 +67,7 @@ class Stretch:
 
     @cached_property
     def length(self) -> float:
-        return float(np.linalg.norm(np.diff(self.line, axis=0), axis=1).sum())
+        return length_of(self.line)
 
     def heading(self, end: int) -> float:
         """Returns the direction of the stretch at an end of the stretch [rad].

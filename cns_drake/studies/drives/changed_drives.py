@@ -96,6 +96,7 @@ class DriveChanger:
         # many drives of a fleet share one.
         self._drawn: dict[tuple[Path, float, int], Route] = {}
         self._networks: dict[Path, RoadNetwork] = {}
+        self._rooms: dict[Path, int] = {}
 
     def changed(
         self,
@@ -262,10 +263,22 @@ class DriveChanger:
         return drive
 
     def _draw_route(self, roads: Path, length: float, seed: int) -> Route:
+        rng = np.random.default_rng(seed)
+        return draw_route(self._network(roads), length, rng)
+
+    def _network(self, roads: Path) -> RoadNetwork:
         if roads not in self._networks:
             self._networks[roads] = load_road_network(roads)
-        rng = np.random.default_rng(seed)
-        return draw_route(self._networks[roads], length, rng)
+        return self._networks[roads]
+
+    def _room(self, folder: MapFolder) -> int:
+        """Returns the number of vehicles that the roads of a map hold."""
+        if folder.path not in self._rooms:
+            has_roads = folder.roads.is_file()
+            network = self._network(folder.roads) if has_roads else None
+            graph = load_ways(folder, network).graph
+            self._rooms[folder.path] = room_for_vehicles(graph)
+        return self._rooms[folder.path]
 
     def _fit_traffic(
         self, drive: Scenario, folder: MapFolder, left: dict[str, Any]
@@ -287,7 +300,7 @@ class DriveChanger:
         if not traffic:
             return
         share = _FOLLOWED_ROOM if driver.get("follows") else _MOST_ROOM
-        most = int(share * room_for_vehicles(load_ways(folder).graph))
+        most = int(share * self._room(folder))
         for name in ("vehicles", "walkers"):
             if isinstance(given := traffic.get(name), int) and given > most:
                 self._on_note(

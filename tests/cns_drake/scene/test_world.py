@@ -88,7 +88,7 @@ def test_files_that_are_no_world(tmp_path, text):
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ('version="1.9"', 'version="#"', "cannot be parsed"),
+        ("<pose>1", '<pose relative_to="nowhere">1', "cannot be parsed: [^<]"),
         ("<pose>1", "<pose>", "must have 6 values"),
         ("body", "b\udca5dy", "not UTF-8"),
     ],
@@ -113,9 +113,7 @@ def test_a_fault_names_the_file_once(tmp_path, monkeypatch):
         with pytest.raises(InputError) as refusal:
             load_world(path)
         message = str(refusal.value)
-        assert message.startswith(
-            f"{path}: cannot be parsed: line 8: At XML path"
-        )
+        assert message == f"{path}: line 8: pose: must have 6 values"
         assert message.count("a.sdf") == 1
 
 
@@ -205,3 +203,45 @@ def test_structures_that_the_table_lacks_follow_behind(tmp_path):
         StructureEntry(8, "barn", "unlabeled"),
         StructureEntry(9, "shed", "unlabeled"),
     ]
+
+
+ROBOT = """<robot name="r"><link name="l">
+<inertial><mass value="-1"/></inertial>
+<visual><geometry><box size="1 1 2"/></geometry></visual>
+<visual><origin xyz="0 0 5"/><geometry><mesh filename="{uri}"/></geometry>
+</visual><collision><geometry><mesh filename="gone.stl"/></geometry></collision>
+</link><gazebo><sensor/></gazebo></robot>"""
+
+
+@pytest.mark.parametrize("uri", ["model://p/a.obj", "package://p/a.obj"])
+def test_meshes_of_urdf_are_searched_as_those_of_sdf(tmp_path, uri):
+    (tmp_path / "models" / "p").mkdir(parents=True)
+    mesh = tmp_path / "models" / "p" / "a.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    path = tmp_path / "worlds" / "r.urdf"
+    path.parent.mkdir()
+    path.write_text(ROBOT.format(uri=uri))
+    world = load_world(path, model_paths=[tmp_path / "models"])
+    inspector = world.scene_graph.model_inspector()
+    assert len(read_perception_geometry(inspector)) == 2
+    assert world.notes == ()
+    mesh.unlink()
+    world = load_world(path)
+    inspector = world.scene_graph.model_inspector()
+    (box,) = read_perception_geometry(inspector)
+    assert np.ptp(box.surface.p_GVset, axis=0).tolist() == [1.0, 1.0, 2.0]
+    (note,) = world.notes
+    assert f"1 meshes not found, and left out: {uri}" in note
+
+
+def test_mjcf_is_read_or_refused(tmp_path):
+    geom = '<geom type="box" size=".5 .5 .5"/>'
+    path = tmp_path / "w.xml"
+    text = "<mujoco model='m'><worldbody>{}</worldbody></mujoco>"
+    path.write_text(text.format(geom))
+    world = load_world(path)
+    assert len(read_perception_geometry(world.scene_graph.model_inspector()))
+    more = f"<replicate count='3' offset='1 0 0'>{geom}</replicate>"
+    path.write_text(text.format(geom + more))
+    with pytest.raises(InputError, match="<replicate> of MJCF is not read"):
+        load_world(path)

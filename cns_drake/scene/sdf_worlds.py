@@ -1,29 +1,44 @@
-"""Reduces Gazebo worlds to their visuals, as SDF that Drake can read.
+"""Reads the visuals of SDF worlds, at their initial places.
 
-Drake rejects many elements of such worlds, and crashes on an infinite collision
-plane if there are many other collision shapes. Only the visuals are kept, at
-their initial places, and nothing in such a world moves.
+Drake parses only the frames: models, links and their poses. The visuals do not
+pass through Drake's parser, because it is slow on cities, refuses much of what
+worlds for Gazebo contain, and reads some of it differently from Gazebo. Nothing
+in such a world moves.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 import contextlib
+from dataclasses import dataclass
 import math
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    GeometryInstance,
+    HalfSpace,
+    IllustrationProperties,
+    Mesh,
+    PerceptionProperties,
+    Rgba,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.model_check import SIZES, lacks_size, read_model
 from cns_drake.scene.model_finder import ModelFinder, model_file
 
-# Elements that Drake does not read, or reads differently from Gazebo.
-_OF_GAZEBO = (
-    "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
-    "road", "population", "submesh", "transparency", "visibility_flags",
-    "cone", "heightmap", "image", "polyline", "initial_position",
-)  # fmt: skip
-_PLANE_COLLISION = ".//collision/geometry/plane"
-_SIZED_PLANE = ".//visual/geometry/plane/size"
 # Elements that are left out -> how a note calls them.
 _SKIPPED = {
     "light": "lights",
@@ -72,10 +87,16 @@ _ATTRIBUTES = {
 }
 # Prefixes of names that SDF leaves to programs; Drake reads its own.
 _CUSTOM = ("drake:", "gz:", "ignition:")
-_SHAPES = (
-    "box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh",
-    "drake:capsule", "drake:ellipsoid",
-)  # fmt: skip
+# Shape -> its class, and SDF's default of its sizes.
+_SHAPES = {
+    "box": (Box, (1.0, 1.0, 1.0)),
+    "sphere": (Sphere, (1.0,)),
+    "cylinder": (Cylinder, (1.0, 1.0)),
+    "capsule": (Capsule, (0.5, 1.0)),
+    "ellipsoid": (Ellipsoid, (1.0, 1.0, 1.0)),
+    "drake:capsule": (Capsule, ()),
+    "drake:ellipsoid": (Ellipsoid, ()),
+}
 # Gazebo's own models, for which no file is needed.
 _SUN = "model://sun"
 _GROUND_PLANE = "model://ground_plane"
@@ -93,61 +114,74 @@ _ENDLESS = 5000.0
 _EVERY_FLAG = 0xFFFFFFFF
 
 
-def is_gazebo_world(path: Path, root: Element) -> bool:
-    """Returns whether a world or model has elements that Drake cannot read.
+def read_sdf_world(
+    plant: MultibodyPlant, path: Path, model_paths: Iterable[Path] = ()
+) -> tuple[str, ...]:
+    """Adds the visuals of a world or model to a plant, all of them static.
 
     Args:
+        plant: plant that is registered with a SceneGraph, and not finalized.
         path: the SDF file.
-        root: the root element of the file.
-    """
-    if root.find("world") is None and root.find("model") is None:
-        return False
-    return (
-        path.suffix.lower() == ".world"
-        or root.find(_PLANE_COLLISION) is not None
-        or root.find(_SIZED_PLANE) is not None
-        or root.find("world/joint") is not None
-        or any(next(root.iter(tag), None) is not None for tag in _OF_GAZEBO)
-        or any(
-            lacks_size(shape)
-            for geometry in root.iterfind(".//visual/geometry")
-            for shape in geometry
-        )
-    )
-
-
-def simplify_world(
-    path: Path, root: Element, model_paths: Iterable[Path] = ()
-) -> tuple[str, tuple[str, ...]]:
-    """Reduces a world or model to static models with visuals.
-
-    Args:
-        path: the SDF file.
-        root: the root element of the file.
         model_paths: folders in which `model://` is searched first.
 
     Returns:
-        The new world as SDF text; notes for the user on what was left out.
+        Notes for the user on what is left out.
 
     Raises:
-        InputError: a model that was found cannot be read, or the pose of a
-            model or visual cannot be determined.
+        InputError: the file has no world and no model, a model that was found
+            cannot be read, or a pose or shape cannot be determined.
+        RuntimeError, ValueError, SystemExit: Drake refuses a frame or a shape.
     """
-    simplifier = _Simplifier(path, model_paths)
+    root = read_model(path)
     worlds = root.findall("world")
     world = worlds[0] if worlds else Element("world", name="world")
     if not worlds:
+        if root.find("model") is None:
+            raise InputError(f"{path}: has no world and no model of SDF")
         world.extend(root)
-    made = Element("sdf", version="1.9")
-    target = SubElement(
-        made, "world", name=_legal_name(world.get("name", "world"))
+    reader = _Reader(path, model_paths)
+    reader.skip("further worlds of the file", len(worlds) - 1)
+    reader.add_world(root, world)
+    reader.register(plant)
+    return reader.notes()
+
+
+def note_of_missing(
+    path: Path, what: str, uris: Collection[str]
+) -> tuple[str, ...]:
+    """Returns a note on the models or meshes of a file that are missing.
+
+    The advice holds for every program and for `load_world`.
+    """
+    if not uris:
+        return ()
+    some = ", ".join(list(uris)[:3]) + (", ..." if len(uris) > 3 else "")
+    return (
+        f"{path}: {len(uris)} {what} not found, and left out: {some}; name "
+        "their folder in the variable GZ_SIM_RESOURCE_PATH",
     )
-    simplifier.skip("further worlds of the file", len(worlds) - 1)
-    simplifier.add_world(root, world, target)
-    return tostring(made, "unicode"), simplifier.notes()
 
 
-class _Simplifier:
+@dataclass(frozen=True)
+class _Visual:
+    """A visual of a link L.
+
+    Attributes:
+        name: its name.
+        frame: name of a frame F of the model; "" for the frame of the link.
+        X_FG: pose of the shape's frame G in F.
+        shape: its shape.
+        properties: properties for each role.
+    """
+
+    name: str
+    frame: str
+    X_FG: RigidTransform
+    shape: Shape
+    properties: tuple[IllustrationProperties | PerceptionProperties, ...]
+
+
+class _Reader:
     """One pass over a world and all models that it includes."""
 
     def __init__(self, path: Path, model_paths: Iterable[Path]):
@@ -160,6 +194,10 @@ class _Simplifier:
         }
         # Names to which poses and frames refer, without their scopes.
         self._referred: set[str] = set()
+        # The frames of the world, as SDF, and the visuals of its links.
+        self._frames = Element("world", name="frames")
+        self._visuals: dict[Element, list[_Visual]] = {}
+        self._meshes: dict[tuple[str, Path], Path | None] = {}
 
     def notes(self) -> tuple[str, ...]:
         """Returns one line for each kind of omitted element."""
@@ -168,13 +206,7 @@ class _Simplifier:
             for what, count in sorted(self._skipped.items())
         ]
         for what, uris in self._missing.items():
-            if uris:
-                some = ", ".join(list(uris)[:3])
-                some += ", ..." if len(uris) > 3 else ""
-                notes.append(
-                    f"{self._path}: {len(uris)} {what} not found, and left "
-                    f"out: {some}; name their folder with --model-path"
-                )
+            notes += note_of_missing(self._path, what, uris)
         return tuple(notes)
 
     def skip(self, what: str, count: int = 1, how: str = "ignored") -> None:
@@ -182,11 +214,45 @@ class _Simplifier:
         if count > 0:
             self._skipped[f"{what} {how}"] += count
 
-    def add_world(self, root: Element, world: Element, target: Element) -> None:
+    def add_world(self, root: Element, world: Element) -> None:
         """Adds the models of a world; `root` is the root of its file."""
         self._scan_file(root)
         self._count_saved(world)
-        self._add_children(world, target, self._path.absolute().parent, 0)
+        folder = self._path.absolute().parent
+        self._add_children(world, self._frames, folder, 0)
+
+    def register(self, plant: MultibodyPlant) -> None:
+        """Adds the frames and visuals that were read to a plant."""
+        made = Element("sdf", version="1.9")
+        made.append(self._frames)
+        Parser(plant).AddModelsFromString(tostring(made, "unicode"), "sdf")
+        for model in self._frames.iterfind("model"):
+            self._register_model(plant, model, "")
+
+    def _register_model(
+        self, plant: MultibodyPlant, model: Element, scope: str
+    ) -> None:
+        name = scope + model.get("name", "")
+        for link in model.iterfind("link"):
+            visuals = self._visuals[link]
+            if not visuals:
+                continue
+            instance = plant.GetModelInstanceByName(name)
+            body = plant.GetBodyByName(link.get("name", ""), instance)
+            for visual in visuals:
+                X_LG = visual.X_FG
+                if visual.frame:
+                    frame = plant.GetFrameByName(visual.frame, instance)
+                    X_LG = frame.GetFixedPoseInBodyFrame() @ X_LG
+                one = GeometryInstance(X_LG, visual.shape, visual.name)
+                for properties in visual.properties:
+                    if isinstance(properties, PerceptionProperties):
+                        one.set_perception_properties(properties)
+                    else:
+                        one.set_illustration_properties(properties)
+                plant.RegisterVisualGeometry(body, one)
+        for inner in model.iterfind("model"):
+            self._register_model(plant, inner, f"{name}::")
 
     def _count_saved(self, world: Element) -> None:
         """Counts what a saved state of the world would change."""
@@ -357,69 +423,125 @@ class _Simplifier:
         # A link without visuals stays, because poses can refer to the link.
         made = SubElement(target, "link", name=_free_name(link, target))
         self._copy_pose(link, made)
-        for visual in link.iterfind("visual"):
-            self._add_visual(visual, made, target, folder)
+        visuals = self._visuals[made] = []
+        taken: set[str] = set()
+        for element in link.iterfind("visual"):
+            name = _free_name_of(element, taken)
+            visual = self._read_visual(element, name, made, target, folder)
+            if visual is not None:
+                taken.add(name)
+                visuals.append(visual)
 
-    def _add_visual(
-        self, visual: Element, link: Element, model: Element, folder: Path
-    ) -> None:
+    def _read_visual(
+        self,
+        visual: Element,
+        name: str,
+        link: Element,
+        model: Element,
+        folder: Path,
+    ) -> _Visual | None:
+        """Returns a visual of a link, or None if it is not shown."""
         geometry = visual.find("geometry")
-        shapes = [] if geometry is None else list(geometry)
-        if not shapes or shapes[0].tag not in _SHAPES:
-            if shapes and shapes[0].tag != "empty":
-                self.skip(f"visuals of type {shapes[0].tag}")
-            return
+        element = None if geometry is None else next(iter(geometry), None)
+        if element is None:
+            return None
+        if element.tag not in (*_SHAPES, "plane", "mesh"):
+            if element.tag != "empty":
+                self.skip(f"visuals of type {element.tag}")
+            return None
         self._count_unknown(visual)
         if self._is_invisible(visual):
-            return
-        shape = shapes[0]
-        made = Element("visual", name=_free_name(visual, link))
-        self._copy_pose(visual, made)
-        self._count_unknown(shape)
-        if shape.tag == "mesh":
-            mesh = self._located_mesh(shape, folder)
-            if mesh is None:
-                return
-            shape = mesh
-        elif shape.tag == "plane" and shape.find("size") is not None:
-            sides = map(float, (shape.findtext("size") or "").split())
-            if min(sides) > _ENDLESS:
-                what = f"planes of more than {_ENDLESS / 1000:g} km"
-                self.skip(what, how="taken as endless")
-            else:
-                shape = _thin_box(shape, made, link, model)
-                how = "end at their size, as Gazebo shows them"
-                self.skip("planes", how=how)
-        elif lacks_size(shape):
-            what = f"shapes without a size ({shape.tag})"
-            self.skip(what, how="made as large as SDF's default")
-        kept = SubElement(SubElement(made, "geometry"), shape.tag)
-        kept.extend(part for part in shape if part.tag in _KNOWN[shape.tag])
-        made.extend(part for part in visual if part.tag.startswith("drake:"))
-        link.append(made)
-        material = visual.find("material")
-        if material is not None:
-            self._add_material(material, made)
+            return None
+        self._count_unknown(element)
+        X_VG = None
+        shape: Shape | None
+        if element.tag == "mesh":
+            shape = self._mesh(element, folder)
+        elif element.tag == "plane":
+            shape, X_VG = self._plane(element)
+        else:
+            if lacks_size(element):
+                what = f"shapes without a size ({element.tag})"
+                self.skip(what, how="made as large as SDF's default")
+            make, default = _SHAPES[element.tag]
+            shape = make(*_sizes(element, default))
+        if shape is None:
+            return None
+        properties = self._properties(visual)
+        if not properties:
+            self.skip("invisible visuals")
+            return None
+        frame, X_FG = self._place(visual, link, model)
+        if X_VG is not None:
+            X_FG = X_FG @ X_VG
+        return _Visual(name, frame, X_FG, shape, properties)
 
-    def _located_mesh(self, shape: Element, folder: Path) -> Element | None:
-        """Returns a mesh with the path of its file, or None if it is missing.
+    def _place(
+        self, visual: Element, link: Element, model: Element
+    ) -> tuple[str, RigidTransform]:
+        """Returns the name of a frame F, and the pose of a visual V in F.
+
+        F is the link, named "", or a frame that is added to the model, for
+        poses that take more than their numbers.
+        """
+        pose = visual.find("pose")
+        if pose is None:
+            return "", RigidTransform()
+        own = Element("frame", name=f"_visual_of_{link.get('name')}")
+        self._copy_pose(visual, own)
+        kept = own.find("pose")
+        if kept is None:
+            return "", RigidTransform()
+        if not kept.attrib:
+            return "", _pose(kept.text or "")
+        own.set("name", _free_name(own, model))
+        own.set("attached_to", link.get("name", ""))
+        model.append(own)
+        return own.get("name", ""), RigidTransform()
+
+    def _mesh(self, element: Element, folder: Path) -> Shape | None:
+        """Returns a mesh, or None if its file is missing.
 
         `folder` is the folder of the file that contains the mesh's URI.
         """
-        uri = (shape.findtext("uri") or "").strip()
-        place = self._finder.find(uri, folder)
-        if place is None or not place.is_file():
+        uri = (element.findtext("uri") or "").strip()
+        if (uri, folder) not in self._meshes:
+            found = self._finder.find(uri, folder)
+            is_file = found is not None and found.is_file()
+            self._meshes[uri, folder] = found if is_file else None
+        place = self._meshes[uri, folder]
+        if place is None:
             self._missing["meshes"][uri] += 1
             return None
-        mesh = Element("mesh")
-        # Drake does not decode percent signs in such a URI.
-        SubElement(mesh, "uri").text = f"file://{place}"
-        scale = shape.find("scale")
-        if scale is not None:
-            mesh.append(scale)
-        if shape.find("submesh") is not None:
+        if element.find("submesh") is not None:
             self.skip("choices of a part of a mesh")
-        return mesh
+        is_convex = element.find("drake:declare_convex") is not None
+        make = Convex if is_convex else Mesh
+        scale = _numbers(element.findtext("scale")) or [1.0, 1.0, 1.0]
+        return make(place, scale3=np.array(scale))
+
+    def _plane(self, element: Element) -> tuple[Shape, RigidTransform]:
+        """Returns the shape G of a plane, and its pose in the visual V.
+
+        A plane that ends is a thin box below the plane. As in Gazebo, the
+        shortest rotation from z to the normal also rotates the sides.
+        """
+        normal = _numbers(element.findtext("normal")) or [0.0, 0.0, 1.0]
+        sides = _numbers(element.findtext("size"))
+        if sides and min(sides) > _ENDLESS:
+            what = f"planes of more than {_ENDLESS / 1000:g} km"
+            self.skip(what, how="taken as endless")
+            sides = []
+        if not sides:
+            X_VG = HalfSpace.MakePose(np.array(normal), np.zeros(3))
+            return HalfSpace(), X_VG
+        self.skip("planes", how="end at their size, as Gazebo shows them")
+        x, y, z = (value / math.hypot(*normal) for value in normal)
+        turn = [1.0 + z, -y, x, 0.0] if z > -1.0 else [0.0, 1.0, 0.0, 0.0]
+        turn = [value / math.hypot(*turn) for value in turn]
+        down = [-value * _PLANE_THICKNESS / 2.0 for value in (x, y, z)]
+        X_VG = RigidTransform(Quaternion(np.array(turn)), down)
+        return Box(*sides, _PLANE_THICKNESS), X_VG
 
     def _is_invisible(self, visual: Element) -> bool:
         """Returns whether Gazebo hides a visual; counts doubtful cases."""
@@ -434,21 +556,43 @@ class _Simplifier:
             self.skip("visibility flags")
         return False
 
-    def _add_material(self, material: Element, target: Element) -> None:
-        for tag in ("script", "pbr"):
+    def _properties(
+        self, visual: Element
+    ) -> tuple[IllustrationProperties | PerceptionProperties, ...]:
+        """Returns the properties of a visual for each role that it has."""
+        rgba = self._colour(visual.find("material"))
+        found: list[IllustrationProperties | PerceptionProperties] = []
+        for tag, properties in (
+            ("drake:illustration_properties", IllustrationProperties()),
+            ("drake:perception_properties", PerceptionProperties()),
+        ):
+            element = visual.find(tag)
+            enabled = "true" if element is None else element.get("enabled", "")
+            if enabled.strip().lower() in ("false", "0"):
+                continue
+            if rgba is not None:
+                properties.AddProperty("phong", "diffuse", rgba)
+            found.append(properties)
+        return tuple(found)
+
+    def _colour(self, material: Element | None) -> Rgba | None:
+        if material is None:
+            return None
+        for tag in ("script", "pbr", "drake:diffuse_map"):
             if material.find(tag) is not None:
                 self.skip("materials by script or texture")
-        numbers = (material.findtext("diffuse") or "").split()
-        try:
-            values = [float(number) for number in numbers]
-        except ValueError:
-            return
-        if len(values) in (3, 4) and all(map(math.isfinite, values)):
-            if len(values) == 4 and values[3] < 1.0:
-                self.skip("transparent colours", how="taken as solid")
-            made = SubElement(target, "material")
-            text = " ".join([*numbers, "1"][:4])
-            SubElement(made, "diffuse").text = text
+        numbers = _numbers(material.findtext("diffuse"))
+        if len(numbers) not in (3, 4):
+            return None
+        if not all(0.0 <= number <= 1.0 for number in numbers):
+            text = " ".join((material.findtext("diffuse") or "").split())
+            raise InputError(
+                f"{self._path}: diffuse: {text}: not within 0 to 1"
+            )
+        if len(numbers) == 4 and numbers[3] < 1.0:
+            self.skip("transparent colours", how="taken as solid")
+        # SDF's colours have single precision.
+        return Rgba(*np.array(numbers, np.float32).tolist())
 
     def _copy_pose(self, source: Element, target: Element) -> None:
         pose = source.find("pose")
@@ -480,36 +624,45 @@ def _override_model(model: Element, include: Element) -> None:
         model.set("placement_frame", placement.strip())
 
 
-def _thin_box(
-    plane: Element, visual: Element, link: Element, model: Element
-) -> Element:
-    """Returns a thin box for a plane of finite size, and places its visual.
+def _pose(text: str) -> RigidTransform:
+    """Returns the pose of six numbers, computed as libsdformat does."""
+    numbers = _numbers(text)
+    roll, pitch, yaw = (value / 2.0 for value in numbers[3:])
+    sr, sp, sy = math.sin(roll), math.sin(pitch), math.sin(yaw)
+    cr, cp, cy = math.cos(roll), math.cos(pitch), math.cos(yaw)
+    turn = [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]
+    length = math.sqrt(
+        turn[0] * turn[0]
+        + turn[1] * turn[1]
+        + turn[2] * turn[2]
+        + turn[3] * turn[3]
+    )
+    # Adding 0 makes 0 of -0.
+    turn = [value / length + 0.0 for value in turn]
+    p_FV = [value + 0.0 for value in numbers[:3]]
+    return RigidTransform(Quaternion(np.array(turn)), p_FV)
 
-    As in Gazebo, the shortest rotation from z to the normal also rotates the
-    sides. The numbers of the plane must be valid.
-    """
-    words = (plane.findtext("normal") or "").split() or ["0", "0", "1"]
-    normal = [float(word) for word in words]
-    x, y, z = (value / math.hypot(*normal) for value in normal)
-    # The pose of the visual becomes a frame, and the box lies below it.
-    own = link.get("name", "")
-    frame = Element("frame", name=f"_plane_of_{own}", attached_to=own)
-    frame.set("name", _free_name(frame, model))
-    model.append(frame)
-    frame.extend(visual.findall("pose"))
-    for pose in visual.findall("pose"):
-        visual.remove(pose)
-    box = Element("box")
-    SubElement(
-        box, "size"
-    ).text = f"{(plane.findtext('size') or '').strip()} {_PLANE_THICKNESS}"
-    turn = [-y, x, 0.0, 1.0 + z] if z > -1.0 else [1.0, 0.0, 0.0, 0.0]
-    turn = [value / math.hypot(*turn) for value in turn]
-    down = [-value * _PLANE_THICKNESS / 2.0 for value in (x, y, z)]
-    pose = SubElement(visual, "pose", relative_to=frame.get("name", ""))
-    pose.set("rotation_format", "quat_xyzw")
-    pose.text = " ".join(map(repr, [*down, *turn]))
-    return box
+
+def _sizes(shape: Element, default: tuple[float, ...]) -> list[float]:
+    """Returns the sizes of a shape in the order of its class's arguments."""
+    found: list[float] = []
+    for name, count in SIZES[shape.tag].items():
+        begin = len(found)
+        text = shape.findtext(name)
+        found += default[begin : begin + count]
+        if text is not None:
+            found[begin:] = _numbers(text)
+    return found
+
+
+def _numbers(text: str | None) -> list[float]:
+    """Returns the numbers in a text, which was checked."""
+    return [float(word) for word in (text or "").split()]
 
 
 def _local_uri(uri: str) -> str:
@@ -530,8 +683,11 @@ def _number_in(text: str | None, default: float) -> float:
 
 def _free_name(element: Element, target: Element) -> str:
     """Returns an element's name, changed if it is already in use."""
+    return _free_name_of(element, {part.get("name", "") for part in target})
+
+
+def _free_name_of(element: Element, taken: set[str]) -> str:
     wanted = _legal_name(element.get("name", element.tag))
-    taken = {sibling.get("name") for sibling in target}
     name = wanted
     count = 1
     while name in taken:

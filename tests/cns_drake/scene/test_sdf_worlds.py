@@ -1,11 +1,15 @@
-"""Worlds that people write for Gazebo."""
+"""SDF worlds, also those that people write for Gazebo."""
 
 from helpers.mesh_texts import obj_text
 import numpy as np
+from pydrake.geometry import Role, SceneGraph
 from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.scene.geometry_list import list_geometry
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.surfaces import tessellate
 from cns_drake.scene.world import load_world
@@ -360,6 +364,10 @@ NOTED = {
         "1 transparent colours taken as solid"
     ),
     "<scale>2 2 2</scale>": "1 elements <scale> in <visual> ignored",
+    "<drake:perception_properties enabled='false'/>"
+    "<drake:illustration_properties enabled='false'/>": (
+        "1 invisible visuals ignored"
+    ),
 }
 
 
@@ -536,4 +544,115 @@ def test_a_world_of_which_nothing_is_seen_says_why(tmp_path):
     extra = "<transparency>1</transparency>"
     path = write(tmp_path, f"<model name='m'>{link(extra=extra)}</model>")
     with pytest.raises(InputError, match=r"no visuals.* \(1 invisible"):
+        load_world(path)
+
+
+def shown(geometry):
+    return f"<model name='m'>{link(f'<geometry>{geometry}</geometry>')}</model>"
+
+
+# Worlds that Drake's own parser would read in another way, or refuse.
+ALIKE = {
+    "frame of an old pose": (
+        "<model name='m'><link name='b'><pose>1 0 0 0 0 0</pose></link>"
+        + link(pose="<pose frame='b'>3 0 0 0 0 0</pose>")
+        + "</model>"
+    ),
+    "mesh by model://": shown("<mesh><uri>model://crate/a.obj</uri></mesh>"),
+    "mesh by package://": shown(
+        "<mesh><uri>package://crate/a.obj</uri><scale>1 -2 3</scale></mesh>"
+    ),
+    "missing mesh": shown("<mesh><uri>gone.dae</uri></mesh>"),
+    "convex hull": shown(
+        "<mesh><uri>model://crate/a.obj</uri><drake:declare_convex/></mesh>"
+    ),
+    "mass below 0": (
+        "<model name='m'><link name='l'><inertial><mass>-1</mass></inertial>"
+        f"<visual name='v'>{BOX}</visual></link></model>"
+    ),
+    "joint without its child": (
+        f"<model name='m'>{link()}<joint name='j' type='fixed'>"
+        "<parent>l</parent><child>gone</child></joint></model>"
+    ),
+    "reserved name": f"<model name='__m__'>{link()}</model>",
+    "one name twice": f"<model name='m'>{link()}{link()}</model>",
+    "sphere without a size": shown("<sphere/>"),
+    "cone": shown("<cone><radius>1</radius><length>2</length></cone>"),
+    "turned in degrees": (
+        "<model name='m'><pose degrees='true'>5 0 1 10 20 30</pose>"
+        + link(pose="<pose degrees='true'>1 2 3 40 50 60</pose>")
+        + "</model>"
+    ),
+    "model in a model": (
+        "<model name='m'><pose>1 2 3 .1 .2 .3</pose><model name='n'>"
+        f"<pose>4 5 6 .4 .5 .6</pose>{link()}</model></model>"
+    ),
+}
+BESIDE = {
+    "light": ("<light name='sun' type='point'/>", "1 lights ignored"),
+    "plugin": ("<plugin name='p' filename='f'/>", "1 plugins ignored"),
+    "include": (include("model://sun"), "1 lights ignored"),
+    "GUI": ("<gui/>", None),
+}
+
+
+@pytest.mark.parametrize("case", ALIKE)
+@pytest.mark.parametrize("version", ["1.6", "1.9"])
+def test_what_else_a_world_contains_changes_nothing(
+    tmp_path, models, case, version
+):
+    (models / "crate" / "a.obj").write_text(obj_text())
+    far = f"<model name='far'><pose>0 40 0 0 0 0</pose>{link()}</model>"
+    found, notes = {}, {}
+    for name, (extra, noted) in {"": ("", None), **BESIDE}.items():
+        path = write(tmp_path, ALIKE[case], far, extra)
+        path.write_text(path.read_text().replace('"1.6"', f'"{version}"'))
+        world = load_world(path, model_paths=[models])
+        inspector = world.scene_graph.model_inspector()
+        found[name] = [
+            (
+                one.name,
+                one.X_FG.GetAsMatrix4().tolist(),
+                tessellate(one.surface).p_GVset.tolist(),
+            )
+            for one in read_perception_geometry(inspector)
+        ]
+        said = [note.split(": ", 1)[1] for note in world.notes]
+        notes[name] = [note for note in said if note != noted]
+        assert len(said) == len(notes[name]) + (noted is not None)
+    assert all(other == found[""] for other in found.values())
+    assert all(other == notes[""] for other in notes.values())
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        "1 2 3 0 0 0",
+        "1 2 3 0.1 -0.2 3",
+        "1e3 -2 0 3.14 1.5 -2",
+        "5 0 -0 0 0 3.24",
+        "-0 6 0 0 0 -4.1",
+    ],
+)
+def test_poses_of_visuals_are_those_of_drake(tmp_path, numbers):
+    """Drake's own parser is the oracle, to the bit."""
+    pose = f"<pose>{numbers}</pose>"
+    path = write(tmp_path, f"<model name='m'>{link(pose=pose)}</model>")
+    path.write_text(path.read_text().replace("1.6", "1.9"))
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    Parser(plant).AddModelsFromString(path.read_text(), "sdf")
+    (expected,), (found,) = (
+        list_geometry(graph.model_inspector(), Role.kPerception)
+        for graph in (scene_graph, load_world(path).scene_graph)
+    )
+    assert found.name == expected.name
+    bits = found.X_FG.GetAsMatrix34().tobytes()
+    assert bits == expected.X_FG.GetAsMatrix34().tobytes()
+
+
+def test_a_colour_that_is_none_is_refused(tmp_path):
+    extra = "<material><diffuse>255 0 0 1</diffuse></material>"
+    path = write(tmp_path, f"<model name='m'>{link(extra=extra)}</model>")
+    with pytest.raises(InputError, match="diffuse: 255 0 0 1: not within"):
         load_world(path)
