@@ -151,7 +151,7 @@ def test_roads_that_cannot_be_used_are_named(tmp_path):
     roads["roads"]["east"]["end"] = "nowhere"
     (tmp_path / "roads.yaml").write_text(yaml.safe_dump(roads))
     done = subprocess.run(
-        [sys.executable, "-m", "cns_drake.city", ".", "--new"],
+        [sys.executable, "-m", "cns_drake", "city", ".", "--new"],
         cwd=tmp_path,
         capture_output=True,
         text=True,
