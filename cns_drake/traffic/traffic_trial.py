@@ -180,7 +180,7 @@ class Trial:
         no two bodies overlap any more, up to the requested numbers.
         """
         kept = np.ones(len(self._half_sizes), bool)
-        kept[whom_to_leave_out(self._overlaps, 1)] = False
+        kept[whom_to_leave_out(self._overlaps)] = False
         vehicles, walkers = (
             np.flatnonzero(part)
             for part in np.split(kept[1:], [len(self._kinds)])
@@ -263,20 +263,20 @@ def _at_half_steps(values: np.ndarray) -> np.ndarray:
     return result
 
 
-def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
+def whom_to_leave_out(overlaps: np.ndarray) -> list[int]:
     """Returns the bodies to remove so that none overlap, as sorted indices.
 
-    Bodies with the most overlaps are removed first.
+    Bodies with the most overlaps are removed first. The first body, the ego
+    car, is never removed.
 
     Args:
         overlaps: (N, N) bool, symmetric: which bodies overlap.
-        kept: the first `kept` bodies are never removed.
     """
     overlaps = overlaps.copy()
     out: list[int] = []
     while True:
         involved = overlaps.sum(axis=0)
-        involved[:kept] = 0
+        involved[0] = 0
         if not involved.any():
             return sorted(out)
         worst = int(involved.argmax())
