@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.cityjson import geometries
+from cns_drake.imports.cityjson import reading
 from cns_drake.imports.cityjson.reading import read_cityjson
 from cns_drake.imports.cityjson.vertices import to_triples
 from cns_drake.imports.drives.free_space import find_free_space
@@ -168,7 +168,7 @@ def test_features_share_the_templates_of_their_file(tmp_path, monkeypatch):
             read.append(where)
         return to_triples(values, where)
 
-    monkeypatch.setattr(geometries, "to_triples", counted)
+    monkeypatch.setattr(reading, "to_triples", counted)
     city = CityWriter()
     shape = {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 2]]]}
     corners = [[0, 0, 0], [2, 0, 0], [0, 2, 0]]
