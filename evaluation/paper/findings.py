@@ -1,24 +1,25 @@
 """The paper's findings, and whether the results of a report confirm them."""
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-import itertools
 
 import numpy as np
 
 from evaluation.change.drive_change import ChangeResult, symmetric_changes
+from evaluation.paper.best_methods import (
+    RING,
+    best_methods,
+    best_with_all_queries,
+    listed_counts,
+)
 from evaluation.paper.paper_values import KAIST, paper
-from evaluation.recognition.metrics import Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.reference import Finding
-from evaluation.report.tables.recognition import recognition_table
 from evaluation.results.headlines import listed
 from evaluation.results.summaries import LEAST_POINTS
-from evaluation.results.table_forms import Cell, in_table_order, title
+from evaluation.results.table_forms import in_table_order, title
 
 _SIGNIFICANCE = 0.05
-_RING = title("ring++")
 # Verdicts on a finding.
 HOLDS = "holds"
 IN_PART = "holds in part"
@@ -193,72 +194,23 @@ def _first_to_last(
 def _ring_is_best(
     results: Sequence[PlaceOutcome], shown: Sequence[PlaceOutcome]
 ) -> Finding:
-    best = _best_methods(results)
+    best = best_methods(results)
     evidence = (
         "In the table beside the paper's numbers (protocol paper), the paper's"
         f" method with the greatest AUC on {len(best)} pairs is"
-        f" {_listed_counts(best)}. {_best_with_all_queries(results)}"
+        f" {listed_counts(best)}. {best_with_all_queries(results)}"
     )
     asked = shown[0].protocol_name
     if asked != "paper":
         words = f"With the protocol {asked}, as in the other tables"
-        evidence += f" {_best_with_all_queries(shown, words)}"
+        evidence += f" {best_with_all_queries(shown, words)}"
     return Finding(
         "RING++ is the best of the paper's methods on every pair, as the paper"
         " counts.",
-        _share_verdict(sum(_RING in methods for methods in best), len(best)),
+        _share_verdict(sum(RING in methods for methods in best), len(best)),
         evidence,
         "Table II",
     )
-
-
-def _best_with_all_queries(
-    results: Sequence[PlaceOutcome],
-    words: str = "If all queries count for every method",
-) -> str:
-    """Returns a sentence on which methods are best if all queries count.
-
-    That is the mode `all` for every method.
-    """
-    best = _best_methods(results, "all")
-    number = sum(_RING in methods for methods in best)
-    return (
-        f"{words}, {_RING} is best on {number} of {len(best)} pairs"
-        f" ({_listed_counts(best)})."
-    )
-
-
-def _best_methods(
-    results: Sequence[PlaceOutcome], mode: Mode | None = None
-) -> list[list[str]]:
-    """Returns the methods with the greatest AUC on each pair.
-
-    Table II of the paper prints these methods in bold. A pair has several best
-    methods if their AUCs are equal as printed. By default, each method is
-    scored in the mode that the paper used for it.
-    """
-    table = recognition_table(results, (), mode, paper())
-    methods = [name for name, _ in table.groups[1:]]
-    step = table.groups[1][1]  # AUC is the first of a method's columns.
-    return [
-        [
-            method
-            for method, cell in zip(
-                methods, row[-step * len(methods) :: step], strict=True
-            )
-            if isinstance(cell, Cell) and cell.rank == 1
-        ]
-        for row in table.rows
-    ]
-
-
-def _listed_counts(best: Iterable[Iterable[str]]) -> str:
-    """Returns on how many pairs each method is best, as text.
-
-    The text has the form "<method> on <number>, ...".
-    """
-    counts = Counter(itertools.chain.from_iterable(best)).most_common()
-    return ", ".join(f"{method} on {number}" for method, number in counts)
 
 
 def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:

@@ -1,10 +1,11 @@
-"""The reference of a report: the paper's values and findings."""
+"""The reference of a report: the paper's values, findings and aims."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 import functools
 
 from evaluation.change.drive_change import ChangeResult
+from evaluation.paper.aims import aims
 from evaluation.paper.findings import findings
 from evaluation.paper.paper_values import TITLE, paper
 from evaluation.recognition.place_outcome import PlaceOutcome
@@ -34,5 +35,12 @@ def paper_reference() -> Reference:
 def _judge(
     results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
 ) -> list[Judgement]:
-    judged = findings(results, changes)
-    return [Judgement(f"What {TITLE} claims", judged)] if judged else []
+    found = (
+        (f"What {TITLE} claims", findings(results, changes)),
+        (
+            "How near to the paper's numbers, to which TCR_sym and the AUC of"
+            " SOLiD were fitted",
+            aims(results, changes),
+        ),
+    )
+    return [Judgement(name, judged) for name, judged in found if judged]
