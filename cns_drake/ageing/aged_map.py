@@ -50,8 +50,6 @@ _MAX_SEED = 2**63
 _HALF_CAR = 1.3
 # Distance between the places along a drive [m].
 _SPACING = 0.5
-
-
 # In each past year, a tree was lower by this height [m].
 _GROWTH = 0.4
 # Trees were never lower than this [m].

@@ -28,8 +28,6 @@ _CHANGE_TEXTS = {
     "lower": "higher in {other}",
     "additional": "not in {other}, or lower there",
 }
-
-
 # Greatest number of samples in a plot; more would not be visible.
 _MAX_SAMPLES = 400
 # Size of a plot in units of its own, which the page stretches.

@@ -32,8 +32,6 @@ _ROUNDING = 1e-6
 _COMPARISON_STEP = 0.1
 # Kinds of cars from which a vehicle of unknown type is drawn.
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
-
-
 # Heights that differ by more than this belong to different roads [m].
 _LEVEL_HEIGHT = 1.5
 # A height is found from at most this many points of lanes, the nearest ones.

@@ -37,8 +37,6 @@ _PART_OF_BOUND = 0.95
 _AHEAD = 0.05
 # At the end of its path, the car has arrived once it is slower than this [m/s].
 _ARRIVED_SPEED = 0.1
-
-
 # Distance between the places at which the ego car's lane is determined [m].
 _POINT_SPACING = 1.0
 # The car's lane is at most this far away [m].

@@ -31,8 +31,6 @@ from cns_drake.traffic.traffic_plan import TrafficPlan
 
 # A pedestrian's box, which contains swinging limbs [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
-
-
 # Faster bodies are labelled as moving, all others as standing [m/s].
 MOVING_SPEED = 0.5
 # Speed at which limbs swing with their full amplitude [m/s].

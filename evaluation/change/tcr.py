@@ -46,8 +46,6 @@ GRIDS = tuple(
 TAU = 4.5
 # Range of a trajectory within which a map counts as covered by it [m].
 COVERAGE_RADIUS = 40.0
-
-
 # Tolerance of the boundary and of flatness, relative to the extent of the
 # cloud. Without it, rounding would put the hull's own corners outside.
 _TOLERANCE = 1e-9

@@ -19,8 +19,6 @@ from cns_drake.city.facades.reliefs import Arch, Band, Relief, lifted
 from cns_drake.city.geometry.mesh import Mesh
 
 Layout = Callable[[int, float], Sequence[Relief]]
-
-
 # Patches keep this distance from the ends of a wall [m]: two walls meet there,
 # and the corner is closed only if their reliefs are the same.
 _END_MARGIN_M = 0.01

@@ -44,8 +44,6 @@ _KNOWN_MEMBERS = {
     "type", "geometry", "attributes", "parents", "children", "children_roles",
     "geographicalExtent", "address", "bbox", "extent", "members",
 }  # fmt: skip
-
-
 # A city is mirrored if less than this share of its geometries look outwards.
 _MIRRORED_SHARE = 0.1
 # At most this many geometries are judged.
@@ -57,8 +55,6 @@ _LEAST_JUDGED = 1e-3
 _UP_OR_DOWN = {"RoofSurface": 1.0, "GroundSurface": -1.0}
 _UP_OR_DOWN_IN_TERRAIN = {**_UP_OR_DOWN, "": 1.0}
 _BEYOND = "coordinates beyond the area of their reference system"
-
-
 # Type of a geometry -> depth of the lists that contain its faces.
 _NESTING = {
     "MultiSurface": 0,

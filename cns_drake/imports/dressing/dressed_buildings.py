@@ -63,8 +63,6 @@ _LOD_WITH_WINDOWS = 3.0
 # wall [m].
 _BEFORE_WALL = 1.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
-
-
 # A building whose feet are farther from the ground than this was sunk into it
 # [m].
 _MOST_SUNK = 2.0
@@ -72,8 +70,6 @@ _MOST_SUNK = 2.0
 _FILLED_SHARE = 0.8
 # Least height of a building that gets a style [m].
 _LEAST_HEIGHT = 1.0
-
-
 # Distance between the places on drives from which walls are looked at [m].
 _SPACING = 4.0
 # Height of the eyes above the ground [m].

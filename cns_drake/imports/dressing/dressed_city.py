@@ -51,16 +51,12 @@ _PAVED: Rgb = (0.57, 0.56, 0.53)
 # If buildings cover at least this share of a city's area, ground of unknown
 # kind is paved.
 _DENSE = 0.12
-
-
 # The sides of a kerb reach this far down from its upper edges [m].
 _KERB_DEPTH = 0.25
 # Colour of kerbs.
 _KERB_RGB: Rgb = (0.60, 0.60, 0.58)
 # Millimetres in a metre: corners that are equal in whole millimetres are one.
 _MM = 1000.0
-
-
 # Streets get marks if they are this close to drives [m].
 _MARKS_WITHIN = 80.0
 # Streets get marks if they are at least this wide [m].
@@ -74,8 +70,6 @@ _DASH_HEIGHT = 0.01
 # Length before a junction that stays free, in addition to half the street's
 # width [m].
 _BEFORE_JUNCTION = 4.0
-
-
 # Pieces of a sidewalk are left out if no circle of this radius fits in [m].
 _SLIVER_RADIUS = 0.3
 # Streets of these kinds have sidewalks unless their tags say otherwise.
@@ -86,8 +80,6 @@ _WITH_SIDEWALKS = (
     "unclassified",
     "residential",
 )
-
-
 # Width of the widest gap that is paved [m].
 _WIDEST_GAP = 3.0
 # Area of the smallest gap that is paved [m^2].

@@ -48,8 +48,6 @@ _WALL_PROBE = 0.5
 _TRUNK_RADIUS = 0.4
 # Classes of structures that nothing may touch.
 _SOLID_CLASSES = ("building", "fence", "other-structure")
-
-
 # Number of sides of posts and balls.
 _SIDES = 8
 # Number of sides of discs. Discs such as signs must not look like octagons.

@@ -12,8 +12,6 @@ from cns_drake.imports.opendrive.course_reader import SHORTEST_PIECE
 _WIDEST_LANE = 100.0
 # Greatest height of a kerb [m].
 _HIGHEST_LANE = 1.0
-
-
 # Width of a painted line without a plausible width [m].
 _MARK_WIDTH = 0.12
 # Bold lines without a width are this many times as wide.

@@ -49,12 +49,8 @@ _ROUNDING = 0.01
 _MOST_ROLL = math.radians(50.0)
 # Names are cut to this length where they become part of other names.
 _LONGEST_NAME = 60
-
-
 # Elements of links at the two ends of a road or lane.
 _ENDS = ("predecessor", "successor")
-
-
 _KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 
 

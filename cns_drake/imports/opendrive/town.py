@@ -67,8 +67,6 @@ _BAY_LENGTHS = (5.8, 7.4)
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
-
-
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
 # Least distance of pedestrians from the edges of a sidewalk [m].
 _FROM_EDGE = 0.45
@@ -78,16 +76,12 @@ _MOST_HALF_WIDTH = 1.05
 _LEAST_HALF_WIDTH = 0.3
 # Least length of a sidewalk with pedestrians [m].
 _SHORTEST_WALKWAY = 5.0
-
-
 # The underside of a bridge is this far below its upper side [m].
 _DECK_DEPTH = np.array([0.0, 0.0, 0.8])
 # Triangles are dropped if twice their area is not greater than this [m^2].
 _LEAST_TWICE_AREA = 1e-6
 # How far the end of a bridge extends to both sides: wider than a kerb [m].
 _END_REACH = 0.2
-
-
 # A road at least this far above another one is a bridge [m].
 _HEADROOM = 3.0
 # Places are above one another if they are at most this far apart, as seen from

@@ -78,8 +78,6 @@ _WALL_HEIGHT = 1.6
 _SEA_MARGIN = 60.0
 # Wider areas, such as whole countries, are refused [m].
 _WIDEST = 20_000.0
-
-
 # Width of the stripes of a zebra crossing, and of the gaps between them [m].
 _STRIPE_WIDTH = 0.5
 # Length of the stripes [m].

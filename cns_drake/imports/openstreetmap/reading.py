@@ -34,8 +34,6 @@ _NO_AREA = 1e-12
 _WITHOUT_AREA = "without area"
 _NOT_CLOSED = "whose outline does not close"
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
-
-
 # A negative id of a file becomes this number minus the id.
 _FIRST_NEW = 10**12
 _KINDS = ("Node", "Way", "Relation")
