@@ -133,6 +133,10 @@ def age_map(
 class AgeingCity:
     """A city at the end of a year.
 
+    It follows from the city at the end of the year before. Each object has its
+    own random numbers for each year and event, so that a simulation of more
+    years begins with the same events as a simulation of fewer years.
+
     Attributes:
         standing: the year, what stands at its end, and the events since today.
         tally: counts of these events.

@@ -237,6 +237,10 @@ class _Version(NamedTuple):
 def _sorted_file(path: Path, folder: Path, faults: ImportFaults) -> Path:
     """Returns a file in the order that the reader needs.
 
+    It needs first the nodes, then the ways, then the relations, each by
+    ascending positive id and only in its newest version. Files of Overpass and
+    of editors have another order.
+
     The result is `path`, or a sorted copy in `folder` if `path` is in another
     order. Objects that are left out of the copy are counted in `faults`.
 
