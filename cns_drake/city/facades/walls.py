@@ -153,9 +153,9 @@ class _Corner(NamedTuple):
 class _WallCells:
     """The cells of one wall, in R rows and C columns.
 
-    The patches on a wall divide it into cells. The depths of the cells determine
-    the whole surface, with every reveal, sill and ledge; it is closed for any
-    patches. Coordinates are panel coordinates, as in
+    The patches on a wall divide it into cells. The depths of the cells
+    determine the whole surface, with every reveal, sill and ledge; it is closed
+    for any patches. Coordinates are panel coordinates, as in
     `cns_drake.city.facades.reliefs`.
 
     Attributes:
