@@ -28,11 +28,6 @@ from cns_drake.imports.cityjson.reference_systems import (
     check_lengths,
     reference_system,
 )
-from cns_drake.imports.cityjson.vertices import (
-    FARTHEST,
-    read_vertices,
-    to_triples,
-)
 from cns_drake.imports.faults import ImportFaults
 
 # Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
@@ -63,6 +58,8 @@ _NESTING = {
     "MultiSolid": 2,
     "CompositeSolid": 2,
 }
+# No place on Earth is farther than this from the origin of a survey grid [m].
+_FARTHEST = 1e8
 
 
 def read_cityjson(path: Path) -> CityFile:
@@ -257,7 +254,7 @@ class _GeometrySource(NamedTuple):
         is_affine = (X[3] == [0.0, 0.0, 0.0, 1.0]).all()
         if reference < 0 or not is_affine:
             raise ValueError
-        if not (np.abs(placed) <= FARTHEST).all():
+        if not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
         return template, (
             self.system.to_metres(placed) + self.vertices[reference]
@@ -381,7 +378,7 @@ def _read_objects(
     transform = document.get("transform", whole.get("transform"))
     if transform is None and not str(whole.get("version")).startswith("1.0"):
         city.faults.add("no transform; vertices taken as coordinates", where)
-    vertices = read_vertices(document, transform, where)
+    vertices = _read_vertices(document, transform, where)
     if not city.objects and len(vertices):
         _count_assumptions(city)
         _settle_axes(city, vertices)
@@ -550,3 +547,56 @@ def _look_outwards(city: CityFile) -> Iterator[bool]:
                         size += signs.get(kind, 0.0) * float(normal[2])
             if abs(size) > _LEAST_JUDGED:
                 yield size > 0.0
+
+
+def _read_vertices(document: dict, transform: object, where: str) -> np.ndarray:
+    """Returns the vertices (N, 3) of a document, in coordinates of the file.
+
+    Args:
+        document: the document, a JSON object.
+        transform: the transform of the document, a JSON object with scale and
+            translation; None if the vertices are coordinates.
+        where: place of the document, for error messages.
+
+    Raises:
+        InputError: vertices or transform cannot be used.
+    """
+    points = to_triples(document.get("vertices", []), f"{where}: vertices")
+    if transform is not None and not isinstance(transform, dict):
+        raise InputError(f"{where}: transform: not an object")
+    for key in (transform or {}).keys() - {"scale", "translate"}:
+        raise InputError(f"{where}: transform.{key} is not read")
+    if transform:
+        scale, move = (
+            to_triples([transform.get(key)], f"{where}: transform.{key}")
+            for key in ("scale", "translate")
+        )
+        if not (scale > 0.0).all():
+            raise InputError(f"{where}: transform.scale: not above 0")
+        with np.errstate(over="ignore", invalid="ignore"):
+            points = points * scale + move
+    if not (np.abs(points) <= _FARTHEST).all():  # NaN fails, too.
+        raise InputError(
+            f"{where}: vertices: a coordinate beyond {_FARTHEST:g} m"
+        )
+    return points
+
+
+def to_triples(values: Any, where: str) -> np.ndarray:
+    """Returns a list of N triples of numbers as an array (N, 3).
+
+    `where` is the place of the list in the file, for error messages.
+
+    Raises:
+        InputError: an item of the list is not a triple of numbers.
+    """
+    try:
+        with np.errstate(over="ignore"):
+            points = np.array(values, dtype=np.float64).reshape(-1, 3)
+        if len(points) != len(values):
+            raise ValueError
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{where}: every item must be three numbers"
+        ) from error
+    return points

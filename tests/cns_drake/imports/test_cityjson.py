@@ -9,8 +9,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.cityjson import reading
-from cns_drake.imports.cityjson.reading import read_cityjson
-from cns_drake.imports.cityjson.vertices import to_triples
+from cns_drake.imports.cityjson.reading import read_cityjson, to_triples
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.ground import ground_of
 
