@@ -1,8 +1,8 @@
 """Writes the map folder of an ageing city: stages for today and each year."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 import shutil
 
@@ -11,12 +11,16 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 import yaml
 
-from cns_drake.ageing.ageing_city import AgeingCity
-from cns_drake.ageing.events import Event
+from cns_drake.ageing import kinds
+from cns_drake.ageing.buildings import Buildings
+from cns_drake.ageing.events import TAKEN_DOWN, Event
+from cns_drake.ageing.lots import find_lots
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.past_city import past_structures
 from cns_drake.ageing.stage_writer import TODAY, StageWriter
 from cns_drake.ageing.standing_structures import StandingStructures
+from cns_drake.ageing.street_renewal import StreetRenewal
+from cns_drake.ageing.trees import Trees
+from cns_drake.ageing.yearly_draws import YearlyDraws
 from cns_drake.ageing.years import check_years
 from cns_drake.base.complete_files import draft_folder
 from cns_drake.base.csv_files import write_csv
@@ -24,6 +28,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import is_there
 from cns_drake.base.progress import doing
 from cns_drake.base.yaml_files import read_yaml
+from cns_drake.city.geometry import Structure
+from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
+from cns_drake.city.plants.plant_sizes import younger_plant
 from cns_drake.imports.map_files import YEAR_COLUMN
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.scenarios.drive_table import write_table
@@ -43,6 +50,10 @@ _MAX_SEED = 2**63
 _HALF_CAR = 1.3
 # Distance between the places along a drive [m].
 _SPACING = 0.5
+# In each past year, a tree was lower by this height [m].
+_GROWTH = 0.4
+# Trees were never lower than this [m].
+_LEAST_TREE = 2.0
 
 
 @dataclass(frozen=True)
@@ -117,6 +128,57 @@ def age_map(
         del world, city  # The pictures need their memory.
         finish(draft, aged)
     return aged
+
+
+class AgeingCity:
+    """A city at the end of a year.
+
+    It follows from the city at the end of the year before. Each object has its
+    own random numbers for each year and event, so that a simulation of more
+    years begins with the same events as a simulation of fewer years.
+
+    Attributes:
+        standing: the year, what stands at its end, and the events since today.
+        tally: counts of these events.
+    """
+
+    def __init__(
+        self,
+        world: OldWorld,
+        rates: Mapping[str, float],
+        seed: int,
+        kept_free: BaseGeometry,
+    ) -> None:
+        """Begins with the city of today.
+
+        Args:
+            world: the city of today.
+            rates: event -> rate per year, see
+                `cns_drake.ageing.rates.read_rates`.
+            seed: seed of all random draws.
+            kept_free: area in W [m] on which nothing is built, because drives
+                lead across it.
+
+        Raises:
+            InputError: the city has no building.
+        """
+        # Trees grow within distances from buildings, which stand on lots.
+        lots = find_lots(world, kept_free)
+        self.standing = StandingStructures(world)
+        draws = YearlyDraws(self.standing, rates, seed)
+        self.tally = draws.tally
+        self._trees = Trees(world, self.standing, draws, seed)
+        self._buildings = Buildings(
+            world, self.standing, draws, self._trees, lots, kept_free
+        )
+        self._streets = StreetRenewal(world, self.standing, draws, kept_free)
+
+    def live(self) -> None:
+        """Simulates one year: samples which structures change."""
+        self.standing.year += 1
+        self._buildings.live()
+        self._trees.live()
+        self._streets.live()
 
 
 def _write_map(
@@ -274,3 +336,60 @@ def _changed_places(city: StandingStructures) -> np.ndarray:
         if one.semantic_class == "building" and one.name in city.by_name
     ]
     return np.array(places, float).reshape(-1, 3)
+
+
+def past_structures(
+    world: OldWorld, year: int
+) -> tuple[dict[str, Structure | None], list[Event]]:
+    """Returns the structures of a past year, and the events since then.
+
+    Buildings that were built after that year are missing, and their lots have
+    another use. Trees are smaller. The city must have years of construction, so
+    `world.today` is not None.
+
+    Args:
+        world: the city of today.
+        year: the year relative to today, negative.
+
+    Returns:
+        Name of each structure -> the structure, or None if it is the same as
+        today; and the events in order of time.
+    """
+    assert world.today is not None
+    standing: dict[str, Structure | None] = dict.fromkeys(world.visuals)
+    events = []
+    for name, one in world.geometry.items():
+        built = world.built.get(name)
+        if built is not None and built - world.today > year:
+            since = built - world.today
+            events.append(Event(since, "built", name))
+            del standing[name]
+            for former in _objects_before(world, name, built):
+                standing[former.name] = former
+                events.append(
+                    Event(since, TAKEN_DOWN, former.name, detail="empty plot")
+                )
+        elif one.semantic_class == "vegetation":
+            height = one.top - one.bottom
+            if height > _LEAST_TREE and one.kind == kinds.TREE:
+                young = max(height + _GROWTH * year, _LEAST_TREE)
+                whole = world.structure(name)
+                model = younger_plant(whole.model, young)
+                standing[name] = replace(whole, model=model)
+    events.sort(key=lambda event: event.year)
+    return standing, events
+
+
+def _objects_before(
+    world: OldWorld, name: str, built: int
+) -> Iterator[Structure]:
+    """Returns the objects on a lot before its building was built.
+
+    Args:
+        world: the city of today.
+        name: name of the building.
+        built: calendar year in which it was built.
+    """
+    lot = world.structure(name)
+    rng = np.random.default_rng(built)
+    return lot_objects(lot, use_by_size(lot), {"hatchback": 1}, rng)

@@ -203,7 +203,7 @@ class McapDrive(Drive):
             return None
         return (
             f"{self._path}: taken while the LiDAR moved, and used as taken"
-            " (evaluation.drives.deskewing takes the motion out)"
+            " (cns_drake.drives.deskewing takes the motion out)"
         )
 
     @property

@@ -174,7 +174,7 @@ def _animate(
         for frame in {*range(0, last, interval), last}:
             animation.SetTransform(frame, path, X_WFs[frame])
     # The script of the page places it.
-    drawing.draw_marker(meshcat, "/vehicle/marker")
+    drawing.draw_marker(meshcat)
     for k, (frame, p_WRset) in enumerate(drive.scans):
         path = f"/scans/{k:03d}"
         drawing.draw_points(meshcat, path, p_WRset)

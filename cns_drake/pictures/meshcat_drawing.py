@@ -99,15 +99,10 @@ def draw_body(
         _draw_mesh(meshcat, f"{path}/{k}", surface, Rgba(*rgb))
 
 
-def draw_marker(meshcat: Meshcat, path: str) -> None:
-    """Draws a large cone that stands on its tip at the origin of a frame.
-
-    Args:
-        meshcat: Meshcat's server.
-        path: path in Meshcat of the cone; the frame is the frame of this path.
-    """
+def draw_marker(meshcat: Meshcat) -> None:
+    """Draws a large cone that stands on its tip at the vehicle's origin."""
     meshcat.SetObject(
-        path,
+        "/vehicle/marker",
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
         _MARKER_RGBA,
     )

@@ -14,7 +14,6 @@ from cns_drake.base.polylines import step_lengths
 from cns_drake.traffic.ego_car import EgoBox, EgoPath
 from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject, kind_name
 from cns_drake.traffic.lane_graph import LaneGraph, Walkway
-from cns_drake.traffic.lane_heights import LaneHeights
 from cns_drake.traffic.overlaps import find_overlaps
 from cns_drake.traffic.social_force import WALKER_LENGTH, WALKER_WIDTH
 from cns_drake.traffic.tracks import Tracks
@@ -34,6 +33,14 @@ _ROUNDING = 1e-6
 _COMPARISON_STEP = 0.1
 # Kinds of cars from which a vehicle of unknown type is drawn.
 _CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
+# Heights that differ by more than this belong to different roads [m].
+_LEVEL_HEIGHT = 1.5
+# A height is found from at most this many points of lanes, the nearest ones.
+_MOST_POINTS = 24
+# These points are at most this far away [m].
+_REACH = 6.0
+# Least cosine of the angle between a vehicle and its lane.
+_LEAST_COSINE = 0.7
 
 
 def play_trace(
@@ -78,13 +85,13 @@ def play_trace(
     lanes = np.concatenate([piece.points for piece in graph.pieces])
     _check_place(trace, path, lanes)
     kinds = [_vehicle_kind(vehicle, seed) for vehicle in trace.vehicles]
-    heights = LaneHeights(lanes)
+    heights = _LaneHeights(lanes)
     trace = _at_map_heights(trace, heights)
     pairs = zip(trace.vehicles, kinds, strict=True)
     rows = [_vehicle_rows(*pair, heights) for pair in pairs]
     vehicles = _make_tracks(trace, trace.vehicles, rows)
     strips = [walkway.points for walkway in walkways]
-    ground = LaneHeights(np.concatenate([lanes, *strips]))
+    ground = _LaneHeights(np.concatenate([lanes, *strips]))
     rows = [_person_rows(person, ground, trace.dt) for person in trace.persons]
     walkers = _make_tracks(trace, trace.persons, rows)
     half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
@@ -134,7 +141,78 @@ def _extent_text(places: np.ndarray) -> str:
     return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
 
 
-def _at_map_heights(trace: FcdTrace, heights: LaneHeights) -> FcdTrace:
+class _LaneHeights:
+    """Heights of the ground, interpolated between points on lanes."""
+
+    def __init__(self, points: np.ndarray):
+        """Takes points (N, 3) on the ground along lanes [m]."""
+        self._tree = cKDTree(points[:, :2])
+        self._z = points[:, 2]
+        steps = np.diff(points[:, :2], axis=0, prepend=points[:1, :2])
+        self._heading = np.arctan2(steps[:, 1], steps[:, 0])
+
+    def at(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the heights (N,) of the ground at places (N, 2) [m].
+
+        Each height is a mean of the heights of the nearest points, weighted by
+        nearness.
+        """
+        distance, near = self._tree.query(xy, k=min(4, len(self._z)))
+        distance, near = (
+            np.reshape(values, (len(xy), -1)) for values in (distance, near)
+        )
+        return self._weighted(distance, near)
+
+    def along(
+        self, xy: np.ndarray, z: np.ndarray, yaw: np.ndarray | None
+    ) -> np.ndarray:
+        """Returns the heights (M,) of one road user at successive places [m].
+
+        Where two roads cross at different heights, the road user is on the road
+        that is nearest to its given height. Without given heights, the road
+        user stays on the road on which it arrived, or else is on a road with a
+        lane in its direction.
+
+        Args:
+            xy: (M, 2) places [m].
+            z: (M,) approximate heights [m]; NaN if they are unknown.
+            yaw: (M,) headings [rad]; None if the direction does not count.
+        """
+        found = self.at(xy)
+        count = min(_MOST_POINTS, len(self._z))
+        distance, near = (
+            np.reshape(values, (len(xy), -1))
+            for values in self._tree.query(xy, k=count)
+        )
+        is_near = distance < _REACH
+        levels = np.where(is_near, self._z[near], np.nan)
+        for k in np.flatnonzero(np.ptp(self._z[near], axis=1) > _LEVEL_HEIGHT):
+            usable = np.flatnonzero(is_near[k])
+            if not len(usable) or np.ptp(levels[k][usable]) <= _LEVEL_HEIGHT:
+                continue
+            if yaw is not None:
+                turn = self._heading[near[k][usable]] - yaw[k]
+                alike = usable[np.abs(np.cos(turn)) > _LEAST_COSINE]
+                usable = alike if len(alike) else usable
+            moved = np.hypot(*(xy[k] - xy[k - 1])) if k else np.inf
+            goal = levels[k][usable[0]]
+            if np.isfinite(z[k]):
+                goal = z[k]
+            elif moved < _REACH:
+                goal = found[k - 1]
+            off = np.abs(levels[k][usable] - goal)
+            usable = usable[off < off.min() + _LEVEL_HEIGHT / 2][:4]
+            (found[k],) = self._weighted(
+                distance[k][None, usable], near[k][None, usable]
+            )
+        return found
+
+    def _weighted(self, distance: np.ndarray, near: np.ndarray) -> np.ndarray:
+        weight = 1.0 / np.maximum(distance, 0.05) ** 2
+        return np.sum(weight * self._z[near], axis=1) / weight.sum(axis=1)
+
+
+def _at_map_heights(trace: FcdTrace, heights: _LaneHeights) -> FcdTrace:
     """Returns a trace whose heights have the same zero as the map's heights.
 
     A trace without heights stays as it is.
@@ -169,7 +247,7 @@ def _vehicle_kind(vehicle: TracedObject, seed: int) -> VehicleKind:
 
 
 def _vehicle_rows(
-    vehicle: TracedObject, kind: VehicleKind, heights: LaneHeights
+    vehicle: TracedObject, kind: VehicleKind, heights: _LaneHeights
 ) -> np.ndarray:
     """Returns the coordinates (M, 5) of a vehicle; see `TrafficPlan`.
 
@@ -186,7 +264,7 @@ def _vehicle_rows(
 
 
 def _person_rows(
-    person: TracedObject, heights: LaneHeights, dt: float
+    person: TracedObject, heights: _LaneHeights, dt: float
 ) -> np.ndarray:
     """Returns the coordinates (M, 5) of a pedestrian; see `TrafficPlan`.
 

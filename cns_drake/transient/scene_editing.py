@@ -1,29 +1,36 @@
 """Changes the structures of a loaded world, and records why."""
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake import geometry
+from pydrake.common import MemoryFile
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cns_drake.base.elementary import product
+from cns_drake.base.errors import InputError
+from cns_drake.city.geometry import (
+    OBJECT_MESHES,
+    BoxShape,
+    CylinderShape,
+    Mesh,
+    Shape,
+    SphereShape,
+)
 from cns_drake.city.geometry.models import Model, Part
+from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.perception_geometry import GREY
-from cns_drake.scene.structure_table import StructureEntry
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
-from cns_drake.transient.drake_shapes import (
-    memory_mesh,
-    model_shape,
-    scaled_shape,
-)
 from cns_drake.transient.structure_geometry import (
     PartGeometry,
     StructureGeometry,
 )
-from cns_drake.transient.table_changes import TableChanges
 
 # Points up to this far above a structure's lowest one belong to its foot [m].
 _FOOT = 0.05
@@ -159,7 +166,7 @@ class SceneEditing:
                 change.
         """
         for part in model.parts:
-            shape = model_shape(part.shape, model.meshes)
+            shape = _model_shape(part.shape, model.meshes)
             X_WG = X_WS @ _pose_in_model(part)
             self._add_part(name, part.name, X_WG, shape, _look_of(part))
         self._table.add_structure(StructureEntry(0, name, semantic_class))
@@ -191,7 +198,7 @@ class SceneEditing:
                 p_WS + share * (part.X_WG.translation() - p_WS),
             )
             self._replace_part(
-                part, X_WG, scaled_shape(self.shape(part), share)
+                part, X_WG, _scaled_shape(self.shape(part), share)
             )
         self.record_cause(structure.name, cause)
 
@@ -226,7 +233,7 @@ class SceneEditing:
             if part in kept:
                 continue
             X_WG = X_WS @ _pose_in_model(part)
-            shape = model_shape(part.shape, after.meshes)
+            shape = _model_shape(part.shape, after.meshes)
             if part.name in old:
                 self._replace_part(old[part.name], X_WG, shape)
                 continue
@@ -257,7 +264,7 @@ class SceneEditing:
             scale = np.array(shape.scale3())
         if np.prod(scale) < 0.0:
             triangles = triangles[:, ::-1]
-        mesh = memory_mesh(surface.p_GVset / scale, triangles, scale)
+        mesh = _memory_mesh(surface.p_GVset / scale, triangles, scale)
         self._replace_part(part, part.X_WG, mesh)
 
     def add_triangles(
@@ -278,7 +285,7 @@ class SceneEditing:
             look: colour, reflectivity and material of the new part.
         """
         R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
-        mesh = memory_mesh(product(p_WVs - p, R), triangles)
+        mesh = _memory_mesh(product(p_WVs - p, R), triangles)
         self._add_part(part.geometry.structure, name, part.X_WG, mesh, look)
 
     def add_mesh(
@@ -304,7 +311,7 @@ class SceneEditing:
         # Vertices have seven significant digits, which are too few far from
         # the origin of the mesh.
         middle = np.round(p_WVs.mean(axis=0))
-        mesh = memory_mesh(p_WVs - middle, triangles)
+        mesh = _memory_mesh(p_WVs - middle, triangles)
         self._add_part(name, "surface", RigidTransform(middle), mesh, look)
         self._table.add_structure(StructureEntry(0, name, semantic_class))
         self.record_cause(name, cause)
@@ -405,3 +412,147 @@ def _look_properties(look: SurfaceLook) -> list[geometry.GeometryProperties]:
     if look.reflectivity is not None:
         seen.AddProperty("lidar", "reflectivity", look.reflectivity)
     return [seen, shown]
+
+
+def _memory_mesh(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    scale: ArrayLike = (1.0, 1.0, 1.0),
+) -> geometry.Mesh:
+    """Returns a mesh in memory; equal meshes give the same text.
+
+    Readers thus recognise equal meshes as the same mesh. The mesh has vertices
+    (N, 3), given before scaling [m], and triangles (M, 3).
+    """
+    used, corners = np.unique(triangles, return_inverse=True)
+    # Python's numbers are formatted several times faster than NumPy's.
+    lines = [
+        f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used].tolist()
+    ]
+    lines += [
+        f"f {a} {b} {c}" for a, b, c in (corners.reshape(-1, 3) + 1).tolist()
+    ]
+    text = "\n".join(lines) + "\n"
+    file = MemoryFile(text.encode(), ".obj", "mesh")
+    return geometry.Mesh(geometry.InMemoryMesh(mesh_file=file), scale)
+
+
+def _model_shape(shape: Shape, meshes: Mapping[str, Mesh]) -> geometry.Shape:
+    """Returns a Drake shape that equals a shape of the city generator.
+
+    `meshes` maps names to the meshes of the model to which the shape belongs.
+    """
+    if isinstance(shape, BoxShape):
+        return geometry.Box(*shape.size)
+    if isinstance(shape, CylinderShape):
+        return geometry.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, SphereShape):
+        return geometry.Sphere(shape.radius)
+    shared = OBJECT_MESHES / f"{shape.mesh}.obj"
+    if shared.is_file():
+        return geometry.Mesh(str(shared), shape.scale)
+    mesh = meshes[shape.mesh]
+    return _memory_mesh(mesh.vertices, mesh.triangles(), shape.scale)
+
+
+def _scaled_shape(shape: geometry.Shape, share: float) -> geometry.Shape:
+    """Returns a shape scaled about its origin by the factor `share`.
+
+    A half space is returned as it is.
+    """
+    if isinstance(shape, geometry.Mesh | geometry.Convex):
+        scale = share * np.array(shape.scale3())
+        return type(shape)(shape.source(), scale)
+    if isinstance(shape, geometry.Box):
+        return geometry.Box(*(share * np.array(shape.size())))
+    if isinstance(shape, geometry.Sphere):
+        return geometry.Sphere(share * shape.radius())
+    if isinstance(shape, geometry.Ellipsoid):
+        axes = (shape.a(), shape.b(), shape.c())
+        return geometry.Ellipsoid(*(share * length for length in axes))
+    if isinstance(shape, geometry.Cylinder | geometry.Capsule):
+        return type(shape)(share * shape.radius(), share * shape.length())
+    if isinstance(shape, geometry.MeshcatCone):
+        sizes = (shape.height(), shape.a(), shape.b())
+        return geometry.MeshcatCone(*(share * length for length in sizes))
+    return shape
+
+
+class TableChanges:
+    """New structures, changed parts and causes, for a structure table."""
+
+    def __init__(self, table: StructureTable):
+        """Begins without changes.
+
+        Args:
+            table: the structure table before the changes.
+        """
+        self._table = table
+        # Name -> entry of a new structure, still without an instance id.
+        self._added: dict[str, StructureEntry] = {}
+        # Name of a structure -> new part of it -> material.
+        self._materials: defaultdict[str, dict[str, str]] = defaultdict(dict)
+        # Name of a structure -> part that was renamed -> its former name.
+        self._renamed: defaultdict[str, dict[str, str]] = defaultdict(dict)
+        self._causes: defaultdict[str, list[str]] = defaultdict(list)
+
+    def add_structure(self, entry: StructureEntry) -> None:
+        """Records a new structure, which gets a free instance id.
+
+        The name in its entry must be unique in the world.
+        """
+        self._added[entry.name] = entry
+
+    def set_material(self, structure: str, part: str, material: str) -> None:
+        """Records the material of a new part."""
+        self._materials[structure][part] = material
+
+    def rename_part(self, structure: str, old: str, new: str) -> None:
+        """Records that a part, which keeps its material, has another name."""
+        self._renamed[structure][new] = old
+
+    def add_cause(self, structure: str, cause: str) -> None:
+        """Records why a structure was changed; each cause counts once."""
+        if cause not in self._causes[structure]:
+            self._causes[structure].append(cause)
+
+    def changed_table(self) -> StructureTable:
+        """Returns the table with the changes; new structures come last.
+
+        Raises:
+            InputError: there are more structures than instance ids.
+        """
+        first = self._table.last_instance + 1
+        if first + len(self._added) - 1 > MAX_INSTANCE:
+            raise InputError(
+                f"transient: {len(self._added)} new structures and "
+                f"{first - 1} others are more than instance ids can count "
+                f"({MAX_INSTANCE})"
+            )
+        entries = [
+            *self._table,
+            *(
+                replace(self._added[name], instance=first + k)
+                for k, name in enumerate(sorted(self._added))
+            ),
+        ]
+        return StructureTable(map(self._changed_entry, entries))
+
+    def _changed_entry(self, entry: StructureEntry) -> StructureEntry:
+        causes = [
+            cause
+            for cause in self._causes.get(entry.name, ())
+            if cause not in entry.causes
+        ]
+        materials = dict(self._materials.get(entry.name, {}))
+        known = {**entry.materials, **materials}
+        for new, old in self._renamed.get(entry.name, {}).items():
+            if old in known:
+                materials[new] = known[old]
+        if not (causes or materials):
+            return entry
+        return replace(
+            entry,
+            causes=(*entry.causes, *causes),
+            materials={**entry.materials, **materials},
+        )

@@ -65,7 +65,7 @@ class MulranDrive(BinDrive):
                 f"{path}: MulRan: neither {' nor '.join(_FOLDERS)} in it"
             )
         files, stamps_ns = list_stamped(folder, ".bin")
-        trajectory = read_matrices(path / _POSES, ",")
+        trajectory = read_matrices(path / _POSES)
         X_UB, spanned = trajectory.interpolate(stamps_ns)
         kept, notes = keep_spanned(files, spanned, trajectory.path)
         notes = (*chosen, *notes)

@@ -120,21 +120,17 @@ class StampedPoses:
         return self.X_WB[nearest]
 
 
-def read_matrices(path: Path, separator: str | None) -> StampedPoses:
+def read_matrices(path: Path) -> StampedPoses:
     """Returns the trajectory in a table of times and poses.
 
     Each row of the table is a time and 12 numbers: the upper three rows of the
-    4 x 4 pose, one after the other.
-
-    Args:
-        path: the file.
-        separator: text between columns; None for white space.
+    4 x 4 pose, one after the other, separated by commas.
 
     Raises:
         InputError: if the table does not have this form, the left 3 x 3 part of
             a pose is no rotation, or the poses are not in order of time.
     """
-    stamps_ns, values = read_stamped_rows(path, 12, separator)
+    stamps_ns, values = read_stamped_rows(path, 12, ",")
     return _increasing_poses(path, stamps_ns, pose_matrices(path, values))
 
 

@@ -23,12 +23,10 @@ from evaluation.clouds.notes import OnNote
 from evaluation.drives import Drive, helipr, nclt, open_drive
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.trajectories import read_poses, read_quaternions
-from evaluation.real import image_sequences, session_tables
+from evaluation.real.image_sequences import FOLDER as IMAGES
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.pair import NamedDrive
 
-# Folders that other modules read.
-_OTHERS = (image_sequences.FOLDER, session_tables.FOLDER)
 # Distance put between scans without poses [m]; no scan reaches so far.
 _APART = 1000.0
 
@@ -219,14 +217,12 @@ def open_data_sets(folder: Path, on_note: OnNote) -> list[RealScans]:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    known = {data_set.folder for data_set in DATA_SETS} | {*_OTHERS}
+    known = {data_set.folder for data_set in DATA_SETS} | {IMAGES}
     scans = [
         listed(folder / data_set.folder, data_set.scans)
         for data_set in DATA_SETS
     ]
-    if not any(scans) and not any(
-        (folder / other).is_dir() for other in _OTHERS
-    ):
+    if not any(scans) and not (folder / IMAGES).is_dir():
         names = ", ".join(sorted(known))
         raise InputError(f"{folder}: no data set that is known ({names})")
     found = []
@@ -323,7 +319,7 @@ def simulated_drives(
     field = lidar_field(unit)
     alike = []
     for path in (entry for entry in listed(folder) if entry.is_dir()):
-        if path.name in _OTHERS:
+        if path.name == IMAGES:
             continue
         drive = open_drive(path)
         if field and drive.lidar_field == field:

@@ -35,8 +35,6 @@ from evaluation.real.image_sequences import (
     open_sequences,
 )
 from evaluation.real.judge_task import JudgeTask
-from evaluation.real.session_tables import FOLDER as SESSIONS
-from evaluation.real.session_tables import draw_sessions, read_sessions
 from evaluation.recognition.describing import Role
 from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
@@ -140,16 +138,12 @@ def measure_real(
         _add_unit(engine, sets, made, choices)
         if not made:
             on_note(f"{unit}: no simulated scan of it to judge")
-    engine.given += read_sessions(folder / SESSIONS, _NAME)
-    if not (engine.jobs or engine.given):
+    if not engine.jobs:
         raise InputError(
             f"{folder}: no data set that these methods can measure; the notes"
             " say why"
         )
-    tables = engine.run(cluster)
-    if engine.given:
-        on_note(f"{draw_sessions(engine.given, output)}: the sessions")
-    return tables
+    return engine.run(cluster)
 
 
 def _is_estimator(name: str) -> bool:

@@ -57,7 +57,6 @@ class Engine:
             study takes.
         jobs: name -> job.
         measured: all comparisons.
-        given: results from another source; the tables begin with these results.
     """
 
     experiment: str
@@ -67,7 +66,6 @@ class Engine:
     on_note: Callable[[str], None] = lambda text: None
     jobs: dict[str, Job] = field(default_factory=dict)
     measured: list[Pair] = field(default_factory=list)
-    given: list[Row] = field(default_factory=list)
     _notes: dict[str, None] = field(default_factory=dict)
 
     def add(
@@ -160,7 +158,7 @@ class Engine:
         Raises:
             InputError: a job has not been done.
         """
-        rows = list(self.given)
+        rows: list[Row] = []
         answers: list[Answers] = []
         baselines = self._baselines()
         for one in self.measured:

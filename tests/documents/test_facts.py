@@ -1,17 +1,12 @@
 """What the documents say of options, files, formats, packages is so."""
 
-import csv
-import itertools
 import pydoc
 import re
 
 from helpers import documents
 from mcap.reader import make_reader
-import pytest
 import typer
 
-from cns_drake import load_scenario
-from cns_drake.city.plan.stages import load_stages
 from cns_drake.command_line import cli
 from evaluation.command_line import cli as evaluation_cli
 from evaluation.drives import open_drive
@@ -95,53 +90,6 @@ def test_names_in_modules_exist():
         assert pydoc.locate(code.partition("(")[0]) is not None, code
 
 
-@pytest.mark.slow
-def test_only_uses_of_lots_end_from_stage_to_stage():
-    """As the glossary and the page on cities have it."""
-    ended = []
-    for folder in sorted(documents.ROOT.glob("worlds/*/")):
-        stages = [
-            {
-                name.partition("/")[0]
-                for name in re.findall(
-                    '<visual name="([^"]+)"', path.read_text()
-                )
-            }
-            for path in sorted(folder.glob("stage_*.sdf"))
-        ]
-        for earlier, later in itertools.pairwise(stages):
-            assert len(earlier) > 900
-            ended += earlier - later
-    assert any("market_stall" in name for name in ended)
-    assert [name for name in ended if "_lot_" not in name] == []
-
-
-def test_the_tutorial_names_the_colours_that_its_page_shows():
-    folder = load_scenario("riverside_01").folder
-    with folder.structures.open() as table:
-        names = [row["name"] for row in csv.DictReader(table)]
-    stages = load_stages(folder.path / "stages.yaml", names)
-    # The page has an entry for each layer that is not empty.
-    assert stages.absent("01")
-    assert any("_lot_" in name for name in names)
-    assert not stages.heights("01").keys() | stages.sites("01").keys()
-    (said,) = re.findall(
-        r"Tick \*What\s+changed\*\.\s+The page then\s+shows ([^.]+)\.",
-        documents.read("docs/tutorial.md").text,
-    )
-    assert " ".join(said.split()) == (
-        "in red all structures that stage 02 adds, "
-        "and in violet all structures that stage 02 clears away"
-    )
-
-
-def test_the_home_says_what_the_program_is_before_any_link():
-    home = documents.read("docs/index.md").text
-    picture = home.index("![")
-    assert picture < re.search(r"(?<!!)\[", home).start()
-    assert "LiDAR" in home[:picture]
-
-
 def test_topics(short_recording):
     page = documents.read("docs/recordings.md")
     said = {
@@ -180,35 +128,3 @@ def test_fields_of_points(short_recording):
     assert f"# NumPy: {' '.join(scan.dtype.names)}\n" in example
     topics = documents.read("docs/recordings.md").text
     assert f"{scan.dtype.itemsize} bytes a point" in topics
-
-
-def test_dependencies():
-    said = {
-        name
-        for row in documents.table(
-            documents.read("CONTRIBUTING.md"), "| package | why |"
-        )
-        for name in row[0].replace("`", "").split(", ")
-    }
-    project = (documents.ROOT / "pyproject.toml").read_text()
-    _, _, rest = project.partition("\ndependencies = [\n")
-    needed = {
-        name.removesuffix("-cpu")
-        for name in re.findall(r'^  "([\w-]+)', rest.split("\n]")[0], re.M)
-    }
-    assert said == needed
-
-
-def test_ci_installs_the_documented_packages():
-    script = (documents.ROOT / ".ci/run").read_text()
-    (command,) = (code for code in CODES if code.startswith("apt install "))
-    image = (documents.ROOT / "Dockerfile").read_text()
-    for package in command.split()[2:]:
-        assert f" {package} " in script
-        assert f" {package} " in image
-    assert "npm ci" in script
-    # It takes the line itself out of the page.
-    pattern = re.search(r"grep -m1 '([^']+)' README\.md", script)[1]
-    text = documents.read("README.md").text
-    line = re.search(pattern, text, re.MULTILINE)[0]
-    assert "'.[test]'" in line

@@ -36,8 +36,3 @@ def test_pages_are_reached_from_the_readme():
         linked = re.findall(r"\]\(([\w./-]+\.md)", page.text)
         waiting |= {follow(page, file) for file in linked} - reached
     assert reached == PAGES.keys()
-
-
-def test_moving_picture_is_small():
-    picture = documents.ROOT / "docs/pictures/drive.webp"
-    assert picture.stat().st_size < 3e6

@@ -1,6 +1,5 @@
 """Every command and example of the documents runs, and does what it says."""
 
-from dataclasses import replace
 import re
 import shlex
 
@@ -95,28 +94,3 @@ def test_each_piece_has_one_recipe():
     assert not faults, "\n".join(faults)
     names = [name for names in claimed.values() for name in names]
     assert sorted(names) == sorted([*RECIPES, *NOT_RUN.values()])
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "```\n.venv/bin/cns-drake dance\n```",
-        "- a list:\n\n  ```bash\n  ls\n  ```",
-        "```yaml\nmap: nowhere\n```",
-        "Type `cns-drake scan --twice` now.",
-        "Type `cns-drake\nscan --twice` now.",
-        "| `dask scheduler` | starts |",
-    ],
-)
-def test_new_pieces_are_noticed(text):
-    page = documents.read("docs/how-to/own_city.md")
-    before = documents.pieces(page)
-    longer = replace(page, text=f"{page.text}\n{text}\n")
-    (new,) = set(documents.pieces(longer)) - set(before)
-    assert claims(new) == []
-    assert new.line > max(piece.line for piece in before)
-
-
-def test_names_of_commands_are_not_run():
-    text = "See `cns-drake scan`, or `--help`, or `a.py`."
-    assert documents.pieces(documents.Page("a.md", text)) == []

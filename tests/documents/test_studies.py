@@ -1,6 +1,5 @@
 """What the page on studies says of experiments and tables is so."""
 
-import inspect
 import itertools
 import re
 
@@ -8,10 +7,6 @@ from helpers import documents
 import pytest
 import yaml
 
-from cns_drake.scenarios.scenario import Scenario
-from cns_drake.studies.drives import changed_drives, side_fields
-from cns_drake.studies.drives.lost_structures import Losses
-from cns_drake.studies.experiments import experiment
 from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import (
@@ -19,12 +14,7 @@ from cns_drake.studies.experiments.experiment_files import (
     shipped_experiments,
 )
 from cns_drake.studies.study import TASKS
-from evaluation.localisation import results, tracking
-from evaluation.recognition import faults, place_numbers, place_outcome
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.results.keys import FROZEN_REDRAW
-from evaluation.results.table import Answers, QueryRows, Results, Row
-from evaluation.study.tasks import map_scores
+from evaluation.results.table import Results, Row
 
 PAGE = documents.read("docs/studies.md")
 
@@ -60,31 +50,6 @@ def test_all_fields_of_an_experiment_are_listed():
     assert sorted(fields) == sorted(Experiment.model_fields)
 
 
-def test_what_can_vary_exists():
-    named = first_codes("### What can vary")
-    assert FROZEN_REDRAW.removeprefix("both.") in named
-    named = [name for name in named if not name.startswith("redraw.")]
-    scenario = [name for name in named if "." in name]
-    for name in scenario:
-        section, field = name.split(".")
-        annotation = Scenario.model_fields[section].annotation
-        assert field in annotation.model_fields, name
-    source = "".join(
-        map(inspect.getsource, (changed_drives, experiment, side_fields))
-    )
-    lost = Losses.model_fields.keys()
-    assert lost <= set(named)
-    for name in set(named) - {*scenario, *lost, "protocol", "crop"}:
-        assert f'"{name}"' in source, name
-    fields = RetrievalProtocol.__dataclass_fields__
-    (values,) = (
-        row[2]
-        for row in documents.table(PAGE, "### What can vary")
-        if row[1] == "protocol"
-    )
-    assert {*codes(values)} <= fields.keys()
-
-
 def test_tasks_and_their_settings_are_listed():
     rows = documents.table(PAGE, "## Tasks and metrics")
     assert [codes(row[0])[0] for row in rows] == list(TASKS)
@@ -95,7 +60,7 @@ def test_tasks_and_their_settings_are_listed():
         assert bool(named) == (row[2] != "none")
 
 
-def test_columns_of_the_tables_are_listed():
+def test_columns_of_the_table_of_results_are_listed():
     key = {
         **dict.fromkeys(("experiment", "map", "database", "query"), "a"),
         **{"seed": 1, "factors": {}, "task": "place", "method": "a"},
@@ -105,34 +70,6 @@ def test_columns_of_the_tables_are_listed():
     row = Row(**key, metric="auc", value=1.0)
     assert {*said, "factors"} == set(Row.__dataclass_fields__)
     assert Results.of([row]).rows == (row,)
-    columns = first_codes("## The table of queries")
-    answers = Answers(**key, columns={})
-    assert QueryRows.of([answers]).answers == (answers,)
-    source = inspect.getsource(inspect.getmodule(Answers))
-    known = source.partition("_ANSWERS = {\n")[2].partition("\n}")[0]
-    assert columns == re.findall(r'"(\w+)":', known)
-
-
-def test_metrics_are_those_of_the_tasks():
-    tasks = {
-        name: inspect.getsource(inspect.getmodule(task))
-        for name, task in TASKS.items()
-    }
-    for name in ("place", "pose"):
-        for module in (faults, place_numbers, place_outcome):
-            tasks[name] += inspect.getsource(module)
-    for module in (results, tracking):
-        tasks["localise"] += inspect.getsource(module)
-    tasks["map"] += inspect.getsource(map_scores)
-    task = ""
-    for row in documents.table(PAGE, "| task | metric | meaning |"):
-        task = (codes(row[0]) or [task])[0]
-        for metric in codes(row[1]):
-            parts = metric.split("_")
-            found = f'"{metric}"' in tasks[task]
-            # Some names are put together.
-            found |= parts[0] in ("iou", "precision", "recall")
-            assert found, metric
 
 
 @pytest.mark.parametrize(

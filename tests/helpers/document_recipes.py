@@ -406,10 +406,6 @@ RECIPES = {
         makes=("made/kitti_bev/suburbia/queries/imgs/000000.png",),
         by_night=True,
     ),
-    "sessions of another program": Recipe(
-        "days,r1,low,high",
-        file="real_scans/sessions/mine.csv",
-    ),
     "help: real": Recipe(
         "cns-eval real real_scans",
         changes=(("--output real", "--method plane-icp --output fits"),),

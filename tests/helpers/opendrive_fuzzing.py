@@ -8,9 +8,9 @@ from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lanes import lane_bands
-from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
+from cns_drake.imports.opendrive.town import split_levels
 from helpers.small_opendrive import (
     TWO_LANES,
     cubic,

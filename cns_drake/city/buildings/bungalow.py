@@ -174,9 +174,7 @@ def _add_front_wing(bungalow: Bungalow, wing: Wing, has_garage: bool) -> None:
     openings = window_rows(bungalow, wing, 1)
     if has_garage:
         width = min(wing.width - 0.8, 4.8)
-        wing_openings.add_garage_door(
-            openings, 0, x=wing.width / 2, width=width
-        )
+        wing_openings.add_garage_door(openings, x=wing.width / 2, width=width)
     add_walls_and_roof(bungalow, wing, openings)
 
 
@@ -196,9 +194,7 @@ def _add_main(bungalow: Bungalow, main: Wing, openings: Openings) -> None:
             width=bungalow.picture + 0.7,
             bay=window,
         )
-    wing_openings.add_door(
-        openings, 0, x=door, floor=floor, lights=_SIDE_LIGHT_M
-    )
+    wing_openings.add_door(openings, x=door, floor=floor, lights=_SIDE_LIGHT_M)
     add_walls_and_roof(bungalow, main, openings)
     reach = min(1.6, main.y0 - bungalow.site.bounds[1] - 0.4)
     if bungalow.veranda and end - start > 4.0 and reach > 0.9:

@@ -199,7 +199,7 @@ def _add_main(house: DetachedHouse) -> None:
     openings = window_rows(house, house.main, house.storeys)
     start, end = (x - house.main.x0 for x in house.free)
     door = start + 0.5 * (end - start)
-    wing_openings.add_door(openings, 0, x=door, floor=house.floor, lights=0.3)
+    wing_openings.add_door(openings, x=door, floor=house.floor, lights=0.3)
     _add_porch(house, (start, end))
     add_walls_and_roof(house, house.main, openings)
     if house.roof in ("gable", "gambrel"):

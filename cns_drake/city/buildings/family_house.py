@@ -81,7 +81,7 @@ def add_walls_and_roof(
 
     The windows of the front get casings, and each gable gets a window.
     """
-    wing_openings.add_casings(openings, (0,), house.casing)
+    wing_openings.add_casings(openings, house.casing)
     bands = []
     if house.floor > 0:
         bands.append(foot_band(height=house.floor, reach=0.04))
@@ -125,7 +125,7 @@ def add_garage(house: FamilyHouse, garage: Wing) -> None:
     openings = Openings(house, garage, house.boxes)
     length = garage.x1 - garage.x0
     wing_openings.add_garage_door(
-        openings, 0, x=length / 2, width=min(length - 0.7, _GARAGE_DOOR_M)
+        openings, x=length / 2, width=min(length - 0.7, _GARAGE_DOOR_M)
     )
     window = wing_openings.sash(width=0.9, z=0.0, sill=1.1, head=2.0)
     openings.add_bays(_SIDES, z=1.0, pitch=3.4, choices=[window])

@@ -139,7 +139,7 @@ def _add_house(
         )
     _add_entrance(flats, openings)
     _add_verandas(flats, wing, storeys, storey, number)
-    wing_openings.add_casings(openings, (0,), flats.casing)
+    wing_openings.add_casings(openings, flats.casing)
     first_floor = round(_FLOOR_M + storey, 2)
     bands = (
         foot_band(height=_FLOOR_M, reach=0.05),
@@ -175,7 +175,7 @@ def _add_entrance(flats: GardenFlats, openings: Openings) -> None:
         )
         openings.replace_by_bay(0, x=middle, width=2.6, bay=stair)
     wing_openings.add_door(
-        openings, 0, x=middle, floor=_FLOOR_M, width=1.2, lights=0.4
+        openings, x=middle, floor=_FLOOR_M, width=1.2, lights=0.4
     )
     across, reach = around(middle, _LANDING_HALF_M), (-0.05, _LANDING_REACH_M)
     canopy = wall.box(across, reach, z=(_FLOOR_M + 2.3, _FLOOR_M + 2.5))

@@ -136,7 +136,7 @@ def add_house(
         )
     door = _add_entrance(house, wing, openings, door_material)
     _add_bay(house, wing, openings, storeys, step, door)
-    wing_openings.add_casings(openings, (0,), house.casing)
+    wing_openings.add_casings(openings, house.casing)
     first_floor = house.floor + step if storeys > 1 else None
     bands = _bands(house, wing, first_floor)
     openings.add_walls((wing_openings.GLASS_M,), bands)
@@ -216,7 +216,7 @@ def _add_entrance(
     x = inset if house.door_left else wall.length - inset
     floor = house.floor
     wing_openings.add_door(
-        openings, 0, x=x, floor=floor, height=2.25, material=material
+        openings, x=x, floor=floor, height=2.25, material=material
     )
     count = max(1, round(floor / porches.RISER_M))
     run = min(

@@ -187,7 +187,7 @@ def _add_entrances(
         top=eaves + 0.4,
     )
     for x in around(middle, offset):
-        wing_openings.add_door(openings, 0, x=x, floor=houses.floor)
+        wing_openings.add_door(openings, x=x, floor=houses.floor)
         if not houses.doors_inside:
             add_porch(x0=x - 0.85, x1=x + 0.85)
     if houses.doors_inside:

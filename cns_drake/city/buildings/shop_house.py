@@ -108,7 +108,7 @@ class ShopHouse(HouseInRow):
             )
         _add_ground(self, wing, openings)
         _add_oriels(self, wing, openings, upper, step)
-        wing_openings.add_casings(openings, (0,), self.casing)
+        wing_openings.add_casings(openings, self.casing)
         bands = [Band(z0=round(ground - 0.3, 2), z1=ground, depth=-self.course)]
         if self.roof == "flat" and room > 0.8:
             z = round(wing.wall_top - 0.45, 2)
@@ -133,7 +133,6 @@ def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
         end = length - _DOOR_BAY_M
     wing_openings.add_shops(
         openings,
-        0,
         start=start,
         end=end,
         height=house.floor,
@@ -142,7 +141,7 @@ def _add_ground(house: ShopHouse, wing: Wing, openings: Openings) -> None:
     )
     if has_flats:
         x = _DOOR_END_M if house.door_left else length - _DOOR_END_M
-        wing_openings.add_door(openings, 0, x=x, floor=0.0, height=2.3)
+        wing_openings.add_door(openings, x=x, floor=0.0, height=2.3)
     back = [
         wing_openings.sash(width=1.2, z=0.0, sill=1.4, head=2.3),
         bays.gate(width=2.2, height=2.3, depth=0.2),

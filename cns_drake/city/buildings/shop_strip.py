@@ -119,7 +119,6 @@ def _add_unit(strip: ShopStrip, wing: Wing, tall: bool) -> None:
     )
     wing_openings.add_shops(
         openings,
-        0,
         start=0.2,
         end=wall.length - 0.2,
         height=strip.ground,

@@ -98,7 +98,6 @@ def arched(
     depth: float,
     *,
     rise: float | None = None,
-    pier: float = 0.3,
 ) -> Bay:
     """Returns a bay with a round-headed recess in its middle.
 
@@ -110,11 +109,10 @@ def arched(
         depth: distance of the back of the recess behind the wall [m].
         rise: height of the arch [m]; by default half the width, which gives a
             half circle.
-        pier: least width of wall on either side [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
-        a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
         if b - a < 0.4:
             return []
         top = spring + (_cm((b - a) / 2) if rise is None else rise)
@@ -127,7 +125,6 @@ def shop_front(
     head: float,
     depth: float = 0.35,
     *,
-    riser: float = 0.45,
     pier: float = 0.3,
     door: bool = True,
 ) -> Bay:
@@ -138,7 +135,6 @@ def shop_front(
     Args:
         head: height of the top of the glass [m].
         depth: distance of the glass behind the wall [m].
-        riser: height of the riser below the glass [m].
         pier: width of wall on each side [m].
         door: whether there is a door; otherwise a post divides the glass.
     """
@@ -148,15 +144,15 @@ def shop_front(
         if b - a < 1.6:
             return []
         relief: list[Relief] = [
-            Patch(a, b, 0.0, riser, depth - 0.2),
-            Patch(a, b, riser, head, depth),
+            Patch(a, b, 0.0, 0.45, depth - 0.2),
+            Patch(a, b, 0.45, head, depth),
         ]
         if door:
             x = _cm(a + 0.62 * (b - a))
             relief.append(Patch(x, min(x + 1.1, b), 0.0, head, depth + 0.6))
         else:
             x = _cm((a + b) / 2)
-            relief.append(Patch(x - 0.06, x + 0.06, riser, head, depth - 0.15))
+            relief.append(Patch(x - 0.06, x + 0.06, 0.45, head, depth - 0.15))
         return relief
 
     return bay
@@ -250,9 +246,7 @@ def gate(width: float, height: float, depth: float = 0.3) -> Bay:
     return bay
 
 
-def loggia(
-    width: float, depth: float, rail: float, head: float, *, pier: float = 0.15
-) -> Bay:
+def loggia(width: float, depth: float, rail: float, head: float) -> Bay:
     """Returns a bay with a balcony inside the wall, behind a solid rail.
 
     Args:
@@ -261,11 +255,10 @@ def loggia(
         depth: distance of the balcony's back wall behind the wall [m].
         rail: height of the top of the rail [m].
         head: height of the top of the opening [m].
-        pier: least width of wall on each side [m].
     """
 
     def bay(x0: float, x1: float) -> list[Relief]:
-        a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 0.3))
         x = _cm(a + 0.3 * (b - a))
         return [
             Patch(a, b, rail, head, depth),

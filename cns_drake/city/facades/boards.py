@@ -31,7 +31,7 @@ def casings(
         if r.depth not in glass or r.z1 - r.z0 < 0.5:
             continue
         if style == "frame":
-            pieces.append(_ring(r, 0.12, reach))
+            pieces.append(_ring(r, reach))
         elif style == "sill":
             low = r.z0 - 0.1
             pieces.append(board(r.x0 - 0.1, r.x1 + 0.1, low, r.z0, 2 * reach))
@@ -42,9 +42,9 @@ def casings(
     return pieces
 
 
-def _ring(r: Relief, width: float, reach: float) -> Mesh:
+def _ring(r: Relief, reach: float) -> Mesh:
     """Returns boards around an opening, mitred at its corners."""
-    w = width
+    w = 0.12
     outer = [(r.x0 - w, r.z0 - w), (r.x0 - w, r.z1 + w),
              (r.x1 + w, r.z1 + w), (r.x1 + w, r.z0 - w)]  # fmt: skip
     inner = [(r.x0, r.z0), (r.x0, r.z1), (r.x1, r.z1), (r.x1, r.z0)]

@@ -23,7 +23,7 @@ _INTO_ROOF = 0.03
 
 
 def gable_line(
-    a: float, b: float, z: float, top: float, ridge: float = 0.5
+    a: float, b: float, z: float, top: float
 ) -> list[tuple[float, float]]:
     """Returns the roof line of a gable roof as (across, height) points [m].
 
@@ -32,13 +32,12 @@ def gable_line(
         b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the ridge [m].
-        ridge: place of the ridge between a and b, as a share of the span.
     """
-    return [(a, z), (a + ridge * (b - a), top), (b, z)]
+    return [(a, z), (a + 0.5 * (b - a), top), (b, z)]
 
 
 def gambrel_line(
-    a: float, b: float, z: float, top: float, knee: bays.Span = (0.24, 0.66)
+    a: float, b: float, z: float, top: float
 ) -> list[tuple[float, float]]:
     """Returns the roof line of a gambrel roof: (across, height) points [m].
 
@@ -49,17 +48,15 @@ def gambrel_line(
         b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the ridge [m].
-        knee: distance of the knee from the end as a share of half the span, and
-            height of the knee as a share of the rise.
     """
     half = (b - a) / 2
-    run = knee[0] * half
-    up = z + knee[1] * (top - z)
+    run = 0.24 * half
+    up = z + 0.66 * (top - z)
     return [(a, z), (a + run, up), (a + half, top), (b - run, up), (b, z)]
 
 
 def barrel_line(
-    a: float, b: float, z: float, top: float, count: int = 8
+    a: float, b: float, z: float, top: float
 ) -> list[tuple[float, float]]:
     """Returns the roof line of a barrel roof as (across, height) points [m].
 
@@ -68,7 +65,6 @@ def barrel_line(
         b: where the line ends across the roof [m].
         z: height of both ends [m].
         top: height of the crown [m].
-        count: number of chords, an even number.
     """
     half = (b - a) / 2
     middle = (a + b) / 2
@@ -77,7 +73,7 @@ def barrel_line(
     span = math.atan2(half, radius - rise)
     return [
         (middle + radius * math.sin(t), top - radius * (1.0 - math.cos(t)))
-        for t in np.linspace(-span, span, count + 1).tolist()
+        for t in np.linspace(-span, span, 9).tolist()
     ]
 
 

@@ -243,7 +243,6 @@ def shaft_walls(
     slit: Bay,
     room: float,
     rim: Band,
-    glass: tuple[float, ...] = (),
 ) -> Facade:
     """Returns the walls of a stair tower: one bay in front and one behind.
 
@@ -255,11 +254,10 @@ def shaft_walls(
         slit: the bay behind.
         room: width of each bay [m].
         rim: the band around the top.
-        glass: depths of the openings that are glazed [m].
     """
     layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
     layout = bays.by_edge(layouts, bays.plain)
-    return Facade(height, (rim,), layout, glass)
+    return Facade(height, (rim,), layout)
 
 
 def add_crown(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from cns_drake.city.facades import bays, boards, canopies
 from cns_drake.city.facades.reliefs import Patch, Relief
@@ -52,7 +52,6 @@ def add_window_storeys(
 
 def add_door(
     openings: Openings,
-    edge: int,
     x: float,
     floor: float,
     *,
@@ -61,12 +60,11 @@ def add_door(
     lights: float = 0.0,
     material: str = "accent",
 ) -> None:
-    """Adds a door with its leaf and, if `lights` is set, side windows.
+    """Adds a front door with its leaf and, if `lights` is set, side windows.
 
     Args:
         openings: the openings of the wing.
-        edge: number of the wall.
-        x: middle of the door along the wall [m].
+        x: middle of the door along the front [m].
         floor: height of the threshold [m].
         width: width of the door [m].
         height: height of the door [m].
@@ -86,28 +84,25 @@ def add_door(
                 )
         return relief
 
-    openings.replace_by_bay(edge, x, width + 2 * lights + 0.5, bay)
+    openings.replace_by_bay(0, x, width + 2 * lights + 0.5, bay)
     leaf = _leaf(x - half, x + half, floor, top)
     openings.out.add_to(
-        material, *(openings.wing.wall(edge).place(part) for part in leaf)
+        material, *(openings.wing.wall(0).place(part) for part in leaf)
     )
 
 
-def add_garage_door(
-    openings: Openings, edge: int, x: float, width: float, height: float = 2.15
-) -> None:
-    """Adds a garage door with horizontal ribs, in the material `trim`.
+def add_garage_door(openings: Openings, x: float, width: float) -> None:
+    """Adds a garage door with ribs to the front, in the material `trim`.
 
     Args:
         openings: the openings of the wing.
-        edge: number of the wall.
-        x: middle of the door along the wall [m].
+        x: middle of the door along the front [m].
         width: width of the door [m].
-        height: height of the door [m].
     """
+    height = 2.15
     a, b = round(x - width / 2, 2), round(x + width / 2, 2)
     hole: list[Relief] = [Patch(a, b, 0.0, height, _DOOR_M)]
-    openings.replace_by_bay(edge, x, width + 0.3, lambda x0, x1: hole)
+    openings.replace_by_bay(0, x, width + 0.3, lambda x0, x1: hole)
     count = 4
     step = height / count
     for k in range(count):
@@ -115,29 +110,24 @@ def add_garage_door(
         high = round((k + 1) * step - 0.02, 2)
         panel = boards.board(a, b, low, high, 0.06)
         panel = panel.moved((0.0, -_DOOR_M, 0.0))
-        openings.out.add_to("trim", openings.wing.wall(edge).place(panel))
+        openings.out.add_to("trim", openings.wing.wall(0).place(panel))
 
 
-def add_casings(openings: Openings, edges: Sequence[int], style: str) -> None:
-    """Adds frames, sills or shutters to the windows of some walls.
+def add_casings(openings: Openings, style: str) -> None:
+    """Adds frames, sills or shutters to the windows of the front.
 
     Args:
         openings: the openings of the wing.
-        edges: numbers of the walls.
         style: `frame`, `sill` or `shutters`.
     """
     material = "accent" if style == "shutters" else "trim"
-    for edge in edges:
-        wall = openings.wing.wall(edge)
-        pieces = boards.casings(
-            openings.layout(edge, wall.length), (GLASS_M,), style
-        )
-        openings.out.add_to(material, *(wall.place(piece) for piece in pieces))
+    wall = openings.wing.wall(0)
+    pieces = boards.casings(openings.layout(0, wall.length), (GLASS_M,), style)
+    openings.out.add_to(material, *(wall.place(piece) for piece in pieces))
 
 
 def add_shops(
     openings: Openings,
-    edge: int,
     start: float,
     end: float,
     height: float,
@@ -146,22 +136,21 @@ def add_shops(
     awnings: float = 0.6,
     reach: float = 1.2,
 ) -> None:
-    """Adds shops side by side between two points of a wall.
+    """Adds shops side by side between two points of the front.
 
     Fascias have the material `sign`, hanging signs `trim`, and awnings
     `awning`.
 
     Args:
         openings: the openings of the wing.
-        edge: number of the wall.
-        start: where the shops begin along the wall [m].
-        end: where the shops end along the wall [m].
+        start: where the shops begin along the front [m].
+        end: where the shops end along the front [m].
         height: height of the ground floor [m].
         width: approximate width of a shop [m].
         awnings: share of the shops that have an awning.
         reach: how far an awning reaches out of the wall [m].
     """
-    wall = openings.wing.wall(edge)
+    wall = openings.wing.wall(0)
     out = openings.out
     head = round(height - 1.15, 2)
     for a, b in bays.stretches(end - start, width, 0.1):
@@ -171,7 +160,7 @@ def add_shops(
         shop = bays.shop_front(head, SHOP_GLASS_M[0], pier=0.25)
         if out.chance(0.5):
             shop = _mirrored_bay(shop)
-        openings.replace_by_bay(edge, (x0 + x1) / 2, x1 - x0, shop)
+        openings.replace_by_bay(0, (x0 + x1) / 2, x1 - x0, shop)
         z = head + 0.08
         tall = out.uniform(0.55, 0.8, 2)
         fascia = wall.box(

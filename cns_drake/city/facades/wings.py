@@ -29,7 +29,6 @@ class Roof:
         eaves: overhang at the lower ends of the slopes [m].
         verge: overhang at the gables [m].
         thickness: vertical thickness of the roof [m].
-        ridge: place of a gable roof's ridge, as a share of the span.
         parapet: height of a flat roof's parapet [m].
         falling: whether a shed roof falls towards the back instead of rising
             towards the back. With `along_y`, whether it falls towards the right
@@ -41,7 +40,6 @@ class Roof:
     eaves: float = 0.4
     verge: float = 0.3
     thickness: float = 0.22
-    ridge: float = 0.5
     parapet: float = 0.4
     falling: bool = False
 
@@ -149,7 +147,7 @@ class Wing:
         a, b = (self.x0, self.x1) if roof.along_y else (self.y0, self.y1)
         z = self.wall_top + roof.thickness - SEAT
         if roof.kind == "gable":
-            return roofs.gable_line(a, b, z, self.top, roof.ridge)
+            return roofs.gable_line(a, b, z, self.top)
         if roof.kind == "gambrel":
             return roofs.gambrel_line(a, b, z, self.top)
         if roof.kind == "barrel":

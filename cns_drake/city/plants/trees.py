@@ -30,15 +30,12 @@ class Species:
         height_range: least and greatest height of a tree [m].
         leaf_rgb: colour of the leaves.
         bark_rgb: colour of the wood.
-        street: whether trees of this species can stand on a sidewalk: people
-            can walk under the crown, which begins at 2.5 m or higher.
     """
 
     variants: int
     height_range: tuple[float, float]
     leaf_rgb: tuple[float, float, float]
     bark_rgb: tuple[float, float, float] = (0.42, 0.34, 0.26)
-    street: bool = True
 
 
 # Name of a species, with which the names of its meshes begin -> the species.
@@ -46,14 +43,12 @@ SPECIES = {
     "plane_tree": Species(5, (8.5, 13.0), (0.36, 0.50, 0.24)),
     "lime_tree": Species(4, (7.8, 10.5), (0.30, 0.47, 0.22)),
     "poplar": Species(3, (12.0, 18.0), (0.38, 0.52, 0.25)),
-    "spruce": Species(3, (8.0, 16.0), (0.20, 0.34, 0.22), street=False),
+    "spruce": Species(3, (8.0, 16.0), (0.20, 0.34, 0.22)),
     "pine": Species(3, (9.0, 14.0), (0.26, 0.39, 0.23), (0.48, 0.34, 0.25)),
     "young_tree": Species(3, (5.2, 6.2), (0.42, 0.56, 0.28)),
     "palm": Species(4, (6.5, 11.0), (0.38, 0.50, 0.26), (0.50, 0.42, 0.33)),
-    "willow": Species(3, (7.5, 11.0), (0.44, 0.54, 0.28), street=False),
+    "willow": Species(3, (7.5, 11.0), (0.44, 0.54, 0.28)),
 }
-# Species that may stand on a sidewalk.
-STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
 
 def mesh_names(species: str, variant: int) -> tuple[str, str]:

@@ -6,29 +6,28 @@ and each further line is a feature with its own vertices. pyproj defines the
 order, direction and units of the axes of the file's reference system.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+import itertools
 from pathlib import Path
 import re
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
 from cns_drake.base.json_text import parse_json
-from cns_drake.imports.cityjson.axes import exchange_mirrored_axes, settle_axes
-from cns_drake.imports.cityjson.city_file import CityFile, CityObject
-from cns_drake.imports.cityjson.geometries import (
-    GeometrySource,
-    Templates,
-    read_geometry,
-    read_templates,
+from cns_drake.imports.cityjson.city_file import (
+    CityFile,
+    CityGeometry,
+    CityObject,
+    Face,
 )
 from cns_drake.imports.cityjson.reference_systems import (
     ReferenceSystem,
     check_lengths,
     reference_system,
 )
-from cns_drake.imports.cityjson.vertices import read_vertices
 from cns_drake.imports.faults import ImportFaults
 
 # Every city is wider than 1 m, and narrower than 1 deg (about 100 km).
@@ -40,6 +39,27 @@ _KNOWN_MEMBERS = {
     "type", "geometry", "attributes", "parents", "children", "children_roles",
     "geographicalExtent", "address", "bbox", "extent", "members",
 }  # fmt: skip
+# A city is mirrored if less than this share of its geometries look outwards.
+_MIRRORED_SHARE = 0.1
+# At most this many geometries are judged.
+_MOST_JUDGED = 1000
+# A geometry is judged if six times the volume of a solid [m^3], or twice the
+# area of other surfaces as seen from above [m^2], is greater than this.
+_LEAST_JUDGED = 1e-3
+# Type of a face -> 1 if the face must look upwards, -1 if downwards.
+_UP_OR_DOWN = {"RoofSurface": 1.0, "GroundSurface": -1.0}
+_UP_OR_DOWN_IN_TERRAIN = {**_UP_OR_DOWN, "": 1.0}
+_BEYOND = "coordinates beyond the area of their reference system"
+# Type of a geometry -> depth of the lists that contain its faces.
+_NESTING = {
+    "MultiSurface": 0,
+    "CompositeSurface": 0,
+    "Solid": 1,
+    "MultiSolid": 2,
+    "CompositeSolid": 2,
+}
+# No place on Earth is farther than this from the origin of a survey grid [m].
+_FARTHEST = 1e8
 
 
 def read_cityjson(path: Path) -> CityFile:
@@ -54,7 +74,7 @@ def read_cityjson(path: Path) -> CityFile:
         raise InputError(f"{path}: the file has no objects")
     if not any(city.faces()):
         raise InputError(f"{path}: no object has a surface")
-    exchange_mirrored_axes(city)
+    _exchange_mirrored_axes(city)
     low, high = city.bounds()
     if _look_like_degrees(low, high):
         raise InputError(
@@ -91,7 +111,7 @@ def _read_documents(path: Path) -> CityFile:
     # The last document of type CityJSON, and the name of its reference system.
     whole: dict = {}
     whole_system = ""
-    templates = Templates()
+    templates = _Templates()
     for number, document in _documents(path):
         kind = document.get("type")
         where = str(path) if number == 0 else f"{path}: line {number}"
@@ -106,7 +126,7 @@ def _read_documents(path: Path) -> CityFile:
                 )
             if not city.objects:
                 city.system, whole_system = system, system.name
-            templates = read_templates(document, where)
+            templates = _read_templates(document, where)
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
         _read_objects(document, whole, templates, where, city)
@@ -170,10 +190,168 @@ def _reference_system(document: dict, where: str) -> ReferenceSystem:
     return reference_system(str(name), f"{where}: metadata.referenceSystem")
 
 
+class _Templates(NamedTuple):
+    """Geometry templates of a file, which objects place in the world.
+
+    Attributes:
+        geometries: the templates, as in the file.
+        points: (N, 3) vertices of all templates, in coordinates of the file.
+    """
+
+    geometries: Sequence[Any] = ()
+    points: np.ndarray = np.zeros((0, 3))
+
+
+def _read_templates(document: dict, where: str) -> _Templates:
+    """Returns the templates in a document of type CityJSON.
+
+    `where` names the file and the line of the document in error messages.
+
+    Raises:
+        InputError: the vertices of the templates cannot be used.
+    """
+    templates = document.get("geometry-templates")
+    templates = templates if isinstance(templates, dict) else {}
+    points = to_triples(
+        templates.get("vertices-templates", []),
+        f"{where}: geometry-templates.vertices-templates",
+    )
+    return _Templates(templates.get("templates") or [], points)
+
+
+class _GeometrySource(NamedTuple):
+    """What the geometries of a document refer to.
+
+    Attributes:
+        vertices: (N, 3) vertices of the document [m].
+        templates: templates of the file.
+        system: reference system of the templates.
+    """
+
+    vertices: np.ndarray
+    templates: _Templates
+    system: ReferenceSystem
+
+    def instance(self, instance: dict) -> tuple[Any, np.ndarray]:
+        """Returns an instance's template, and the vertices of the instance.
+
+        The vertices (N, 3) are the template's vertices, transformed to the
+        place of the instance [m].
+
+        Args:
+            instance: geometry of the type `GeometryInstance`, which refers to a
+                template and a transformation.
+
+        Raises:
+            LookupError, TypeError, ValueError: if the instance is faulty.
+        """
+        template = self.templates.geometries[instance["template"]]
+        (reference,) = instance["boundaries"]
+        X = np.array(instance["transformationMatrix"], dtype=np.float64)
+        X = X.reshape(4, 4)
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = self.templates.points @ X[:3, :3].T + X[:3, 3]
+        is_affine = (X[3] == [0.0, 0.0, 0.0, 1.0]).all()
+        if reference < 0 or not is_affine:
+            raise ValueError
+        if not (np.abs(placed) <= _FARTHEST).all():
+            raise ValueError
+        return template, (
+            self.system.to_metres(placed) + self.vertices[reference]
+        )
+
+
+def _read_geometry(
+    geometry: Any, source: _GeometrySource, name: str, faults: ImportFaults
+) -> CityGeometry | None:
+    """Returns a geometry of an object; None if the geometry cannot be read.
+
+    Args:
+        geometry: the geometry in the file.
+        source: the vertices and templates to which the geometry refers.
+        name: id of the object, as an example in `faults`.
+        faults: counts geometries and faces that are left out.
+    """
+    vertices = source.vertices
+    try:
+        lod = _level_of_detail(geometry.get("lod"))
+        kind = geometry["type"]
+        if kind == "GeometryInstance":
+            geometry, vertices = source.instance(geometry)
+            kind = geometry["type"]
+            lod = lod or _level_of_detail(geometry.get("lod"))
+        if kind not in _NESTING:
+            faults.add(f"geometry of type {kind}, left out", name)
+            return None
+        boundaries = geometry["boundaries"]
+        for _ in range(_NESTING[kind]):
+            boundaries = [face for group in boundaries for face in group]
+        kinds = _surface_kinds(
+            geometry.get("semantics"), _NESTING[kind], len(boundaries)
+        )
+    except (LookupError, TypeError, ValueError, AttributeError):
+        faults.add("geometry that is not an object, left out", name)
+        return None
+    faces, kinds_of_faces = [], []
+    for boundary, kind_of_face in zip(boundaries, kinds, strict=True):
+        face = _face_of_boundary(boundary, vertices)
+        if face is None:
+            faults.add("face with unknown vertices, left out", name)
+        else:
+            faces.append(face)
+            kinds_of_faces.append(kind_of_face)
+    return CityGeometry(lod, faces, kinds_of_faces, _NESTING[kind] > 0)
+
+
+def _level_of_detail(value: object) -> float:
+    """Returns the level of detail that a geometry states; 0 if none."""
+    return float(str(value)) if value is not None else 0.0
+
+
+def _face_of_boundary(boundary: Any, vertices: np.ndarray) -> Face | None:
+    """Returns a face; None if an index belongs to no vertex."""
+    face = []
+    try:
+        for ring in boundary:
+            indices = np.array(ring)
+            if len(indices) == 0:
+                continue
+            if indices.dtype.kind != "i" or indices.ndim != 1:
+                return None
+            if indices.min() < 0 or indices.max() >= len(vertices):
+                return None
+            face.append(vertices[indices])
+    except (TypeError, ValueError):
+        return None
+    return face or None
+
+
+def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
+    """Returns the types of `number` faces; "" for an unknown type."""
+    unknown = [""] * number
+    if not isinstance(semantics, dict):
+        return unknown
+    values, surfaces = semantics.get("values"), semantics.get("surfaces")
+    for _ in range(nesting):
+        if not isinstance(values, list) or None in values:
+            return unknown
+        values = [value for group in values for value in group]
+    if not isinstance(values, list) or len(values) != number:
+        return unknown
+    if not isinstance(surfaces, list):
+        return unknown
+    return [
+        ""
+        if value is None or not 0 <= value < len(surfaces)
+        else str(surfaces[value].get("type", ""))
+        for value in values
+    ]
+
+
 def _read_objects(
     document: dict,
     whole: dict,
-    templates: Templates,
+    templates: _Templates,
     where: str,
     city: CityFile,
 ) -> None:
@@ -200,12 +378,12 @@ def _read_objects(
     transform = document.get("transform", whole.get("transform"))
     if transform is None and not str(whole.get("version")).startswith("1.0"):
         city.faults.add("no transform; vertices taken as coordinates", where)
-    vertices = read_vertices(document, transform, where)
+    vertices = _read_vertices(document, transform, where)
     if not city.objects and len(vertices):
         _count_assumptions(city)
-        settle_axes(city, vertices)
+        _settle_axes(city, vertices)
     vertices = city.system.to_metres(vertices)
-    source = GeometrySource(vertices, templates, city.system)
+    source = _GeometrySource(vertices, templates, city.system)
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
             value.get("type"), str
@@ -234,7 +412,7 @@ def _count_assumptions(city: CityFile) -> None:
 
 
 def _read_object(
-    name: str, value: dict, source: GeometrySource, faults: ImportFaults
+    name: str, value: dict, source: _GeometrySource, faults: ImportFaults
 ) -> CityObject:
     """Returns an object of the file; what is not read is counted in `faults`.
 
@@ -244,7 +422,7 @@ def _read_object(
         faults.add(f"{key} of an object, not read", name)
     listed = value.get("geometry") or []
     geometries = [
-        read_geometry(geometry, source, name, faults)
+        _read_geometry(geometry, source, name, faults)
         for geometry in (listed if isinstance(listed, list) else [listed])
     ]
     parents = value.get("parents") or []
@@ -266,3 +444,159 @@ def _add_parents(objects: dict, city: CityFile) -> None:
             part = city.objects.get(str(child))
             if part is not None and not part.parents:
                 city.objects[part.name] = part._replace(parents=[name])
+
+
+def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
+    """Decides which of the first two coordinates is east, if it can.
+
+    Many programs write east first although the definition of the reference
+    system says north first. East first is assumed if only this order brings the
+    middle vertex of the file into the system's area of use.
+
+    In two cases, the order stays open, and `_exchange_mirrored_axes` decides by
+    the faces: both orders bring the vertex into the area, or the system is
+    defined as east first and only north first brings the vertex there.
+
+    An exchange counts as a fault of the city. It also counts as a fault if the
+    vertex is outside the area and the order is not exchanged here.
+
+    Args:
+        city: the city, whose objects are not read yet. Without a reference
+            system, the function does nothing.
+        vertices: (N, 3) vertices of the file in its own coordinates, N > 0.
+    """
+    defined = city.system
+    if not defined.name:
+        return
+    first, second, _ = vertices[len(vertices) // 2].tolist()
+    is_there = defined.has_place(first, second)
+    city.order_is_open = defined.has_place(second, first)
+    if city.order_is_open and not is_there and defined.is_north_first:
+        city.order_is_open = False
+        _exchange_axes(city)
+    elif not is_there:
+        city.faults.add(_BEYOND, defined.name)
+
+
+def _exchange_axes(city: CityFile) -> None:
+    """Exchanges the first two coordinates of the system and of all faces."""
+    defined = city.system
+    city.system = defined.exchanged()
+    turn = city.system.matrix @ np.linalg.inv(defined.matrix)
+    for face in city.faces():
+        face[:] = [ring @ turn.T for ring in face]
+    order = [axis.partition(" ")[0] for axis in defined.axes[:2]]
+    city.faults.add(
+        f"reference system with {order[0]} first, but coordinates with"
+        f" {order[1]} first; read as {order[1]} first",
+        defined.name,
+    )
+
+
+def _exchange_mirrored_axes(city: CityFile) -> None:
+    """Exchanges the first two coordinates if the city is mirrored otherwise.
+
+    The corners of a face are counter-clockwise as seen from outside; in a
+    mirrored city, faces are inside out. Coordinates are exchanged only if
+    `_settle_axes` has left their order open. Without a reference system, a
+    mirrored city is counted as a fault. An order that is open is counted as
+    well, if no face can be judged and north is first.
+    """
+    if city.system.name and not city.order_is_open:
+        return
+    outwards = list(itertools.islice(_look_outwards(city), _MOST_JUDGED))
+    if not outwards:
+        if city.system.is_north_first:
+            kind = "order of axes that no face shows, taken as defined"
+            city.faults.add(kind, city.system.name)
+    elif sum(outwards) < _MIRRORED_SHARE * len(outwards):
+        if city.order_is_open:
+            _exchange_axes(city)
+            if any(fault.kind == _BEYOND for fault in city.faults.rows()):
+                city.faults.take_back(_BEYOND)
+        elif len(outwards) > 1:
+            city.faults.add(
+                "all inside out: the city may be mirrored (north first?)",
+                "the file",
+            )
+
+
+def _look_outwards(city: CityFile) -> Iterator[bool]:
+    """Yields for each geometry whether its faces look outwards.
+
+    A solid whose faces look outwards has a positive volume. Roofs and terrains
+    must look upwards, and floors downwards. Geometries are left out if their
+    volume or area is too small to judge.
+    """
+    for city_object in city.objects.values():
+        is_terrain = city_object.object_type == "TINRelief"
+        signs = _UP_OR_DOWN_IN_TERRAIN if is_terrain else _UP_OR_DOWN
+        for geometry in city_object.geometries:
+            if not geometry.faces:
+                continue
+            first = geometry.faces[0][0][0]
+            size = 0.0
+            for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
+                for ring in face:
+                    p = ring - first
+                    # Normal of the ring, as long as twice its area.
+                    normal = np.cross(p, np.roll(p, -1, axis=0)).sum(axis=0)
+                    if geometry.is_solid:
+                        size += float(p[0] @ normal)
+                    else:
+                        size += signs.get(kind, 0.0) * float(normal[2])
+            if abs(size) > _LEAST_JUDGED:
+                yield size > 0.0
+
+
+def _read_vertices(document: dict, transform: object, where: str) -> np.ndarray:
+    """Returns the vertices (N, 3) of a document, in coordinates of the file.
+
+    Args:
+        document: the document, a JSON object.
+        transform: the transform of the document, a JSON object with scale and
+            translation; None if the vertices are coordinates.
+        where: place of the document, for error messages.
+
+    Raises:
+        InputError: vertices or transform cannot be used.
+    """
+    points = to_triples(document.get("vertices", []), f"{where}: vertices")
+    if transform is not None and not isinstance(transform, dict):
+        raise InputError(f"{where}: transform: not an object")
+    for key in (transform or {}).keys() - {"scale", "translate"}:
+        raise InputError(f"{where}: transform.{key} is not read")
+    if transform:
+        scale, move = (
+            to_triples([transform.get(key)], f"{where}: transform.{key}")
+            for key in ("scale", "translate")
+        )
+        if not (scale > 0.0).all():
+            raise InputError(f"{where}: transform.scale: not above 0")
+        with np.errstate(over="ignore", invalid="ignore"):
+            points = points * scale + move
+    if not (np.abs(points) <= _FARTHEST).all():  # NaN fails, too.
+        raise InputError(
+            f"{where}: vertices: a coordinate beyond {_FARTHEST:g} m"
+        )
+    return points
+
+
+def to_triples(values: Any, where: str) -> np.ndarray:
+    """Returns a list of N triples of numbers as an array (N, 3).
+
+    `where` is the place of the list in the file, for error messages.
+
+    Raises:
+        InputError: an item of the list is not a triple of numbers.
+    """
+    try:
+        with np.errstate(over="ignore"):
+            points = np.array(values, dtype=np.float64).reshape(-1, 3)
+        if len(points) != len(values):
+            raise ValueError
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{where}: every item must be three numbers"
+        ) from error
+    return points

@@ -4,27 +4,36 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 import numpy as np
+from scipy.spatial import KDTree
 import shapely
-from shapely.geometry import MultiLineString, Polygon
+from shapely.geometry import LineString, MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.facades.assembly import Assembly
 from cns_drake.city.facades.site import Site
-from cns_drake.city.geometry import Model, UpperSides, turned_up
-from cns_drake.imports.dressing import facade_pieces, roof_pieces
-from cns_drake.imports.dressing.bare_buildings import (
-    BareBuilding,
-    split_buildings,
+from cns_drake.city.geometry import (
+    MeshShape,
+    Model,
+    UpperSides,
+    looks_up,
+    turned_up,
 )
-from cns_drake.imports.dressing.drive_views import DriveViews
+from cns_drake.imports.dressing import facade_pieces, roof_pieces
 from cns_drake.imports.dressing.facade_plan import (
     FacadePlan,
     plan_facade,
     with_doors,
     with_shops,
 )
-from cns_drake.imports.dressing.wall_panels import Panel, find_panels
+from cns_drake.imports.dressing.styles import Style, make_style
+from cns_drake.imports.dressing.wall_panels import (
+    Panel,
+    find_panels,
+    is_upright,
+)
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
@@ -54,6 +63,28 @@ _LOD_WITH_WINDOWS = 3.0
 # wall [m].
 _BEFORE_WALL = 1.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
+# A building whose feet are farther from the ground than this was sunk into it
+# [m].
+_MOST_SUNK = 2.0
+# Share of the box around a footprint that the footprint is assumed to fill.
+_FILLED_SHARE = 0.8
+# Least height of a building that gets a style [m].
+_LEAST_HEIGHT = 1.0
+# Distance between the places on drives from which walls are looked at [m].
+_SPACING = 4.0
+# Height of the eyes above the ground [m].
+_EYES = 2.0
+# A wall is looked at from this many of the nearest places.
+_NEAREST = 8
+# A wall is also looked at from about this many other places.
+_OTHERS = 24
+# Probes of a wall are at these parts of its length and height. The wall is
+# visible if one of its probes is visible.
+_PROBES = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
+# Probes are this far in front of the wall [m].
+_BEFORE = 0.3
+# The highest probes are this far below the top of the wall [m].
+_BELOW_TOP = 0.3
 
 
 @dataclass(frozen=True)
@@ -100,12 +131,12 @@ def dress_buildings(
             doors stand [m].
     """
     buildings = [one for one in objects if one.is_building]
-    bare = split_buildings(buildings, ground, seed)
+    bare = _split_buildings(buildings, ground, seed)
     walls: Mapping[int, list[FacadePlan]] = {}
     if drives and bare:
         lasting = set(buildings if always is None else always)
         hiding = [b.triangles for b in buildings if b in lasting]
-        views = DriveViews(drives, ground, joined_triangles(hiding))
+        views = _DriveViews(drives, ground, joined_triangles(hiding))
         upper = UpperSides(turned_up(paving))
         walls = _plan_facades(bare, drives, streets, ground, views, upper)
     paths = MultiLineString([drive.path for drive in drives])
@@ -124,8 +155,94 @@ def dress_buildings(
     return DressedBuildings(dressed, at_random, by_file)
 
 
+@dataclass(frozen=True)
+class _BareBuilding:
+    """An imported building, split into surfaces that details can be added to.
+
+    Attributes:
+        imported: the building as imported, without details.
+        walls: triangles (M, 3, 3) of the walls [m].
+        roof: triangles (M, 3, 3) of the roof [m].
+        rest: triangles (M, 3, 3) of all other surfaces [m].
+        base: height of the lowest floor in W [m].
+        style: appearance of the building.
+        is_flat: whether the roof is flat.
+        rng: random generator for the details.
+    """
+
+    imported: ImportedObject
+    walls: np.ndarray
+    roof: np.ndarray
+    rest: np.ndarray
+    base: float
+    style: Style
+    is_flat: bool
+    rng: np.random.Generator
+
+
+def _split_buildings(
+    buildings: Sequence[ImportedObject], ground: Ground, seed: int
+) -> list[_BareBuilding]:
+    """Returns buildings, split into walls, roof and other surfaces.
+
+    A variant of a building, such as a lower building in an earlier stage, has
+    the style of the original.
+
+    Args:
+        buildings: the buildings.
+        ground: the ground on which they stand.
+        seed: seed of the random styles.
+    """
+    split = []
+    styles: dict[str, Style] = {}
+    variants_last = sorted(buildings, key=lambda one: one.original != "")
+    for building in variants_last:
+        style = styles.get(building.original)
+        bare = _split_building(building, ground, seed, style)
+        styles[building.draw_name] = bare.style
+        split.append(bare)
+    return split
+
+
+def _split_building(
+    building: ImportedObject,
+    ground: Ground,
+    seed: int,
+    known: Style | None = None,
+) -> _BareBuilding:
+    """Returns a building, split into walls, roof and other surfaces.
+
+    For a variant, `known` is the style of the original. The other arguments are
+    as for `_split_buildings`.
+    """
+    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
+    for part in building.structure.model.parts:
+        if isinstance(part.shape, MeshShape):
+            mesh = building.structure.model.meshes[part.shape.mesh]
+            surfaces[part.name] = mesh.vertices[mesh.triangles()]
+    body = surfaces["body"]
+    upright, up = is_upright(body), looks_up(body)
+    roof = np.concatenate([surfaces["roof"], body[up]])
+    walls, rest = body[upright], body[~upright & ~up]
+    corners = building.triangles.reshape(-1, 3)
+    foot = float(corners[:, 2].min())
+    below = float(ground.height(corners[:, :2]).min())
+    base = foot if abs(foot - below) < _MOST_SUNK else below
+    width, depth = np.ptp(corners[:, :2], axis=0)
+    standing = walls if len(walls) else building.triangles
+    height = max(_LEAST_HEIGHT, float(standing[:, :, 2].max()) - base)
+    is_flat = bool(len(roof)) and roof_pieces.is_flat_roof(roof)
+    rng = random_generator(seed, "dressing", building.draw_name)
+    area = _FILLED_SHARE * float(width * depth)
+    style = make_style(building.tags, building.year, area, height, is_flat, rng)
+    if known is not None:
+        storeys = max(1, round(height / known.storey))
+        style = replace(known, storey=height / storeys)
+    return _BareBuilding(building, walls, roof, rest, base, style, is_flat, rng)
+
+
 def _dress_building(
-    building: BareBuilding,
+    building: _BareBuilding,
     plans: Sequence[FacadePlan],
     paths: BaseGeometry,
     seed: int,
@@ -179,12 +296,118 @@ def _dress_building(
     return out.to_model(footprint), counts
 
 
+class _DriveViews:
+    """Viewpoints along drives, to find out which walls are visible."""
+
+    def __init__(
+        self,
+        drives: Sequence[WaypointRoute],
+        ground: Ground,
+        solids: np.ndarray,
+    ):
+        """Takes viewpoints along the drives, of which there is at least one.
+
+        `solids` (M, 3, 3) are the triangles that occlude walls in all stages
+        [m].
+        """
+        paths = [LineString(drive.path) for drive in drives]
+        self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
+        z = ground.height(self._xy) + _EYES
+        self._eyes = np.column_stack([self._xy, z])
+        self._tree = KDTree(self._xy)
+        self._scene = None
+        # Embree computes in float32, so coordinates are relative to the middle
+        # of the places.
+        self._middle = np.array([*self._xy.mean(axis=0), 0.0])
+        if len(solids):
+            self._scene = EmbreeScene()
+            TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
+
+    def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
+        """Returns (N,) bool: whether boxes are near a drive.
+
+        `limits` (N, 2, 2) contains the least and the greatest x and y of each
+        box [m]. A box counts as near if the circle around it is at most
+        `distance` [m] from a viewpoint.
+        """
+        middles = limits.mean(axis=1)
+        reach = np.linalg.norm(limits[:, 1] - middles, axis=1)
+        return np.asarray(self._tree.query(middles)[0] <= reach + distance)
+
+    def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
+        """Returns the distance from which drives see each wall, (N,) [m].
+
+        This is the distance from the wall to the nearest viewpoint on a drive
+        from which the wall is visible; infinite without such a viewpoint.
+
+        Args:
+            panels: the N walls.
+            most: greatest distance at which a viewpoint counts [m].
+        """
+        facing = [self._facing_places(panel, most) for panel in panels]
+        counts = [len(distances) for _, distances in facing]
+        if not sum(counts):
+            return np.full(len(panels), np.inf)
+        number = np.repeat(np.arange(len(panels)), counts)
+        place = np.concatenate([places for places, _ in facing])
+        distance = np.concatenate([distances for _, distances in facing])
+        probes = []
+        for panel in panels:
+            top = max(panel.height - _BELOW_TOP, panel.height / 2.0)
+            x, z = _PROBES.T * [[panel.length], [top]]
+            probes.append(panel.place(x, z, _BEFORE))
+        is_seen = self._is_seen(np.stack(probes)[number], self._eyes[place])
+        nearest = np.full(len(panels), np.inf)
+        np.minimum.at(nearest, number[is_seen], distance[is_seen])
+        return nearest
+
+    def _facing_places(
+        self, panel: Panel, most: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the places that face a panel, and their distances.
+
+        The result is two arrays (K,): numbers of places at most `most` from the
+        panel, and their distances from the panel [m]. The nearest places are
+        all included, of the others only some.
+        """
+        middle = panel.origin[:2] + panel.along * panel.length / 2.0
+        near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
+        index = np.array(near, dtype=int)
+        from_start = self._xy[index] - panel.origin[:2]
+        out = from_start @ panel.outward
+        x = from_start @ panel.along
+        aside = np.maximum(np.maximum(-x, x - panel.length), 0.0)
+        distance = np.hypot(out, aside)
+        usable = np.flatnonzero((out > 0.0) & (distance <= most))
+        usable = usable[np.argsort(distance[usable], kind="stable")]
+        step = max(1, (len(usable) - _NEAREST) // _OTHERS)
+        usable = np.append(usable[:_NEAREST], usable[_NEAREST::step])
+        return index[usable], distance[usable]
+
+    def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+        """Returns (K,) bool: whether eyes see any of their probes.
+
+        `eyes` (K, 3) and `probes` (K, P, 3) are places in W [m].
+        """
+        if self._scene is None:
+            return np.ones(len(eyes), dtype=bool)
+        starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)
+        ways = (probes - self._middle).reshape(-1, 3) - starts
+        hits = self._scene.run(
+            starts.astype("f4"),
+            ways.astype("f4"),
+            np.ones(len(ways), dtype="f4"),
+            query="OCCLUDED",
+        )
+        return np.asarray((hits < 0).reshape(len(eyes), -1).any(axis=1))
+
+
 def _plan_facades(
-    bare: Sequence[BareBuilding],
+    bare: Sequence[_BareBuilding],
     drives: Sequence[WaypointRoute],
     streets: Sequence[Street],
     ground: Ground,
-    views: DriveViews,
+    views: _DriveViews,
     paving: UpperSides,
 ) -> dict[int, list[FacadePlan]]:
     """Returns the plans of the walls to dress, by the building's number.
@@ -278,7 +501,7 @@ def _with_fronts(
 
 
 def _visible_panels(
-    walls: Sequence[np.ndarray], views: DriveViews
+    walls: Sequence[np.ndarray], views: _DriveViews
 ) -> tuple[list[Panel], np.ndarray]:
     """Returns the plane walls visible from drives, and their distances [m].
 

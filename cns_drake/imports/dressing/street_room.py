@@ -9,9 +9,15 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.round_shapes import revolved
 from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry import (
+    CylinderShape,
+    Mesh,
+    MeshShape,
+    Model,
     Occupancy,
+    SphereShape,
     Structure,
     UpperSides,
     ground_triangles,
@@ -20,7 +26,6 @@ from cns_drake.city.geometry import (
 )
 from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faces import joined_triangles
 from cns_drake.imports.ground import Ground
@@ -43,6 +48,14 @@ _WALL_PROBE = 0.5
 _TRUNK_RADIUS = 0.4
 # Classes of structures that nothing may touch.
 _SOLID_CLASSES = ("building", "fence", "other-structure")
+# Number of sides of posts and balls.
+_SIDES = 8
+# Number of sides of discs. Discs such as signs must not look like octagons.
+_SIDES_OF_DISC = 20
+# Names of the meshes.
+_POST = "round_post"
+_DISC = "round_disc"
+_BALL = "round_ball"
 
 
 @dataclass
@@ -233,3 +246,43 @@ def _bounding_triangles(footprint: BaseGeometry, z: float) -> np.ndarray:
     x0, y0, x1, y1 = footprint.bounds
     a, b, c, d = ((x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z))
     return np.array([(a, b, c), (a, c, d)])
+
+
+def without_curves(model: Model) -> Model:
+    """Returns a model with polyhedra in place of cylinders and spheres.
+
+    A polyhedron has the same cross-section area as the shape that it replaces.
+    """
+    parts = []
+    meshes = dict(model.meshes)
+    for part in model.parts:
+        shape = part.shape
+        if isinstance(shape, CylinderShape):
+            r = shape.radius
+            is_disc = shape.length < shape.radius
+            name = _DISC if is_disc else _POST
+            sides = _SIDES_OF_DISC if is_disc else _SIDES
+            scaled = MeshShape(name, (r, r, shape.length))
+            part = replace(part, shape=scaled)
+            meshes[name] = _revolved([1.0], [0.5], sides)
+        elif isinstance(shape, SphereShape):
+            r = shape.radius
+            part = replace(part, shape=MeshShape(_BALL, (r, r, r)))
+            # The circles are at latitudes of 90, 45 and 0 deg.
+            half = np.sqrt(0.5)
+            meshes[_BALL] = _revolved(
+                [0.0, half, 1.0], [1.0, half, 0.0], _SIDES
+            )
+        parts.append(part)
+    return replace(model, parts=tuple(parts), meshes=meshes)
+
+
+def _revolved(radius: list[float], z: list[float], sides: int) -> Mesh:
+    """Returns a solid of revolution with polygons of the circles' areas.
+
+    `z` is as for `revolved`, and `radius` contains the radii of the circles.
+    """
+    step = 2.0 * np.pi / sides
+    wide = np.sqrt(step / np.sin(step)) * np.array(radius)
+    vertices, triangles = revolved(wide, np.array(z), sides)
+    return Mesh(vertices, tuple(map(tuple, triangles.tolist())))

@@ -5,7 +5,7 @@ roads, lanes and junctions. The import only reports, as faults, links to things
 that are not in the file.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 import contextlib
 from dataclasses import replace
@@ -17,6 +17,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.xml_elements import Element, read_elements
+from cns_drake.base.yaml_files import parse_yaml
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive import road_model
 from cns_drake.imports.opendrive.course_reader import (
@@ -24,14 +25,13 @@ from cns_drake.imports.opendrive.course_reader import (
     WIDEST_JOINT,
     read_course,
 )
-from cns_drake.imports.opendrive.dangling_links import count_dangling_links
 from cns_drake.imports.opendrive.lane_reader import (
+    is_single_sided,
     read_cubics,
     read_sections,
     step_function,
 )
 from cns_drake.imports.opendrive.thing_reader import read_things
-from cns_drake.imports.opendrive.unread import count_unread
 
 # Unit of a speed limit -> its size [m/s].
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
@@ -49,6 +49,9 @@ _ROUNDING = 0.01
 _MOST_ROLL = math.radians(50.0)
 # Names are cut to this length where they become part of other names.
 _LONGEST_NAME = 60
+# Elements of links at the two ends of a road or lane.
+_ENDS = ("predecessor", "successor")
+_KNOWN = parse_yaml(Path(__file__).with_name("unread.yaml").read_bytes())
 
 
 def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
@@ -73,8 +76,8 @@ def read_roads(path: Path, faults: ImportFaults) -> road_model.RoadMap:
             roads.append(road)
     if not roads:
         raise InputError(f"{path}: the file has no roads")
-    count_dangling_links(top, faults)
-    count_unread(top, faults, "the file")
+    _count_dangling_links(top, faults)
+    _count_unread(top, faults, "the file")
     x, y = _origin_of(path, roads)
     reference = top.first("header", "geoReference")
     system = "" if reference is None else reference.text or ""
@@ -244,3 +247,140 @@ def _speed_limits(
                 faults.add(kind, name)
                 limit = 0.0
         yield road_type.number("s", 0.0), limit
+
+
+def _count_dangling_links(top: Element, faults: ImportFaults) -> None:
+    """Counts links to objects that are not in the file, as faults.
+
+    Objects are roads, lanes and junctions. `top` is the root element of the
+    file.
+    """
+    roads = {road.attrib.get("id", ""): road for road in top.all("road")}
+    junctions = {
+        junction.attrib.get("id", "") for junction in top.all("junction")
+    }
+    for name, road in roads.items():
+        own = road.attrib.get("junction", "-1")
+        if own not in ("-1", "") and own not in junctions:
+            faults.add("road of a junction that is not in the file", name)
+        for end in _ENDS:
+            kind, linked = _link_at(road, end)
+            known = junctions if kind == "junction" else roads
+            if linked is not None and linked not in known:
+                faults.add(f"link to a {kind} that is not in the file", name)
+        for _ in _dangling_lane_links(road, roads):
+            faults.add("link to a lane that is not in the file", name)
+    for junction in top.all("junction"):
+        name = junction.attrib.get("id", "")
+        for connection in junction.all("connection"):
+            for key in ("incomingRoad", "connectingRoad", "linkedRoad"):
+                linked = connection.attrib.get(key)
+                if linked is not None and linked not in roads:
+                    faults.add(
+                        "connection of a junction with a road that is not in"
+                        " the file",
+                        f"junction {name}",
+                    )
+
+
+def _link_at(road: Element, end: str) -> tuple[str, str | None]:
+    """Returns kind and id of the link at a road's end; None without a link."""
+    link = road.first("link", end)
+    if link is None:
+        return "road", None
+    kind = link.attrib.get("elementType", "road")
+    return kind, link.attrib.get("elementId")
+
+
+def _dangling_lane_links(
+    road: Element, roads: Mapping[str, Element]
+) -> Iterator[Element]:
+    """Yields the links of a road's lanes to lanes that do not exist."""
+    sections = _lane_sections(road)
+    for number, section in enumerate(sections):
+        for end in _ENDS:
+            beyond = _lanes_beyond(road, sections, number, end, roads)
+            if beyond is None:
+                continue
+            for lane in _section_lanes(section):
+                for link in lane.all("link", end):
+                    if link.attrib.get("id") not in beyond:
+                        yield link
+
+
+def _lanes_beyond(
+    road: Element,
+    sections: Sequence[Element],
+    number: int,
+    end: str,
+    roads: Mapping[str, Element],
+) -> set[str | None] | None:
+    """Returns the numbers of the lanes beyond one end of a road's section.
+
+    Args:
+        road: the road.
+        sections: the road's lane sections, in their order along the road.
+        number: index of the section.
+        end: `predecessor` or `successor`.
+        roads: name of a road -> the road.
+
+    Returns:
+        The numbers as in the file. None beyond an end of the road that no
+        known road follows.
+    """
+    step = 1 if end == "successor" else -1
+    at = number + step
+    if 0 <= at < len(sections):
+        beside = [sections[at]]
+        # One side of a road may continue through sections of the other side.
+        while is_single_sided(sections[at]) and 0 < at < len(sections) - 1:
+            at += step
+            beside.append(sections[at])
+    else:
+        kind, linked = _link_at(road, end)
+        if kind != "road" or linked is None or linked not in roads:
+            return None
+        # The link names the end of the other road; some files omit it.
+        others = _lane_sections(roads[linked])
+        beside = others[:1] + others[-1:]
+    return {
+        lane.attrib.get("id")
+        for section in beside
+        for lane in _section_lanes(section)
+    }
+
+
+def _lane_sections(road: Element) -> list[Element]:
+    """Returns the sections of a road's lanes, sorted along the road."""
+    sections = road.all("lanes", "laneSection")
+    return sorted(sections, key=lambda section: section.number("s", 0.0))
+
+
+def _section_lanes(section: Element) -> Iterator[Element]:
+    """Yields the lanes of a section."""
+    for side in ("left", "center", "right"):
+        yield from section.all(side, "lane")
+
+
+def _count_unread(element: Element, faults: ImportFaults, name: str) -> None:
+    """Counts parts of an element that affect the roads but are not read.
+
+    `name` is the name of the road or junction that contains the element.
+    """
+    known = _KNOWN["elements"].get(element.tag)
+    for key, usual in _KNOWN["attributes"].get(element.tag, {}).items():
+        value = element.attrib.get(key)
+        with contextlib.suppress(TypeError, ValueError):
+            value = f"{float(value or ''):g}"
+        if value is not None and value not in usual:
+            faults.add(f"{key} of {element.tag}, not read", name)
+    for child in element.all("*"):
+        own = name
+        if child.tag in ("road", "junction"):
+            own = child.attrib.get("id", "")
+        if not child.attrib and not len(child):
+            continue
+        if known is not None and child.tag not in known:
+            faults.add(f"{child.tag} of {element.tag}, not read", own)
+        elif child.tag != "userData":
+            _count_unread(child, faults, own)

@@ -1,19 +1,20 @@
 """Builds a town on an imported road network."""
 
-from collections import Counter
-from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 import shapely
 from shapely import GEOSException
-from shapely.geometry import MultiLineString
+from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError, value_errors
-from cns_drake.base.polylines import distances_along
+from cns_drake.base.polylines import distances_along, length_of
 from cns_drake.base.progress import doing
 from cns_drake.city.generation.city_structures import (
     City,
@@ -30,17 +31,17 @@ from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.drives import search, steerable_drives
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
-from cns_drake.imports.opendrive import bridges
-from cns_drake.imports.opendrive.band_graph import BandGraph
+from cns_drake.imports.imported_objects import make_object
+from cns_drake.imports.opendrive.band_graph import BandGraph, usual_limit_of
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
 from cns_drake.imports.opendrive.lanes import (
+    LEAST_WIDTH,
     LaneBand,
     is_raised,
     lane_bands,
+    lane_class,
     lane_polygon,
 )
-from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_model import RoadMap
@@ -48,6 +49,10 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
 from cns_drake.imports.options import ImportOptions
 from cns_drake.scene.semantics import GROUND_CLASSES
+from cns_drake.traffic.lane_file import lane_text
+from cns_drake.traffic.lane_graph import Walkway
+from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
+from cns_drake.traffic.polylines import resampled
 
 # Height of sidewalks above the road if the file states none [m].
 _KERB_HEIGHT = 0.1
@@ -63,6 +68,32 @@ _BAY_LENGTHS = (5.8, 7.4)
 _TAKEN_SHARE = 0.6
 # Least width of a parking lane [m].
 _LEAST_PARKING = 1.9
+_SIDEWALKS = frozenset({"sidewalk", "walking"})
+# Least distance of pedestrians from the edges of a sidewalk [m].
+_FROM_EDGE = 0.45
+# Greatest distance of pedestrians from the middle of a sidewalk [m].
+_MOST_HALF_WIDTH = 1.05
+# There are no pedestrians where this distance would be smaller [m].
+_LEAST_HALF_WIDTH = 0.3
+# Least length of a sidewalk with pedestrians [m].
+_SHORTEST_WALKWAY = 5.0
+# The underside of a bridge is this far below its upper side [m].
+_DECK_DEPTH = np.array([0.0, 0.0, 0.8])
+# Triangles are dropped if twice their area is not greater than this [m^2].
+_LEAST_TWICE_AREA = 1e-6
+# How far the end of a bridge extends to both sides: wider than a kerb [m].
+_END_REACH = 0.2
+# A road at least this far above another one is a bridge [m].
+_HEADROOM = 3.0
+# Places are above one another if they are at most this far apart, as seen from
+# above [m].
+_ABOVE_WITHIN = 2.5
+# A bridge extends this far to both sides of the road that it crosses [m].
+_BRIDGE_REACH = 8.0
+# The arrays of a band, with one row for each place along the road.
+_ARRAYS = (
+    "inner", "outer", "middle", "heading", "roll", "grade", "rise", "s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -162,6 +193,68 @@ def _build(
     )
 
 
+def _bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
+    """Yields the structures of bridges: their upper sides and undersides.
+
+    `bands` contains the lanes on bridges.
+    """
+    of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
+    for band in bands:
+        # The sides of parts without a lane are closed as well.
+        semantic_class = lane_class(band.kind) or "other-ground"
+        left, right = band.inner, band.outer
+        if band.lane.number > 0:
+            left, right = right, left
+        upper = _triangles_between(right, left)
+        of_road[band.road.name, semantic_class].append(upper)
+        low_left, low_right = left - _DECK_DEPTH, right - _DECK_DEPTH
+        of_road[band.road.name, "other-structure"] += [
+            _triangles_between(low_left, low_right),
+            _triangles_between(low_right, right),
+            _triangles_between(left, low_left),
+        ]
+    for (road, semantic_class), pieces in of_road.items():
+        triangles = np.concatenate(pieces)
+        edges = np.cross(
+            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        )
+        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_TWICE_AREA]
+        if len(triangles):
+            yield make_object(
+                f"bridge_{road}_{semantic_class}",
+                semantic_class,
+                "Bridge",
+                {"deck": triangles},
+                {},
+            ).structure
+
+
+def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
+    """Returns narrow strips across the lanes at both ends of bridges, in W [m].
+
+    `bands` contains the lanes on bridges.
+    """
+    lines = [
+        LineString([band.inner[k, :2], band.outer[k, :2]])
+        for band in bands
+        for k in (0, -1)
+    ]
+    return shapely.union_all(lines).buffer(_END_REACH, cap_style="flat")
+
+
+def _triangles_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns triangles between two lines (N, 3).
+
+    The triangles look upwards if line `b` is to the left of line `a`.
+    """
+    return np.concatenate(
+        [
+            np.stack([a[:-1], a[1:], b[1:]], axis=1),
+            np.stack([a[:-1], b[1:], b[:-1]], axis=1),
+        ]
+    )
+
+
 class _TownStreets(NamedTuple):
     """The streets of a town, as the file determines them.
 
@@ -197,7 +290,7 @@ def _read_streets(
         bands = [band for road in roads.roads for band in lane_bands(road)]
     ground, raised = split_levels(bands)
     _count_raised_kerbs(raised, faults)
-    ends = bridges.bridge_ends(raised)
+    ends = bridge_ends(raised)
     on_ground = ImportedStreets(ground, ends)
     _check_extent(source, on_ground.areas.carriageway)
     return _TownStreets(
@@ -261,7 +354,7 @@ def _structures_of_file(
             "marks", streets.ground, streets.surface.heights, areas.carriageway
         )
         marks += road_marks("bridge_marks", raised)
-    return _StructuresOfFile(list(bridges.bridge_decks(raised)), things, marks)
+    return _StructuresOfFile(list(_bridge_decks(raised)), things, marks)
 
 
 def _city_along(
@@ -455,3 +548,116 @@ def _counts_by_kind(
         "plants, sampled at random": drawn["vegetation"],
     }
     return {kind: number for kind, number in kinds.items() if number}
+
+
+def lane_text_of_bands(
+    bands: Sequence[LaneBand], kerbs: KerbHeights
+) -> str | None:
+    """Returns the text of a lane file; None if there is no lane to drive on.
+
+    `bands` contains the lanes of the whole network, and `kerbs` the heights of
+    sidewalks above the road.
+    """
+    graph = BandGraph(bands)
+    lanes = [
+        DirectedLane(
+            line,
+            usual_limit_of([band]),
+            band.road.junction is not None,
+        )
+        for band, line in zip(graph.bands, graph.lines, strict=True)
+    ]
+    joined = join_lanes(lanes, graph.followers)
+    if not joined.pieces:
+        return None
+    sidewalks = [band for band in bands if band.lane.kind in _SIDEWALKS]
+    return lane_text(joined, _walkways(sidewalks, kerbs))
+
+
+def _walkways(bands: Sequence[LaneBand], kerbs: KerbHeights) -> list[Walkway]:
+    """Returns a walkway for each sidewalk; pedestrians turn at its ends."""
+    walkways: list[Walkway] = []
+    for band in bands:
+        half = min(float(band.width.min()) / 2 - _FROM_EDGE, _MOST_HALF_WIDTH)
+        length = length_of(band.middle)
+        if half < _LEAST_HALF_WIDTH or length < _SHORTEST_WALKWAY:
+            continue
+        first = 2 * len(walkways)
+        kerb = kerbs(band.middle[:, :2])
+        points = resampled(
+            np.column_stack([band.middle[:, :2], band.middle[:, 2] + kerb])
+        )
+        walkways.append(Walkway(points, half, first, first + 1))
+    return walkways
+
+
+def split_levels(
+    bands: Sequence[LaneBand],
+) -> tuple[list[LaneBand], list[LaneBand]]:
+    """Returns the lanes on the ground and the lanes on bridges.
+
+    A lane that leads onto a bridge is cut at the bridge's end.
+    """
+    raised = _raised_places(bands)
+    ground: list[LaneBand] = []
+    bridges: list[LaneBand] = []
+    for band in bands:
+        above = raised.get(band.road.name)
+        if above is None:
+            ground.append(band)
+            continue
+        low, high = np.searchsorted(
+            above, [band.s - _BRIDGE_REACH, band.s + _BRIDGE_REACH]
+        )
+        is_bridge = high > low
+        for run, carried in _stretches_of_one_level(is_bridge):
+            parts = {name: getattr(band, name)[run] for name in _ARRAYS}
+            level = bridges if carried else ground
+            level.append(replace(band, **parts))
+    return ground, bridges
+
+
+def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
+    """Returns where each road passes over another road.
+
+    The result maps the name of a road to increasing distances along it [m].
+    """
+    # Roads are numbered by one of their bands.
+    number_of = {band.road.name: number for number, band in enumerate(bands)}
+    rows = [np.zeros((0, 5))]
+    for band in bands:
+        wide = band.width > LEAST_WIDTH
+        for edge in (band.inner, band.middle, band.outer):
+            numbers = np.full(len(band.s), number_of[band.road.name])
+            rows.append(np.column_stack([edge, band.s, numbers])[wide])
+    places = np.concatenate(rows)
+    xy = places[:, :2]
+    z, s, number = places[:, 2:].T
+    if len(places) == 0 or np.ptp(z) < _HEADROOM:
+        return {}
+    tree = cKDTree(xy)
+    raised: dict[str, list[float]] = {}
+    high = np.flatnonzero(z > z.min() + _HEADROOM)
+    for place, near in zip(
+        high, tree.query_ball_point(xy[high], _ABOVE_WITHIN), strict=True
+    ):
+        is_below = z[near] < z[place] - _HEADROOM
+        if (is_below & (number[near] != number[place])).any():
+            road = bands[int(number[place])].road.name
+            raised.setdefault(road, []).append(float(s[place]))
+    return {road: np.unique(along) for road, along in raised.items()}
+
+
+def _stretches_of_one_level(
+    is_bridge: np.ndarray,
+) -> Iterator[tuple[slice, bool]]:
+    """Yields stretches of a lane with one level, and whether it is a bridge.
+
+    `is_bridge` (N,) says which places along the lane are on a bridge.
+    Neighbouring stretches share a place.
+    """
+    starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
+    for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
+        last = min(b + 1, len(is_bridge))
+        if last - a > 1:
+            yield slice(int(a), int(last)), bool(is_bridge[a])

@@ -6,22 +6,24 @@ https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 import re
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.trees import tree
+from cns_drake.imports import faces
+from cns_drake.imports.colours import WHITE_PAINT
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.foreign_city import ForeignCity
-from cns_drake.imports.imported_objects import ImportedObject
+from cns_drake.imports.imported_objects import ImportedObject, make_object
 from cns_drake.imports.openstreetmap import reading, streets
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, raised_object
 from cns_drake.imports.openstreetmap.bridges import (
@@ -36,7 +38,6 @@ from cns_drake.imports.openstreetmap.buildings import (
     make_buildings,
     standing_buildings,
 )
-from cns_drake.imports.openstreetmap.crossing_stripes import crossing_stripes
 from cns_drake.imports.openstreetmap.element_kinds import (
     is_building,
     was_building,
@@ -59,6 +60,7 @@ from cns_drake.imports.openstreetmap.tags import (
     length,
     tag_value,
 )
+from cns_drake.imports.openstreetmap.way_tags import is_tunnel, street_width
 from cns_drake.imports.solids import extruded
 from cns_drake.imports.streets import Street
 
@@ -76,6 +78,12 @@ _WALL_HEIGHT = 1.6
 _SEA_MARGIN = 60.0
 # Wider areas, such as whole countries, are refused [m].
 _WIDEST = 20_000.0
+# Width of the stripes of a zebra crossing, and of the gaps between them [m].
+_STRIPE_WIDTH = 0.5
+# Length of the stripes [m].
+_STRIPE_LENGTH = 3.0
+# Height of the stripes above the street [m].
+_STRIPE_HEIGHT = 0.01
 
 
 def import_openstreetmap(
@@ -131,7 +139,7 @@ def import_openstreetmap(
             passages=passages,
         ),
         *streets.street_surfaces(features, local, bridges),
-        *crossing_stripes(features, local),
+        *_crossing_stripes(features, local),
         *ground_areas(features, local, dressed),
         *sea(coasts, local, sea_limits, faults),
         *parapets(features.ways, bridges, local),
@@ -323,3 +331,64 @@ def _trees(
         trunk = Point(x, y).buffer(_TRUNK_RADIUS, quad_segs=2)
         walls, _ = extruded(trunk, 0.0, _TRUNK_HEIGHT, name, ImportFaults())
         yield ImportedObject(structure, "Tree", None, walls)
+
+
+def _crossing_stripes(
+    features: OsmFeatures, local: LocalMetres
+) -> Iterator[ImportedObject]:
+    """Yields the stripes of zebra crossings, slightly above their street."""
+    marked = {number for number, tags in features.crossings if is_marked(tags)}
+    for _, tags, line, nodes in features.ways:
+        width = street_width(tags)
+        if width is None or is_tunnel(tags):
+            continue
+        for k, number in enumerate(nodes):
+            if number not in marked:
+                continue
+            marked.remove(number)
+            places = local(line)
+            along = places[min(k + 1, len(nodes) - 1)] - places[max(k - 1, 0)]
+            if not along.any():
+                continue
+            stripes = _stripes(places[k], along / np.hypot(*along), width)
+            name = f"n{number}"
+            surface = [
+                faces.flat_surface(s, _STRIPE_HEIGHT, name, features.faults)
+                for s in stripes
+            ]
+            yield make_object(
+                f"crossing_{name}",
+                "road",
+                "Crossing",
+                {"stripes": np.concatenate(surface)},
+                {"stripes": WHITE_PAINT},
+            )
+
+
+def _stripes(
+    place: np.ndarray, along: np.ndarray, width: float
+) -> list[Polygon]:
+    """Returns the stripes across a street, around a place."""
+    left = np.array([-along[1], along[0]])
+    count = max(1, int((width - _STRIPE_WIDTH) / (2 * _STRIPE_WIDTH)))
+    middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE_WIDTH
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
+    return [
+        Polygon(
+            place
+            + np.outer(corners[:, 0] * _STRIPE_LENGTH, along)
+            + np.outer(corners[:, 1] * _STRIPE_WIDTH + middle, left)
+        )
+        for middle in middles
+    ]
+
+
+def is_marked(tags: Mapping[str, str]) -> bool:
+    """Returns whether a crossing is marked by stripes."""
+    markings = tags.get("crossing:markings")
+    if markings is not None:
+        return markings.startswith("zebra") or markings == "yes"
+    return (
+        tags.get("crossing") in ("zebra", "marked", "uncontrolled")
+        or tags.get("crossing_ref") == "zebra"
+    )

@@ -3,13 +3,12 @@
 https://wiki.openstreetmap.org/wiki/Map_features
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from cns_drake.imports.colours import LAWN, WATER, Rgb
 from cns_drake.imports.imported_objects import ImportedObject
 from cns_drake.imports.openstreetmap.area_looks import AreaLook, flat_object
 from cns_drake.imports.openstreetmap.features import OsmFeatures, Tags
-from cns_drake.imports.openstreetmap.ground_tags import area_kind, green_kind
 from cns_drake.imports.openstreetmap.local_metres import LocalMetres
 from cns_drake.imports.openstreetmap.tags import TABLES, has_tag
 from cns_drake.imports.openstreetmap.way_tags import is_tunnel, path_width
@@ -63,12 +62,12 @@ def ground_areas(
 
 def _plain_look(tags: Tags) -> AreaLook | None:
     """Returns the look of ground in a plain city; None for other areas."""
-    type_and_class = area_kind(tags)
+    type_and_class = _area_kind(tags)
     if type_and_class is None:
         return None
     object_type, semantic_class = type_and_class
     colours = {"WaterBody": WATER, "LandUse": LAWN}
-    kind = green_kind(tags) if object_type == "LandUse" else ""
+    kind = _green_kind(tags) if object_type == "LandUse" else ""
     return AreaLook(
         object_type,
         semantic_class,
@@ -108,4 +107,35 @@ def _pitch_look(tags: Tags) -> AreaLook:
     rgb = LAWN if is_grass else _SURFACE_COLOURS.get(surface or "", _TARTAN)
     return _PITCH._replace(
         rgb=rgb, semantic_class="terrain" if is_grass else "other-ground"
+    )
+
+
+def _area_kind(tags: Mapping[str, str]) -> tuple[str, str] | None:
+    """Returns the kind and the semantic class of an area on the ground.
+
+    The result is None for tags of anything else.
+    """
+    if tags.get("natural") == "water" or tags.get("waterway") in (
+        "riverbank",
+        "dock",
+    ):
+        return "WaterBody", "other-ground"
+    if tags.get("amenity") == "parking":
+        return "Parking", "parking"
+    if tags.get("highway") == "pedestrian" or tags.get("place") == "square":
+        return "Square", "other-ground"
+    if _green_kind(tags):
+        return "LandUse", "terrain"
+    return None
+
+
+def _green_kind(tags: Mapping[str, str]) -> str:
+    """Returns the kind of green land, such as `park`; "" if there is none."""
+    return next(
+        (
+            tags[key]
+            for key, values in TABLES["green"].items()
+            if tags.get(key) in values.split()
+        ),
+        "",
     )

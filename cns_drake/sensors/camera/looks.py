@@ -65,19 +65,17 @@ def _stones(
     across: int,
     rows: int,
     joint: tuple[float, float],
-    *,
-    lag: float = 0.0,
-    spread: float = 0.1,
+    spread: float,
 ) -> np.ndarray:
     """Returns a texture (N, N, 1) of rows of stones, each of random brightness.
 
     `across` and `rows` count the stones, and `joint` contains the width and the
     brightness of the joints between the stones. Every other row is shifted by
-    `lag` stones. The standard deviation of the stones' brightness is `spread`.
+    half a stone. The standard deviation of the stones' brightness is `spread`.
     """
     y, x = np.indices((_SIDE, _SIDE)) / _SIDE
     row = (y * rows).astype(int)
-    place = x * across + lag * (row % 2)
+    place = x * across + 0.5 * (row % 2)
     stones = 1.0 + spread * rng.normal(size=(rows, across))
     shade = stones[row, place.astype(int) % across]
     edge = np.minimum((place % 1) / across, (y * rows % 1) / rows) < joint[0]
@@ -212,11 +210,11 @@ LOOKS = {
     "signals": Look(1.0, _signals, 0.6, True),
     "asphalt": Look(6.0, _asphalt),
     "paving": Look(
-        4.8, lambda rng: _stones(rng, 8, 8, (0.004, 0.6), lag=0.5, spread=0.06)
+        4.8, lambda rng: _stones(rng, 8, 8, (0.004, 0.6), spread=0.06)
     ),
     "brick": Look(
         2.25,
-        lambda rng: _stones(rng, 9, 30, (0.0055, 1.5), lag=0.5, spread=0.2),
+        lambda rng: _stones(rng, 9, 30, (0.0055, 1.5), spread=0.2),
     ),
     "grass": Look(5.0, _grass),
     "plaster": Look(9.0, _plaster),

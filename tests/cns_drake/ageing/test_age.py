@@ -10,14 +10,12 @@ import pytest
 from scipy.stats import poisson
 import shapely
 
-from cns_drake.ageing.aged_map import age_map
-from cns_drake.ageing.ageing_city import AgeingCity
+from cns_drake.ageing.aged_map import AgeingCity, age_map, past_structures
+from cns_drake.ageing.alterations import horizontal_section
 from cns_drake.ageing.old_world import OldWorld
-from cns_drake.ageing.past_city import past_structures
 from cns_drake.ageing.rates import (
     DEFAULT_RATES,
 )
-from cns_drake.ageing.sections import horizontal_section
 from cns_drake.ageing.standing_structures import structure_triangles
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.ageing.sections import greatest_y, horizontal_section
+from cns_drake.ageing.alterations import greatest_y, horizontal_section
 
 
 def test_section_of_a_roof():

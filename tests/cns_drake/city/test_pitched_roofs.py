@@ -9,7 +9,7 @@ from cns_drake.city.facades import outlines, roofs
 from cns_drake.city.facades.reliefs import Patch
 
 LINES = {
-    "gable": roofs.gable_line(2.0, 10.0, 5.0, 8.0, ridge=0.3),
+    "gable": roofs.gable_line(2.0, 10.0, 5.0, 8.0),
     "gambrel": roofs.gambrel_line(2.0, 10.0, 5.0, 8.0),
     "barrel": roofs.barrel_line(2.0, 10.0, 5.0, 8.0),
 }

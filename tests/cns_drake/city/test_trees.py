@@ -8,7 +8,7 @@ import pytest
 from cns_drake.city.geometry.models import MeshShape
 from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.city.plants.trees import SPECIES, STREET_TREES, mesh_names
+from cns_drake.city.plants.trees import SPECIES, mesh_names
 
 VARIANTS = [
     (name, variant)
@@ -50,7 +50,7 @@ def test_height_is_as_asked(name):
             assert top == pytest.approx(height, abs=0.01)
 
 
-@pytest.mark.parametrize("name", STREET_TREES)
+@pytest.mark.parametrize("name", sorted(SPECIES.keys() - {"spruce", "willow"}))
 def test_people_can_walk_under_street_trees(name):
     low, high = SPECIES[name].height_range
     for seed, height in itertools.product(range(10), (low, high)):

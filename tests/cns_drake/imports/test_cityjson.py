@@ -2,17 +2,37 @@
 
 import json
 
-from helpers.imported_cityjson import area, structures, volume
 from helpers.small_cityjson import CityWriter
 import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.imports.cityjson import geometries
-from cns_drake.imports.cityjson.reading import read_cityjson
-from cns_drake.imports.cityjson.vertices import to_triples
+from cns_drake.imports.cityjson import reading
+from cns_drake.imports.cityjson.city import import_objects
+from cns_drake.imports.cityjson.reading import read_cityjson, to_triples
 from cns_drake.imports.drives.free_space import find_free_space
 from cns_drake.imports.ground import ground_of
+
+ORIGIN = np.array([85000.0, 446000.0, 3.0])
+
+
+def structures(path, **options):
+    city = read_cityjson(path)
+    values = {"lod": None, "year_attribute": None} | options
+    return city, {
+        one.structure.name: one
+        for one in import_objects(city, ORIGIN, **values)
+    }
+
+
+def area(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def volume(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
 
 
 @pytest.mark.parametrize("version", ["1.0", "1.1", "2.0"])
@@ -168,7 +188,7 @@ def test_features_share_the_templates_of_their_file(tmp_path, monkeypatch):
             read.append(where)
         return to_triples(values, where)
 
-    monkeypatch.setattr(geometries, "to_triples", counted)
+    monkeypatch.setattr(reading, "to_triples", counted)
     city = CityWriter()
     shape = {"type": "MultiSurface", "lod": 2, "boundaries": [[[0, 1, 2]]]}
     corners = [[0, 0, 0], [2, 0, 0], [0, 2, 0]]

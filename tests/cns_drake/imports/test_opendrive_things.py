@@ -11,10 +11,9 @@ from shapely.geometry import LineString, box
 from cns_drake.base.errors import InputError
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.lanes import lane_bands
-from cns_drake.imports.opendrive.levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.things import thing_structures
-from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.opendrive.town import build_town, split_levels
 from cns_drake.imports.options import ImportOptions
 
 SIGNS = """<signals>

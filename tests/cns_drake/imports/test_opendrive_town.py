@@ -29,11 +29,10 @@ from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.faults import ImportFaults
 from cns_drake.imports.opendrive.band_graph import BandGraph
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
-from cns_drake.imports.opendrive.lane_traffic import lane_text_of_bands
 from cns_drake.imports.opendrive.lanes import lane_bands, lane_polygon
 from cns_drake.imports.opendrive.road_heights import KerbHeights, RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
-from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.opendrive.town import build_town, lane_text_of_bands
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.options import ImportOptions
 from cns_drake.imports.report import REPORT_NAME

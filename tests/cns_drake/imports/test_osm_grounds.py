@@ -4,8 +4,8 @@ from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 
-from cns_drake.imports.dressing.lane_marks import lane_marks
-from cns_drake.imports.dressing.parked_cars import may_park_on
+from cns_drake.imports.dressing.dressed_city import lane_marks
+from cns_drake.imports.dressing.street_dressing import may_park_on
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.imports.streets import Street

@@ -11,7 +11,7 @@ from cns_drake.city.geometry.models import (
     Part,
     SphereShape,
 )
-from cns_drake.imports.dressing.round_parts import without_curves
+from cns_drake.imports.dressing.street_room import without_curves
 
 
 def volume(mesh, scale):

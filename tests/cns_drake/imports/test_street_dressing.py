@@ -16,9 +16,11 @@ from cns_drake.city.geometry.object_models import HEADROOM
 from cns_drake.city.ground.coverings import GROUND_TAG
 from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.dressing import dressed_city
-from cns_drake.imports.dressing.dressed_city import dress_city
-from cns_drake.imports.dressing.kerbs import with_kerb
-from cns_drake.imports.dressing.missing_sidewalks import missing_sidewalks
+from cns_drake.imports.dressing.dressed_city import (
+    dress_city,
+    missing_sidewalks,
+    with_kerb,
+)
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import ground_of, ground_structures

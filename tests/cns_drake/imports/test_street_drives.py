@@ -9,8 +9,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.drives.steerable_drives import driven_path
 from cns_drake.imports.drives.street_graph import lane_links, make_lanes
 from cns_drake.imports.import_map import import_city
-from cns_drake.imports.openstreetmap.city import import_openstreetmap
-from cns_drake.imports.openstreetmap.crossing_stripes import is_marked
+from cns_drake.imports.openstreetmap.city import import_openstreetmap, is_marked
 from cns_drake.imports.openstreetmap.way_tags import (
     driven_directions,
     lanes_beside,

@@ -8,8 +8,8 @@ import shapely
 from shapely.geometry import LineString, box
 
 from cns_drake.imports.cityjson.city import import_cityjson
+from cns_drake.imports.dressing.dressed_city import paved_gaps
 from cns_drake.imports.dressing.guessed_streets import guessed_streets
-from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.drives.steerable_drives import WaypointRoute
 from cns_drake.imports.ground import ground_of
 from cns_drake.imports.openstreetmap.city import import_openstreetmap

@@ -23,7 +23,7 @@ from cns_drake.motion.suspension_data import (
     load_suspension_rates,
 )
 from cns_drake.motion.trajectory import Trajectory, poses_and_motion
-from cns_drake.motion.wheel_motion import WheelMotion
+from cns_drake.motion.vehicle_motion import WheelMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cns_drake.motion.trajectory import Trajectory
-from cns_drake.motion.wheel_motion import WheelMotion
+from cns_drake.motion.vehicle_motion import WheelMotion
 
 
 def test_wheels_of_a_steady_bend_roll_on_circles():

@@ -8,8 +8,12 @@ from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.pictures.drive_record import DriveRecord
-from cns_drake.pictures.motion_plots import TimePlot, motion_plots
-from cns_drake.pictures.page_panel import ShownStages, make_panel
+from cns_drake.pictures.page_panel import (
+    ShownStages,
+    TimePlot,
+    make_panel,
+    motion_plots,
+)
 
 
 def points(plot):

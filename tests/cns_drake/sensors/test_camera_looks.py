@@ -11,7 +11,7 @@ import pytest
 
 from cns_drake.scene.materials import MATERIALS
 from cns_drake.sensors.camera import gltf_mesh, looks, sky
-from cns_drake.sensors.camera.texture_coordinates import (
+from cns_drake.sensors.camera.gltf_mesh import (
     face_coordinates,
     repeated_coordinates,
 )

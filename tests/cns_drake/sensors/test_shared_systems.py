@@ -14,8 +14,8 @@ import pytest
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.sensors.imu.imu import NoisyImu
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
-from cns_drake.sensors.imu.noisy_imu import NoisyImu
 from cns_drake.sensors.imu.vehicle_imu import VehicleImu
 
 FILES = ("/vehicle_motion.py", "/imu.py", "/noise.py")

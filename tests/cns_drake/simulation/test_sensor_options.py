@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform
 import pytest
 from scipy.special import lambertw
 
+from cns_drake.drives.deskewing import deskew
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import DrivePlan, plan_drive
 from cns_drake.scenarios.scenario_files import make_scenario
@@ -19,7 +20,6 @@ from cns_drake.simulation.loaded_drive import load_drive
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import make_station
 from evaluation.drives import open_drive
-from evaluation.drives.deskewing import deskew
 
 # A tilted sensor off the vehicle's middle, so that no transform is trivial.
 MOUNT = {"xyz": [1.2, -0.4, 1.7], "rpy_deg": [3.0, -2.0, 40.0]}

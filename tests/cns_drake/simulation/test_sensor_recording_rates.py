@@ -13,9 +13,8 @@ from pydrake.systems.framework import DiagramBuilder
 import pytest
 
 from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.sensors.imu.imu import add_imu
+from cns_drake.sensors.imu.imu import NoisyImu, add_imu
 from cns_drake.sensors.imu.noise import ImuErrors, ImuNoise
-from cns_drake.sensors.imu.noisy_imu import NoisyImu
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.sensors.odometry.odometry import add_odometry

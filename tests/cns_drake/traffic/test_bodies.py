@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 from cns_drake.base.errors import InputError
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import MAX_INSTANCE
-from cns_drake.traffic.body_states import bodies_at
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_motion import (
     WALKER_SIZE,
+    bodies_at,
     make_traffic,
     traffic_structures,
 )

@@ -15,10 +15,9 @@ from cns_drake.scenarios.sections import DriverConfig, TrafficConfig
 from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic.ego_car import STEP, EgoBox
-from cns_drake.traffic.follower import Follower
+from cns_drake.traffic.follower import Follower, find_runs
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.occupants import find_occupants
-from cns_drake.traffic.path_runs import find_runs
 from cns_drake.traffic.streets import make_streets
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
 from cns_drake.traffic.vehicle_records import (

@@ -14,16 +14,14 @@ from cns_drake.sensors.lidar.adding import connect_lidar
 from cns_drake.sensors.lidar.lidar import Lidar
 from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.body_states import (
-    MOVING_SPEED,
-    BodyStates,
-    LimbTable,
-    bodies_at,
-)
 from cns_drake.traffic.tracks import Tracks
 from cns_drake.traffic.traffic_motion import (
+    MOVING_SPEED,
     WALKER_SIZE,
+    BodyStates,
+    LimbTable,
     add_traffic,
+    bodies_at,
     connect_traffic,
     make_traffic,
     traffic_structures,

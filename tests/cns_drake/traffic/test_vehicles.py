@@ -9,8 +9,8 @@ from cns_drake.traffic.car_following import (
     interaction,
 )
 from cns_drake.traffic.streets import PIECE, Streets
+from cns_drake.traffic.traffic_trial import vehicle_poses
 from cns_drake.traffic.vehicle_kinds import STANDSTILL_GAP
-from cns_drake.traffic.vehicle_poses import vehicle_poses
 from cns_drake.traffic.vehicle_records import CURRENT, VEHICLE
 
 # Wanted speed [m/s], headway [s], acceleration and deceleration [m/s^2].

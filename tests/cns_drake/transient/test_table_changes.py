@@ -5,7 +5,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.scene.labels import MAX_INSTANCE
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.transient.table_changes import TableChanges
+from cns_drake.transient.scene_editing import TableChanges
 
 
 @pytest.fixture

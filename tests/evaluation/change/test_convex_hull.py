@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.change.convex_hull import in_convex_hull
+from evaluation.change.tcr import in_convex_hull
 
 CUBE = np.array(
     [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)]

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.drives.deskewing import deskew
 from evaluation.drives import open_drive
-from evaluation.drives.deskewing import deskew
 
 NUM = 200
 # A turn takes 100 ms, in which the vehicle drives 1 m.

@@ -5,8 +5,8 @@ import shutil
 
 from helpers import eval_program
 from helpers.eval_program import run_program
-from helpers.map_pairs import GROUND, WALL, labelled_drive, wall_at
-from helpers.small_map import box_visual, scenario_values
+from helpers.small_map import box_visual, scenario_values, world_text
+from helpers.tiny_drive import tiny_scenario
 import numpy as np
 import pytest
 import yaml
@@ -16,9 +16,13 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.sensors.lidar.beam_coverage import BeamCoverage
-from cns_drake.simulation.simulated_drive import SimulationSource
+from cns_drake.simulation.simulated_drive import (
+    SimulatedDrive,
+    SimulationSource,
+)
 from cns_drake.studies.ground_truth.exact_labels import NEAR, is_there
 from cns_drake.studies.ground_truth.labelled_drive import (
+    LabelledDrive,
     open_labelled,
     simulate_labelled,
 )
@@ -28,10 +32,35 @@ from evaluation.map_update.labels import Label
 from evaluation.map_update.scores import score
 from evaluation.map_update.sessions import read_pair, read_truth
 
+GROUND = box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (200, 200, 1))
+# Its front is 10 m to the left of the drive.
+WALL = box_visual("wall/body", (0, 15.5, 3, 0, 0, 0), (30, 1, 6))
 HOUSE = box_visual("house/body", (-6, 30, 2, 0, 0, 0), (8, 1, 4))
 HALL = box_visual("hall/body", (25, -5, 3, 0, 0, 0), (8, 6, 6))
 # It hides the house from all of the drive.
 SCREEN = box_visual("screen/body", (-6, 14, 5, 0, 0, 0), (40, 0.2, 12))
+
+
+def wall_at(offset):
+    """The wall, farther from the drive by an offset [m]."""
+    return box_visual("wall/body", (0, 15.5 + offset, 3, 0, 0, 0), (30, 1, 6))
+
+
+def labelled_drive(folder, visuals, frames=40, **lidar):
+    """The drive of `tiny_scenario` in a world of these visuals, simulated."""
+    folder.mkdir(parents=True)
+    world = folder / "world.sdf"
+    world.write_text(world_text(visuals))
+    config = {"preset": "vlp-16", "columns": 720} | lidar
+    scenario = tiny_scenario(
+        folder,
+        world=str(world),
+        name=folder.name,
+        lidars={"lidar": config},
+        frames=frames,
+    )
+    simulated = SimulatedDrive(scenario)
+    return LabelledDrive(simulated, simulated, scenario)
 
 
 def label(tmp_path, before, after, **options):
