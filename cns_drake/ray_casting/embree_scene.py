@@ -21,7 +21,6 @@ from cns_drake.ray_casting.capsule_axes import CapsuleAxes
 from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
-    PROXY,
     PROXY_OWNER,
     SOLID,
     merge_first,
@@ -74,27 +73,21 @@ class EmbreeScene:
         """Moves all groups to their current poses."""
         self._first.place(placed)
 
-    def cast_rays(
-        self, rays: Rays, with_normals: bool, solid: int = SOLID
-    ) -> Hits:
+    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on the scene; returns the hits.
 
         Args:
             rays: the rays.
             with_normals: whether to find normals as well.
-            solid: shapes that rays can hit: flat and curved shapes (`SOLID`),
-                or only curved shapes (`CURVED`).
         """
-        hits = self._first.cast(
-            rays, mask=solid | PROXY, with_normals=with_normals
-        )
+        hits = self._first.cast(rays, with_normals=with_normals)
         if self._second.rows:
-            self._cast_on_curved_shapes(rays, hits, with_normals, solid)
+            self._cast_on_curved_shapes(rays, hits, with_normals)
         self._axes.cast(rays, hits)
         return hits
 
     def _cast_on_curved_shapes(
-        self, rays: Rays, hits: Hits, with_normals: bool, solid: int
+        self, rays: Rays, hits: Hits, with_normals: bool
     ) -> None:
         """Updates hits of rays that may meet curved shapes that never move."""
         is_near = self._proxies.contain(rays.p_OSset)
@@ -109,7 +102,7 @@ class EmbreeScene:
             reach = np.minimum(in_second.ranges, rest.max_ranges)
             in_first = self._first.cast(
                 rest._replace(max_ranges=reach),
-                mask=solid,
+                mask=SOLID,
                 with_normals=with_normals,
             )
             is_first = in_first.owner >= 0

@@ -30,7 +30,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
     RayHits,
-    cast_exact_rays,
+    cast_free_rays,
     geometry_ids,
 )
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
@@ -397,7 +397,7 @@ class Lidar(LeafSystem):
         seen = self._eval_all(context)
         # The time of the output.
         time = float(self.causal)
-        return cast_exact_rays(seen, p_WR, d_W, max_range, time)
+        return cast_free_rays(seen, p_WR, d_W, max_range, time)
 
     def _check_context(self, context: Context) -> None:
         """Checks that a Context belongs to this LiDAR.
