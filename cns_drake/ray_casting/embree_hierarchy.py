@@ -42,14 +42,16 @@ _NO_TURN = np.eye(3)[None]
 # Embree treats smaller direction components as positive, whatever their sign. A
 # packet that mixes such rays with rays of truly positive components loses hits.
 _TINY = 1e-18
-# Hits on triangles are right if single precision moves them by less than this
-# [m]: a step of the coordinates that a LiDAR stores by default.
-TOLERANCE = 2.0**-10
+# Hits on triangles are right if their ranges are wrong by less than this [m]:
+# two steps of the coordinates that a LiDAR stores by default.
+_TOLERANCE = 2.0**-9
+# Points are on a triangle if they are at most this far away [m].
+_GAP = 2.0**-11
 # Typical error of a coordinate in single precision, as a share of the distances
 # from which the coordinate follows. With it, the error that is expected of a
-# range is less than `TOLERANCE` only if the true error is (measured; see
+# range is less than `_TOLERANCE` only if the true error is (measured; see
 # `test_doubtful_hits.py`).
-_ROUNDING = 2.0**-27
+_ROUNDING = 2.0**-26
 # Lateral distance between rays that ask for the same hit, as a share of the
 # distances from which their coordinates follow: some roundings.
 _ASIDE = 2.0**-20
@@ -283,7 +285,7 @@ class EmbreeHierarchy:
         rays: Rays,
         mask: int,
         with_normals: bool,
-        tolerance: float = TOLERANCE,
+        tolerance: float = _TOLERANCE,
     ) -> Hits:
         """Casts rays in single precision.
 
@@ -328,31 +330,28 @@ class EmbreeHierarchy:
         doubtful = np.flatnonzero(hits.doubt != CERTAIN)
         if not len(doubtful):
             return doubtful
-        near = rays.select(doubtful, hits.ranges[doubtful])
         corners, _ = self._find_corners(
-            hits.group[doubtful], hits.doubt[doubtful], near.times
+            hits.group[doubtful],
+            hits.doubt[doubtful],
+            rays.times[doubtful % len(rays.times)],
         )
-        d, ranges = near.d_Oset(), np.empty(len(doubtful))
-        _meet(corners, near.p_OSset, d, ranges)
-        error = np.abs(ranges - near.max_ranges)
-        beside = np.flatnonzero(np.isinf(ranges))
-        points = near.p_OSset + near.max_ranges[:, None].astype(float) * d
-        error[beside] = _distances(corners[beside], points[beside])
-        return doubtful[error > TOLERANCE]
+        return doubtful[_are_wrong(rays, hits.ranges, doubtful, corners)]
 
     def _find_wrong_misses(
         self, rays: Rays, mask: int, hits: Hits
     ) -> np.ndarray:
         """Returns the indices of misses that rays on either side contradict.
 
-        Only a miss between two successive hits is examined, because a ray that
-        passes through a vertex is alone.
+        Only a miss between two successive hits on one geometry is examined (and
+        the miss of a ray that is cast alone): among other rays, a ray that
+        passes through a vertex is the only one.
         """
-        has_hit = hits.owner != -1
-        missed = ~has_hit
-        missed[1:] &= has_hit[:-1]
-        missed[:-1] &= has_hit[1:]
-        rows = np.flatnonzero(missed)
+        owner = hits.owner
+        rows = 1 + np.flatnonzero(
+            (owner[1:-1] == -1) & (owner[:-2] == owner[2:]) & (owner[2:] != -1)
+        )
+        if len(owner) == 1:
+            rows = np.flatnonzero(owner == -1)
         for angle in (_TURN_ASIDE, -_TURN_ASIDE):
             if len(rows):
                 near = rays.select(rows, rays.max_ranges_of(rows))
@@ -389,7 +388,7 @@ class EmbreeHierarchy:
         for _ in range(_MOST_LAYERS):
             ray = lanes // len(_BUNDLE)
             starts = p_set[lanes] + begins[lanes, None] * d_set[lanes]
-            reach = best[ray] + TOLERANCE - begins[lanes]
+            reach = best[ray] + _TOLERANCE - begins[lanes]
             found = self._cast(
                 Rays(
                     starts,
@@ -411,9 +410,7 @@ class EmbreeHierarchy:
             corners, corners_L = self._find_corners(
                 found.group[flat], found.doubt[flat], times[ray[flat]]
             )
-            met = np.empty(len(flat))
-            _meet(corners, p[ray[flat]], d[ray[flat]], met)
-            ranges[flat] = met
+            ranges[flat] = _meet_each(corners, p[ray[flat]], d[ray[flat]])
             found.normals[flat] = np.cross(
                 corners_L[:, 1] - corners_L[:, 0],
                 corners_L[:, 2] - corners_L[:, 0],
@@ -672,79 +669,117 @@ def _cast_packets(
 
 
 @compiled
-def _meet(
-    corners: np.ndarray, p: np.ndarray, d: np.ndarray, ranges: np.ndarray
-) -> None:
-    """Sets the range at which each of N rays meets a triangle of its own.
+def _are_wrong(
+    rays: Rays, ranges: np.ndarray, rows: np.ndarray, corners: np.ndarray
+) -> np.ndarray:
+    """Returns which of M hits on triangles are wrong in double precision.
+
+    If a ray passes its triangle, its hit is right if the point is on the
+    triangle all the same.
+
+    Args:
+        rays: the N rays.
+        ranges: (N,) ranges at which they were found to hit [m].
+        rows: (M,) indices of the rays that are examined.
+        corners: (M, 3, 3) corners of the triangle that each one hit [m].
+    """
+    wrong = np.empty(len(rows), np.bool_)
+    d, q = np.empty(3), np.empty(3)
+    for k in range(len(rows)):
+        row = rows[k]
+        p = rays.p_OSset[row % len(rays.p_OSset)]
+        R = rays.R_OSset[row % len(rays.R_OSset)]
+        d_S = rays.d_Sset[row]
+        for i in range(3):
+            d[i] = R[i, 0] * d_S[0] + R[i, 1] * d_S[1] + R[i, 2] * d_S[2]
+            q[i] = p[i] + np.float64(ranges[row]) * d[i]
+        distance = _meet(corners[k], p, d)
+        if distance < np.inf:
+            wrong[k] = abs(distance - ranges[row]) > _TOLERANCE
+        else:
+            wrong[k] = _distance(corners[k], q) > _GAP
+    return wrong
+
+
+@compiled
+def _meet(c: np.ndarray, p: np.ndarray, d: np.ndarray) -> float:
+    """Returns the range at which a ray meets a triangle; inf for a miss [m].
 
     After Moeller and Trumbore (1997), with a tolerance at edges.
 
     Args:
-        corners: (N, 3, 3) corners of the triangles [m].
-        p: (N, 3) origins [m].
-        d: (N, 3) unit directions.
-        ranges: (N,) the result [m], inf for a miss.
+        c: (3, 3) corners of the triangle [m].
+        p: (3,) origin [m].
+        d: (3,) unit direction.
     """
     a, b, s, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for k in range(len(corners)):
-        c = corners[k]
-        ranges[k] = np.inf
-        longest = far = det = 0.0
-        for i in range(3):
-            a[i], b[i] = c[1, i] - c[0, i], c[2, i] - c[0, i]
-            s[i] = p[k, i] - c[0, i]
-            longest += abs(a[i]) + abs(b[i])
-            far += abs(s[i])
-        for i in range(3):
-            j, m = (i + 1) % 3, (i + 2) % 3
-            n[i] = a[j] * b[m] - a[m] * b[j]
-            det -= n[i] * d[k, i]
-        rounding = _ROUNDING_TOLERANCE * longest * far
-        # In the plane of the triangle, as far as numbers tell: the ray meets
-        # the edge of a neighbour instead.
-        if rounding >= _LARGEST_ERROR * abs(det):
-            continue
-        distance = (n[0] * s[0] + n[1] * s[1] + n[2] * s[2]) / det
-        u = v = 0.0
-        for i in range(3):
-            j, m = (i + 1) % 3, (i + 2) % 3
-            across = s[j] * d[k, m] - s[m] * d[k, j]
-            u += b[i] * across
-            v -= a[i] * across
-        slack = _EDGE_TOLERANCE * abs(det) + rounding
-        if det < 0.0:
-            u, v = -u, -v
-        if u >= -slack and v >= -slack and u + v <= abs(det) + slack:
-            ranges[k] = distance if distance > 0.0 else np.inf
+    longest = far = det = 0.0
+    for i in range(3):
+        a[i], b[i], s[i] = c[1, i] - c[0, i], c[2, i] - c[0, i], p[i] - c[0, i]
+        longest += abs(a[i]) + abs(b[i])
+        far += abs(s[i])
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        n[i] = a[j] * b[m] - a[m] * b[j]
+        det -= n[i] * d[i]
+    rounding = _ROUNDING_TOLERANCE * longest * far
+    # In the plane of the triangle, as far as numbers tell: the ray meets the
+    # edge of a neighbour instead.
+    if rounding >= _LARGEST_ERROR * abs(det):
+        return np.inf
+    u = v = 0.0
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        across = s[j] * d[m] - s[m] * d[j]
+        u += b[i] * across
+        v -= a[i] * across
+    slack = _EDGE_TOLERANCE * abs(det) + rounding
+    if det < 0.0:
+        u, v = -u, -v
+    if min(u, v, abs(det) - u - v) < -slack:
+        return np.inf
+    distance = (n[0] * s[0] + n[1] * s[1] + n[2] * s[2]) / det
+    return distance if distance > 0.0 else np.inf
 
 
 @compiled
-def _distances(corners: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Returns the distance (N,) of each point from a triangle of its own [m].
+def _meet_each(corners: np.ndarray, p: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Returns the ranges of N rays on a triangle each; see `_meet`."""
+    ranges = np.empty(len(corners))
+    for k in range(len(corners)):
+        ranges[k] = _meet(corners[k], p[k], d[k])
+    return ranges
+
+
+@compiled
+def _distance(c: np.ndarray, q: np.ndarray) -> float:
+    """Returns the distance of a point q (3,) from a triangle [m].
 
     Args:
-        corners: (N, 3, 3) corners of the triangles [m].
-        q: (N, 3) points [m].
+        c: (3, 3) corners of the triangle [m].
+        q: (3,) the point [m].
     """
-    distances = np.empty(len(q))
-    for k in range(len(q)):
-        nearest = np.inf
-        is_inside = True
-        c = corners[k]
-        n = np.cross(c[1] - c[0], c[2] - c[0])
-        square = np.dot(n, n)
+    nearest = height = np.inf
+    is_inside = True
+    n = np.cross(c[1] - c[0], c[2] - c[0])
+    square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
+    for k in range(3):
+        edge, away = c[(k + 1) % 3] - c[k], q - c[k]
+        side = np.cross(edge, away)
+        over = length = inward = 0.0
         for i in range(3):
-            edge, away = c[(i + 1) % 3] - c[i], q[k] - c[i]
-            if np.dot(np.cross(edge, away), n) < 0.0:
-                is_inside = False
-            length = np.dot(edge, edge)
-            part = np.dot(away, edge) / length if length > 0.0 else 0.0
-            away = away - min(max(part, 0.0), 1.0) * edge
-            nearest = min(nearest, np.sqrt(np.dot(away, away)))
-        if is_inside and square > 0.0:
-            nearest = abs(np.dot(q[k] - c[0], n)) / np.sqrt(square)
-        distances[k] = nearest
-    return distances
+            inward += side[i] * n[i]
+            over += edge[i] * away[i]
+            length += edge[i] * edge[i]
+        is_inside = is_inside and inward >= 0.0
+        part = min(max(over / length, 0.0), 1.0) if length > 0.0 else 0.0
+        gap = away - part * edge
+        gap_square = gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2]
+        nearest = min(nearest, np.sqrt(gap_square))
+        height = abs(away[0] * n[0] + away[1] * n[1] + away[2] * n[2])
+    if is_inside and square > 0.0:
+        return height / np.sqrt(square)
+    return nearest
 
 
 def _move_aside(

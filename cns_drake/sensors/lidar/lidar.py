@@ -377,10 +377,10 @@ class Lidar(LeafSystem):
     ) -> RayHits:
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
-        The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
-        to 1e-4 m for rays that start within 1 km of the LiDAR. Hits on
-        triangles are computed in double precision, hits on half spaces and on
-        curved shapes in single precision.
+        The rays do not depend on the LiDAR's pattern or noise, but are cast as
+        beams are. For rays that start within 1 km of the LiDAR, ranges are
+        exact to 2e-3 m. A ray that passes an edge within 1e-4 m, measured
+        across the ray, can end on either side of it.
 
         Args:
             context: context of the LiDAR.

@@ -27,9 +27,10 @@ from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.patterns import DirectionPattern
 
 SLOPE = RollPitchYaw(0.3, 0.4, 0.5)
-# What docs/drake.md promises: error of a range, and distance from an edge at
-# which a beam may pass on either side [m].
-ERROR, BESIDE = 1e-3, 1e-4
+# What docs/drake.md promises: error of a range, distance of a point from its
+# triangle, and distance from an edge at which a beam may pass on either side
+# [m].
+ERROR, GAP, BESIDE = 2e-3, 1e-3, 1e-4
 
 
 class Scene:
@@ -178,12 +179,12 @@ def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
         expected, beside, is_inside = meet_triangle(p, d, corners)
         met = np.isfinite(ranges)
         points = p + ranges[met, None] * d[met]
-        assert distance_from(points, corners).max(initial=0.0) < ERROR
+        assert distance_from(points, corners).max(initial=0.0) < GAP
         is_sure = beside > BESIDE
         np.testing.assert_array_equal(met[is_sure], is_inside[is_sure])
         is_sure &= is_inside
         np.testing.assert_allclose(
-            ranges[is_sure], expected[is_sure], rtol=0.0, atol=1.5 * ERROR
+            ranges[is_sure], expected[is_sure], rtol=0.0, atol=ERROR
         )
         sure += is_sure.sum()
         grazing += met.sum()
