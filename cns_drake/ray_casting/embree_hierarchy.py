@@ -693,11 +693,11 @@ def _are_wrong(
         for i in range(3):
             d[i] = R[i, 0] * d_S[0] + R[i, 1] * d_S[1] + R[i, 2] * d_S[2]
             q[i] = p[i] + np.float64(ranges[row]) * d[i]
-        distance = _meet(corners[k], p, d)
-        if distance < np.inf:
-            wrong[k] = abs(distance - ranges[row]) > _TOLERANCE
+        error = abs(_meet(corners[k], p, d) - ranges[row])
+        if _TOLERANCE < error < np.inf:
+            wrong[k] = True
         else:
-            wrong[k] = _distance(corners[k], q) > _GAP
+            wrong[k] = error > _GAP and _distance(corners[k], q) > _GAP
     return wrong
 
 
