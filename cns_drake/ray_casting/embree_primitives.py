@@ -22,12 +22,9 @@ from cns_drake.scene.surfaces import (
     merge_triangles,
 )
 
-# Masks of geometry: triangles, curved shapes, polyhedra around curved shapes;
-# what rays hit (without these polyhedra), and all.
-FLAT = 1
-CURVED = 2
-PROXY = 4
-SOLID = FLAT | CURVED
+# Masks of geometry: what rays hit; polyhedra around curved shapes; and all.
+SOLID = 1
+PROXY = 2
 ALL = SOLID | PROXY
 # Owner of the primitives of proxies.
 PROXY_OWNER = -2
@@ -46,13 +43,15 @@ class Primitives(NamedTuple):
         buffers: slot, format and array of each buffer.
         owners: (P,) int32 for each primitive, the number of its member in the
             group.
-        mask: `FLAT`, `CURVED`, or `PROXY` for polyhedra around curved shapes.
+        mask: `SOLID`, or `PROXY` for polyhedra around curved shapes.
+        surface: the triangles in double precision, if rays hit triangles.
     """
 
     kind: int
     buffers: list[tuple[int, int, np.ndarray]]
     owners: np.ndarray
-    mask: int = CURVED
+    mask: int = SOLID
+    surface: TriangleSurface | None = None
 
 
 def merge_first(group: RayGroup) -> Iterator[Primitives]:
@@ -69,7 +68,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
         if isinstance(surface, TriangleSurface)
     ]
     if flat:
-        yield _triangle_primitives(flat, FLAT)
+        yield _triangle_primitives(flat, SOLID)
     if group.frame_id is not None:
         yield from merge_curved(members)
         return
@@ -113,7 +112,13 @@ def _triangle_primitives(
         (embree.VERTEX_BUFFER, embree.FLOAT3, vertices),
         (embree.INDEX_BUFFER, embree.UINT3, corners),
     ]
-    return Primitives(embree.TRIANGLE, buffers, owners, mask)
+    return Primitives(
+        embree.TRIANGLE,
+        buffers,
+        owners,
+        mask,
+        merged if mask == SOLID else None,
+    )
 
 
 def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:

@@ -12,10 +12,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting import moving_groups
-from cns_drake.ray_casting.embree_primitives import CURVED, SOLID
 from cns_drake.ray_casting.embree_scene import EmbreeScene
-from cns_drake.ray_casting.exact_triangles import ExactTriangles
-from cns_drake.ray_casting.half_spaces import cast_on_plane, take_plane_hits
 from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses
 from cns_drake.ray_casting.ray_groups import Motion, group_geometries, serves
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -111,8 +108,6 @@ class RayCastingScene:
         self._scene: EmbreeScene = EmbreeScene(
             solid, num_threads, None if previous is None else previous._scene
         )
-        self._solid = solid
-        self._flat: ExactTriangles | None = None
         self._moving = moving_groups.MovingGroups(self._groups, self._p_WO)
         self._owners = np.array([g.members[0][0] for g in self._groups], int)
         self._normal_matrices: np.ndarray | None = None
@@ -173,7 +168,6 @@ class RayCastingScene:
         R_WSset: np.ndarray = _IDENTITY,
         times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
-        exact: bool = False,
     ) -> SceneHits:
         """Returns the first hits of N rays from one or several poses of S.
 
@@ -190,15 +184,13 @@ class RayCastingScene:
                 revolution to 1 at its end; by default 0.
             with_normals: whether to also return the normals of the surfaces, as
                 they are at the start of the revolution.
-            exact: whether rays are cast on triangles in double precision, from
-                exact origins. A cast then takes several times as long; the
-                first such cast takes as long as building the scene. Exact casts
-                require `with_normals` and the same time for all rays.
 
         Raises:
             ValueError: N is not a multiple of K, L, M or T.
         """
-        p_OSset = np.atleast_2d(p_WSset) - self._p_WO
+        p_OSset = np.ascontiguousarray(
+            np.atleast_2d(p_WSset) - self._p_WO, dtype=float
+        )
         R_WSset = np.reshape(R_WSset, (-1, 3, 3))
         max_ranges = np.atleast_1d(np.asarray(max_range, np.float32))
         for count, what in (
@@ -210,42 +202,23 @@ class RayCastingScene:
             if len(d_Sset) % max(count, 1) or (count == 0 and len(d_Sset)):
                 raise ValueError(f"{count} {what} for {len(d_Sset)} rays")
         rays = Rays(
-            p_OSset.astype(np.float32),
+            p_OSset,
             np.ascontiguousarray(R_WSset, dtype=float),
             max_ranges,
             np.ascontiguousarray(d_Sset, dtype=float),
             np.ascontiguousarray(times, dtype=np.float32),
         )
-        kinds = CURVED if exact else SOLID
         if self._planes:
-            hits = self._cast_on_planes(rays, with_normals, kinds)
+            hits = self._cast_on_planes(rays, with_normals)
         else:
-            hits = self._scene.cast_rays(rays, with_normals, kinds)
-        if exact:
-            self._cast_exactly(p_OSset, rays, hits)
+            hits = self._scene.cast_rays(rays, with_normals)
         is_outside = np.zeros(0, bool)
         if with_normals:
             matrices = self._calc_normal_matrices()
             is_outside = _face_origins(hits, matrices, rays.d_Oset())
         return SceneHits(hits.ranges, hits.owner, hits.normals, is_outside)
 
-    def _cast_exactly(
-        self, p_OSset: np.ndarray, rays: Rays, hits: Hits
-    ) -> None:
-        """Updates hits on all but triangles by those on triangles."""
-        if self._flat is None:
-            self._flat = ExactTriangles(self._solid)
-        missed = np.flatnonzero(hits.owner < 0)
-        hits.ranges[missed] = rays.max_ranges_of(missed)
-        p_Oset = np.ascontiguousarray(
-            p_OSset[np.arange(len(rays.d_Sset)) % len(p_OSset)], dtype=float
-        )
-        self._flat.cast(p_Oset, rays.d_Oset(), float(rays.times[0]), hits)
-        hits.ranges[hits.owner < 0] = np.inf
-
-    def _cast_on_planes(
-        self, rays: Rays, with_normals: bool, kinds: int
-    ) -> Hits:
+    def _cast_on_planes(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays on half spaces first, and then on all other geometry.
 
         A ray that hits a plane is followed no farther than that. Rays hit a
@@ -256,11 +229,11 @@ class RayCastingScene:
         met = np.full(len(limits), -1, np.int32)
         for row, group in self._planes.items():
             times = _AT_ONCE if group.motion is None else rays.times
-            cast_on_plane(group.X_OL_at(times).copy(), rays, row, limits, met)
+            _cast_on_plane(group.X_OL_at(times).copy(), rays, row, limits, met)
         hits = self._scene.cast_rays(
-            rays._replace(max_ranges=limits), with_normals, kinds
+            rays._replace(max_ranges=limits), with_normals
         )
-        take_plane_hits(met, limits, self._owners, hits)
+        _take_plane_hits(met, limits, self._owners, hits)
         return hits
 
     def _calc_normal_matrices(self) -> np.ndarray:
@@ -312,3 +285,74 @@ def _face_origins(
         for i in range(3):
             normals[ray, i] = n[i] / (-scale if along > 0.0 else scale)
     return is_outside
+
+
+@compiled
+def _cast_on_plane(
+    X_OLs: np.ndarray,
+    rays: Rays,
+    row: int,
+    limits: np.ndarray,
+    met: np.ndarray,
+) -> None:
+    """Casts rays on a half space: the plane z = 0 of its group's frame L.
+
+    The function is compiled, because NumPy would take as long as all other
+    geometry.
+
+    Args:
+        X_OLs: (K, 3, 4) poses of L; ray i takes pose i mod K.
+        rays: the N rays.
+        row: row of the group.
+        limits: (N,) greatest ranges; set to the range of each hit [m].
+        met: (N,) row of the group that each ray hit; set to `row` for each hit.
+    """
+    counts = len(rays.p_OSset), len(rays.R_OSset), len(X_OLs)
+    origin = turn = pose = -1
+    height = 0.0
+    normal_S = np.empty(3)
+    for ray in range(len(rays.d_Sset)):
+        if ray == 0 or max(counts) > 1:
+            # Indices are incremented, because remainders take long.
+            origin = origin + 1 if origin + 1 < counts[0] else 0
+            turn = turn + 1 if turn + 1 < counts[1] else 0
+            pose = pose + 1 if pose + 1 < counts[2] else 0
+            R = rays.R_OSset[turn]
+            X = X_OLs[pose]
+            height = 0.0
+            for i in range(3):
+                height += X[i, 2] * (X[i, 3] - rays.p_OSset[origin, i])
+                normal_S[i] = (
+                    R[0, i] * X[0, 2] + R[1, i] * X[1, 2] + R[2, i] * X[2, 2]
+                )
+        along = 0.0
+        for i in range(3):
+            along += normal_S[i] * rays.d_Sset[ray, i]
+        # Rays parallel to the plane, or away from it, do not hit it.
+        if along == 0.0 or height * along < 0.0:
+            continue
+        distance = height / along
+        is_first = met[ray] < 0 and distance == limits[ray]
+        if distance < limits[ray] or is_first:
+            limits[ray], met[ray] = distance, row
+
+
+@compiled
+def _take_plane_hits(
+    met: np.ndarray, limits: np.ndarray, owners: np.ndarray, hits: Hits
+) -> None:
+    """Sets the hits of rays that hit a plane and nothing nearer.
+
+    Args:
+        met: (N,) row of the half space's group that each ray hit; -1 for none.
+        limits: (N,) ranges of these hits [m].
+        owners: (G,) index of the first geometry of each group.
+        hits: hits of the rays on all other geometry, changed in place.
+    """
+    for ray in range(len(met)):
+        row = np.int64(met[ray])
+        if row >= 0 and hits.owner[ray] == -1:
+            hits.ranges[ray] = limits[ray]
+            hits.owner[ray], hits.group[ray] = owners[row], row
+            for axis in range(hits.normals.shape[1]):
+                hits.normals[ray, axis] = axis == 2

@@ -11,6 +11,9 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 
+# Value of `Hits.doubt` for certain hits, and for misses.
+CERTAIN = -1
+
 
 class Rays(NamedTuple):
     """N rays, cast from one or several poses of a sensor S.
@@ -21,7 +24,7 @@ class Rays(NamedTuple):
     length of the array.
 
     Attributes:
-        p_OSset: (K, 3) float32 origins [m].
+        p_OSset: (K, 3) float64 origins [m].
         R_OSset: (L, 3, 3) float64 orientations of S in O.
         max_ranges: (M,) float32 greatest ranges [m].
         d_Sset: (N, 3) float64 unit directions, expressed in S.
@@ -85,12 +88,15 @@ class Hits(NamedTuple):
             geometries of a group are fixed to the same frame L.
         normals: (N, 3) float32 normal of the surface, expressed in L, of any
             length; zero for a miss. (N, 0) unless normals were requested.
+        doubt: (N,) int32 number of the triangle that was hit, in its group, if
+            single precision may be wrong; otherwise `CERTAIN`.
     """
 
     ranges: np.ndarray
     owner: np.ndarray
     group: np.ndarray
     normals: np.ndarray
+    doubt: np.ndarray
 
     @classmethod
     def misses(cls, num_rays: int, with_normals: bool) -> Hits:
@@ -105,4 +111,5 @@ class Hits(NamedTuple):
             np.full(num_rays, -1, np.int32),
             np.full(num_rays, -1, np.int32),
             np.zeros((num_rays, 3 if with_normals else 0), np.float32),
+            np.full(num_rays, CERTAIN, np.int32),
         )

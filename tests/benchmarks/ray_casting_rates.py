@@ -34,7 +34,7 @@ from stages import (
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
-    FLAT,
+    SOLID,
     merge_first,
     merge_second,
 )
@@ -130,14 +130,14 @@ def _all_in_one(geometries, stands):
         group.place(np.zeros(3), still)
 
     def merge(group):
-        solid = [part for part in merge_first(group) if part.mask == FLAT]
+        solid = [part for part in merge_first(group) if part.mask == SOLID]
         return [*solid, *merge_second(group)]
 
     return EmbreeHierarchy(groups, merge, 1)
 
 
 def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
-    tree = hierarchy._tree
+    tree = hierarchy._packet_scenes
     function = embree.load().rtcIntersect16
     intersect16 = ctypes.cast(function, ctypes.c_void_p)
     count = len(d_S)

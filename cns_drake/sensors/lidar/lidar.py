@@ -30,7 +30,7 @@ from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.lidar.ray_queries import (
     RayHits,
-    cast_exact_rays,
+    cast_free_rays,
     geometry_ids,
 )
 from cns_drake.sensors.lidar.scan_assembly import POINT_DTYPE, set_points
@@ -377,10 +377,10 @@ class Lidar(LeafSystem):
     ) -> RayHits:
         """Casts N rays on the geometry that the LiDAR sees in a Context.
 
-        The rays do not depend on the LiDAR's pattern or noise. Ranges are exact
-        to 1e-4 m for rays that start within 1 km of the LiDAR. Hits on
-        triangles are computed in double precision, hits on half spaces and on
-        curved shapes in single precision.
+        The rays do not depend on the LiDAR's pattern or noise, but are cast as
+        beams are. For rays that start within 1 km of the LiDAR, ranges are
+        exact to 2e-3 m. A ray that passes an edge within 1e-4 m, measured
+        across the ray, can end on either side of it.
 
         Args:
             context: context of the LiDAR.
@@ -397,7 +397,7 @@ class Lidar(LeafSystem):
         seen = self._eval_all(context)
         # The time of the output.
         time = float(self.causal)
-        return cast_exact_rays(seen, p_WR, d_W, max_range, time)
+        return cast_free_rays(seen, p_WR, d_W, max_range, time)
 
     def _check_context(self, context: Context) -> None:
         """Checks that a Context belongs to this LiDAR.

@@ -34,7 +34,7 @@ class RayHits(NamedTuple):
     normals_W: np.ndarray
 
 
-def cast_exact_rays(
+def cast_free_rays(
     seen: SeenGeometry,
     p_WR: np.ndarray,
     d_W: np.ndarray,
@@ -66,7 +66,6 @@ def cast_exact_rays(
         ranges,
         times=np.array([time]),
         with_normals=True,
-        exact=True,
     )
     return RayHits(
         hits.ranges, geometry_ids(seen.built, hits.geometry), hits.normals_W
@@ -74,7 +73,7 @@ def cast_exact_rays(
 
 
 def _check_rays(p_W: np.ndarray, d_W: np.ndarray, ranges: np.ndarray) -> None:
-    """Checks the arguments of `cast_exact_rays`.
+    """Checks the arguments of `cast_free_rays`.
 
     Raises:
         ValueError: shapes or values are impossible.

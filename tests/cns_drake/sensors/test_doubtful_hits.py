@@ -1,9 +1,8 @@
-"""Single rays are right where single precision is not.
+"""Hits of scans, and of single rays, where single precision is not right.
 
-Oracles: rational arithmetic, and closed meshes, which no ray leaves.
+Oracles: triangles in double precision, one by one, and closed meshes, which no
+ray leaves.
 """
-
-from fractions import Fraction
 
 from helpers.closed_forms import ellipsoid
 import numpy as np
@@ -27,14 +26,21 @@ from scipy.spatial import ConvexHull
 from cns_drake.sensors.lidar.adding import add_lidar
 from cns_drake.sensors.lidar.patterns import DirectionPattern
 
-AHEAD = DirectionPattern([[1, 0, 0]], min_range=0.1, max_range=9, period=0.1)
 SLOPE = RollPitchYaw(0.3, 0.4, 0.5)
+# What docs/drake.md promises: error of a range, distance of a point from its
+# triangle, and distance from an edge at which a beam may pass on either side
+# [m].
+ERROR, GAP, BESIDE = 2e-3, 1e-3, 1e-4
 
 
 class Scene:
-    """Shapes at rest, or on one frame that has been moved."""
+    """Shapes at rest, or on one frame that has been moved; and a LiDAR.
 
-    def __init__(self, shapes, X_WF=None):
+    The LiDAR is at p_WS and its axes are the world's; by default it is where
+    the shapes are, and has one beam.
+    """
+
+    def __init__(self, shapes, X_WF=None, p_WS=None, d_Wset=((1, 0, 0),)):
         builder = DiagramBuilder()
         graph = builder.AddSystem(SceneGraph())
         source = graph.RegisterSource("s")
@@ -46,13 +52,22 @@ class Scene:
             made = GeometryInstance(X_FG, shape, f"g{k}")
             made.set_perception_properties(PerceptionProperties())
             self.ids.append(graph.RegisterGeometry(source, frame, made))
-        X_WS = X_WF or shapes[0][1]
+        if p_WS is None:
+            p_WS = (X_WF or shapes[0][1]).translation()
+        self.count = len(d_Wset)
+        pattern = DirectionPattern(
+            d_Wset,
+            min_range=0.1,
+            max_range=1e3,
+            period=0.1,
+            rings=np.arange(self.count),
+        )
         self.lidar = add_lidar(
             builder,
             graph,
             graph.world_frame_id(),
-            RigidTransform(X_WS.translation()),
-            AHEAD,
+            RigidTransform(p_WS),
+            pattern,
         )
         diagram = builder.Build()
         context = diagram.CreateDefaultContext()
@@ -68,6 +83,14 @@ class Scene:
     def cast(self, p_W, d_W, max_range=np.inf):
         return self.lidar.CastRays(self.own, p_W, d_W, max_range)
 
+    def scan(self):
+        """Returns the range of each beam, inf without a return."""
+        points = self.lidar.scan_output_port().Eval(self.own)
+        ranges = np.full(self.count, np.inf)
+        xyz = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
+        ranges[points["ring"]] = np.linalg.norm(xyz, axis=1)
+        return ranges
+
 
 def write_mesh(path, corners, triangles):
     lines = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners]
@@ -76,35 +99,47 @@ def write_mesh(path, corners, triangles):
     return Mesh(str(path))
 
 
-def exact_hit(p, d, corners):
-    """Returns range and least distance from an edge in the plane, or None."""
-    a, b, c = ([Fraction(x) for x in corner] for corner in corners.tolist())
-    p, d = [Fraction(x) for x in p.tolist()], [Fraction(x) for x in d.tolist()]
+def meet_triangle(p, d, corners):
+    """Returns how N rays from p meet a triangle, in double precision.
 
-    def minus(u, v):
-        return [x - y for x, y in zip(u, v, strict=True)]
+    The ranges at which they meet its plane; their distances from its edges
+    (segments); whether they pass inside of it (after Moeller and Trumbore).
+    """
+    a, b, c = corners
+    with np.errstate(divide="ignore", invalid="ignore"):
+        h = np.cross(d, c - a)
+        det = h @ (b - a)
+        u = h @ (p - a) / det
+        q = np.cross(p - a, b - a)
+        v = d @ q / det
+        ranges = q @ (c - a) / det
+    beside = np.full(len(d), np.inf)
+    for start, end in ((a, b), (b, c), (c, a)):
+        # The nearest point of the edge to each line.
+        edge, away = end - start, start - p
+        across = edge - (d @ edge)[:, None] * d
+        off = away - (d @ away)[:, None] * d
+        part = -(off * across).sum(axis=1) / (across * across).sum(axis=1)
+        nearest = off + np.clip(part, 0.0, 1.0)[:, None] * across
+        beside = np.minimum(beside, np.linalg.norm(nearest, axis=1))
+    is_inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (ranges > 0.0)
+    return ranges, beside, is_inside
 
-    def dot(u, v):
-        return sum(x * y for x, y in zip(u, v, strict=True))
 
-    def cross(u, v):
-        return [
-            u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]
-            for i in range(3)
-        ]
-
-    n = cross(minus(b, a), minus(c, a))
-    along = dot(n, d)
-    if along == 0:
-        return None
-    distance = dot(n, minus(a, p)) / along
-    q = [x + distance * y for x, y in zip(p, d, strict=True)]
-    insides = []
-    for u, v in ((a, b), (b, c), (c, a)):
-        edge = minus(v, u)
-        area = dot(cross(edge, minus(q, u)), n)
-        insides.append(float(area) / float(dot(n, n) * dot(edge, edge)) ** 0.5)
-    return float(distance), min(insides)
+def distance_from(points, corners):
+    """Returns the distance of each point from a triangle."""
+    a, b, c = corners
+    n = np.cross(b - a, c - a)
+    n /= np.linalg.norm(n)
+    nearest = np.full(len(points), np.inf)
+    is_inside = np.ones(len(points), bool)
+    for start, end in ((a, b), (b, c), (c, a)):
+        edge, away = end - start, points - start
+        is_inside &= np.cross(edge, away) @ n >= 0.0
+        part = np.clip(away @ edge / (edge @ edge), 0.0, 1.0)
+        off = np.linalg.norm(away - part[:, None] * edge, axis=1)
+        nearest = np.minimum(nearest, off)
+    return np.where(is_inside, np.abs((points - a) @ n), nearest)
 
 
 @pytest.mark.slow
@@ -112,9 +147,10 @@ def exact_hit(p, d, corners):
     "is_moving", [pytest.param(False, marks=pytest.mark.night), True]
 )
 def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
+    """In single precision, hundreds of beams end up to 9 m beside."""
     rng = np.random.default_rng(7 + is_moving)
-    sure = 0
-    for trial in range(8):
+    sure = grazing = 0
+    for trial in range(12):
         start = rng.uniform(-50.0, 50.0, 3)
         u, v = rng.normal(size=(2, 3))
         u /= np.linalg.norm(u)
@@ -123,34 +159,37 @@ def test_slender_triangles_seen_along_their_plane(tmp_path, is_moving):
         corners = start + np.outer([0.0, rng.uniform(4, 15), 2.0], u)
         corners[2] += v
         mesh = write_mesh(tmp_path / f"{trial}.obj", corners, [(0, 1, 2)])
-        X_WF = RigidTransform(SLOPE, [30.0, -9.0, 4.0]) if is_moving else None
-        scene = Scene([(mesh, RigidTransform())], X_WF)
         n = np.cross(u, v / np.linalg.norm(v))
-        count = 150
-        aim = corners[0] + rng.uniform(-0.2, 1.2, (count, 1)) * (
-            corners[1] - corners[0]
-        )
-        aim += rng.uniform(-0.2, 1.2, (count, 1)) * (corners[2] - corners[0])
-        back = rng.normal(size=(count, 3))
-        back -= np.outer(back @ n, n)
-        back /= np.linalg.norm(back, axis=1, keepdims=True)
-        back += 10.0 ** rng.uniform(-3.7, -0.5, (count, 1)) * n
-        p = aim + back * rng.uniform(1.0, 400.0, (count, 1))
-        d = aim - p
+        back = u * rng.uniform(-1, 1) + v / np.linalg.norm(v)
+        back += 10.0 ** rng.uniform(-3.7, -1.0) * n
+        p = corners.mean(axis=0) + back * 10.0 ** rng.uniform(0.7, 2.5)
+        aims = rng.uniform(-0.2, 1.2, (2, 3000, 1))
+        d = start + aims[0] * (corners[1] - start) - p
+        d += aims[1] * (corners[2] - start)
         d /= np.linalg.norm(d, axis=1, keepdims=True)
-        X = X_WF or RigidTransform()
-        p_W, d_W = (X @ p.T).T, d @ X.rotation().matrix().T
-        ranges = scene.cast(p_W, d_W).ranges.astype(float)
-        for k in range(count):
-            expected = exact_hit(p[k], d[k], corners)
-            if expected is None or abs(expected[1]) < 1e-4:
-                continue
-            sure += 1
-            if expected[0] > 0.0 and expected[1] > 0.0:
-                assert ranges[k] == pytest.approx(expected[0], rel=1e-6)
-            else:
-                assert np.isinf(ranges[k])
+        X = RigidTransform(SLOPE, [30.0, -9.0, 4.0]) if is_moving else None
+        X_WF = X or RigidTransform()
+        d_W = d @ X_WF.rotation().matrix().T
+        scene = Scene([(mesh, RigidTransform())], X, X_WF @ p, d_W)
+        ranges = scene.scan()
+        # Single rays and beams are cast in one way.
+        np.testing.assert_allclose(
+            scene.cast(X_WF @ p, d_W).ranges, ranges, rtol=2e-7
+        )
+        expected, beside, is_inside = meet_triangle(p, d, corners)
+        met = np.isfinite(ranges)
+        points = p + ranges[met, None] * d[met]
+        assert distance_from(points, corners).max(initial=0.0) < GAP
+        is_sure = beside > BESIDE
+        np.testing.assert_array_equal(met[is_sure], is_inside[is_sure])
+        is_sure &= is_inside
+        np.testing.assert_allclose(
+            ranges[is_sure], expected[is_sure], rtol=0.0, atol=ERROR
+        )
+        sure += is_sure.sum()
+        grazing += met.sum()
     assert sure > 700
+    assert grazing > 3000
 
 
 def closed_meshes():
@@ -184,7 +223,6 @@ def test_no_ray_leaves_a_closed_mesh(tmp_path, kind, far):
     corners, triangles = closed_meshes()[kind]
     mesh = write_mesh(tmp_path / "mesh.obj", corners, triangles)
     X = RigidTransform(SLOPE, [far, -far, 0.0])
-    scene = Scene([(mesh, X)])
     edges = corners[triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
     aims = np.concatenate(
         [corners, edges.mean(axis=1), edges[:, 0] * 0.3 + edges[:, 1] * 0.7]
@@ -193,9 +231,8 @@ def test_no_ray_leaves_a_closed_mesh(tmp_path, kind, far):
         away = aims - p
         length = np.linalg.norm(away, axis=1)
         d_W = (away / length[:, None]) @ X.rotation().matrix().T
-        d_W /= np.linalg.norm(d_W, axis=1, keepdims=True)
-        ranges = scene.cast(X @ p, d_W).ranges
-        np.testing.assert_allclose(ranges, length, rtol=1e-6, atol=1e-5)
+        ranges = Scene([(mesh, X)], None, X @ p, d_W).scan()
+        np.testing.assert_allclose(ranges, length, rtol=0.0, atol=1e-4)
 
 
 def test_rays_in_the_plane_of_a_face_meet_its_neighbours():
@@ -205,7 +242,7 @@ def test_rays_in_the_plane_of_a_face_meet_its_neighbours():
     scene = Scene([(Box(*(2.0 * half)), X)])
     rng = np.random.default_rng(9)
     for axis in range(3):
-        for shift, meets in ((0.0, True), (1e-7, False), (-1e-7, True)):
+        for shift, meets in ((2e-4, False), (-2e-4, True)):
             aim = rng.uniform(-0.9, 0.9, (200, 3)) * half
             aim[:, axis] = half[axis] + shift
             turn = rng.uniform(0.0, 2.0 * np.pi, 200)
@@ -226,7 +263,9 @@ def test_rays_in_the_plane_of_a_face_meet_its_neighbours():
                 sides = [(s * half - p) / d for s in (-1.0, 1.0)]
             entries = np.minimum(*sides)
             entries[:, axis] = -np.inf
-            np.testing.assert_allclose(ranges, entries.max(axis=1), rtol=1e-6)
+            np.testing.assert_allclose(
+                ranges, entries.max(axis=1), rtol=0.0, atol=ERROR
+            )
 
 
 def test_all_kinds_of_shapes_hide_each_other():
@@ -259,9 +298,6 @@ def test_all_kinds_of_shapes_hide_each_other():
     first = expected.argmin(axis=0)
     least = expected.min(axis=0)
     hits = scene.cast(p, d)
-    # Curved shapes and half spaces are met in single precision.
-    flat = first == 1
-    np.testing.assert_allclose(hits.ranges[flat], least[flat], rtol=1e-6)
     np.testing.assert_allclose(hits.ranges, least, rtol=1e-4, atol=2e-4)
     order = np.sort(expected, axis=0)
     clear = np.isfinite(least) & (order[1] > order[0] + 1e-3)
