@@ -69,7 +69,6 @@ app = program.make_program(
         "export-pairs": "export DRIVE ... --format pointnetvlad|overlap",
         "map-truth": "export A B --format map-truth",
         "film": "export DRIVE --format film",
-        "repair": "export FILE.mcap --format mcap",
     },
 )
 for _command, (_first, *_rest) in _EXAMPLES.items():

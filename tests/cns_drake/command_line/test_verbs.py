@@ -35,7 +35,6 @@ FORMER = {
     ),
     ("cns-drake", "map-truth"): "cns-drake export A B --format map-truth",
     ("cns-drake", "film"): "cns-drake export DRIVE --format film",
-    ("cns-drake", "repair"): "cns-drake export FILE.mcap --format mcap",
     ("cns-eval", "ranking"): "cns-eval compare --rankings",
     ("cns-eval", "trend"): "cns-drake study FILE.yaml FOLDER",
     ("cns-eval", "scores"): (
