@@ -7,10 +7,11 @@ import zipfile
 
 import numpy as np
 
+from cns_drake.base.errors import one_line
 from cns_drake.base.files import read_bytes
 
-# The compressions that `np.savez` and `np.savez_compressed` write. Their
-# readers stop at the declared size.
+# The compressions that `np.savez` and `np.savez_compressed` write. Of these,
+# `zipfile` unpacks no more than it is asked for.
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
@@ -25,14 +26,16 @@ def read_npz(
     Args:
         path: the file.
         names: names of the arrays to read.
-        most_bytes: greatest size of the file, and of each array.
+        most_bytes: greatest size of the file, and of the named arrays together.
 
     Raises:
         InputError: the file cannot be read, or is too large.
-        ValueError: the file is not an .npz archive, or an array is too large.
+        ValueError: the file is not an .npz archive, or the arrays are too
+            large.
     """
     content = read_bytes(path, most_bytes)
     found = {}
+    left = most_bytes
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             known = {info.filename: info for info in archive.infolist()}
@@ -40,14 +43,20 @@ def read_npz(
                 info = known.get(f"{name}.npy")
                 if info is None:
                     continue
-                if info.file_size > most_bytes:
-                    raise ValueError(f"{name}: {info.file_size} bytes")
+                left -= info.file_size
+                if left < 0:
+                    raise ValueError(f"{name}: more than {most_bytes} bytes")
                 if info.compress_type not in _COMPRESSIONS:
                     raise ValueError(f"{name}: an unknown compression")
+                with archive.open(info) as member:
+                    # Without a size, all that is compressed is unpacked first,
+                    # and then cut to the declared size.
+                    array = member.read(info.file_size)
                 found[name] = np.lib.format.read_array(
-                    io.BytesIO(archive.read(info)), allow_pickle=False
+                    io.BytesIO(array), allow_pickle=False
                 )
     except Exception as error:
         # NumPy evaluates headers as Python, and can raise any error.
-        raise ValueError(f"{type(error).__name__}: {error}") from error
+        fault = one_line(f"{type(error).__name__}: {error}")
+        raise ValueError(fault) from error
     return found

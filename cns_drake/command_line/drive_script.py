@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-import contextlib
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING, Literal
@@ -96,8 +95,7 @@ def run_drive(
     )
     if frames is not None:
         scenario = scenario.replaced(frames=frames)
-    goes_on = contextlib.nullcontext if overwrite else terminal.resumable
-    with goes_on(), progress_display.show_progress():
+    with progress_display.show_progress():
         run = simulate(
             scenario,
             output,

@@ -37,7 +37,6 @@ class Format(str, Enum):
     KITTI = "kitti"
     MULRAN = "mulran"
     TUM = "tum"
-    MCAP = "mcap"
     POINTNETVLAD = "pointnetvlad"
     OVERLAP = "overlap"
     OVERLAP_TABLE = "overlap-table"
@@ -116,8 +115,7 @@ def export(
 ) -> None:
     """Export drives to the formats of other programs.
 
-    The formats cns, kitti, mulran and tum convert a recording. The format mcap
-    writes the readable part of a damaged .mcap file to a new file.
+    The formats cns, kitti, mulran and tum convert a recording.
 
     The formats pointnetvlad, overlap and overlap-table are data for training
     place recognition: point clouds with exact positives, negatives and
@@ -150,18 +148,16 @@ def export(
             leave them out: then the drives of the experiment that --vary names
             are exported, or all shipped drives if --vary is not given.
         layout: Format to write: cns (the CNS data set), kitti (KITTI odometry),
-            mulran (MulRan), tum (only the trajectory), mcap (a repaired copy),
-            pointnetvlad (clouds and pickle files for PointNetVLAD), overlap
-            (scans and the exact overlap of each pair), overlap-table (only the
-            overlaps between a database and a query drive, for cns-eval pr
-            --exact-overlaps), map-truth (two maps with labels of what changed),
-            map-sessions (two maps without labels), bev-images (bird's-eye
-            images with poses) or film.
+            mulran (MulRan), tum (only the trajectory), pointnetvlad (clouds and
+            pickle files for PointNetVLAD), overlap (scans and the exact overlap
+            of each pair), overlap-table (only the overlaps between a database
+            and a query drive, for cns-eval pr --exact-overlaps), map-truth (two
+            maps with labels of what changed), map-sessions (two maps without
+            labels), bev-images (bird's-eye images with poses) or film.
         output: Folder to write; created if it does not exist. With map-truth,
             map-sessions and bev-images, the folder must be new or empty. With
-            mcap and film, the output is a file instead, and an existing file is
-            replaced; a film's name ends in .webp, or in .mp4, which needs
-            ffmpeg.
+            film, the output is a file instead, and an existing file is
+            replaced; its name ends in .webp, or in .mp4, which needs ffmpeg.
         absent_in: Another stage of the map, such as 01. Points on structures
             that do not exist in that stage get SemanticKITTI's labels of moving
             objects (252 to 259). Only with --format kitti.
@@ -231,8 +227,6 @@ def export(
     elif layout == Format.MAP_SESSIONS:
         opened = _open_drives(words, lidar, columns)
         _write_sessions(opened, output, spacing or _MAP_SPACING, json=json)
-    elif layout == Format.MCAP:
-        _export_repaired(first, output, json=json)
     elif layout == Format.BEV_IMAGES:
         _write_images(_open_drives(words, lidar, columns)[0], output, json=json)
     elif layout == Format.FILM:
@@ -302,32 +296,6 @@ def _export_recording(
     show({"output": str(path)}, str(path), json=json)
     if layout != Format.TUM:
         suggest_evaluation(Path(recording), lidar, path)
-
-
-def _export_repaired(file: str, output: Path, *, json: bool) -> None:
-    """Writes the readable part of a damaged recording."""
-    with uninterrupted():
-        from cns_drake.recording.repair import repair_mcap
-
-    result = repair_mcap(Path(file), output)
-    line = (
-        f"{result.output}: {result.num_messages} messages over "
-        f"{result.seconds:.2f} s recovered; "
-    )
-    if result.num_faults:
-        line += (
-            f"damaged places: {result.num_faults}, the first at "
-            f"{result.first_fault}"
-        )
-    else:
-        line += "the file was whole"
-    values = {
-        "output": str(result.output),
-        "messages": result.num_messages,
-        "seconds": result.seconds,
-        "faults": result.num_faults,
-    }
-    show(values, line, json=json)
 
 
 def _export_film(

@@ -18,7 +18,7 @@ from cns_drake.drives.lidar_topics import (
     cloud_topics,
     lidar_name,
 )
-from cns_drake.drives.mcap_images import McapImages
+from cns_drake.drives.mcap_file import LOCATION
 from cns_drake.drives.mcap_messages import StaticTransforms, checked_poses
 from cns_drake.drives.mcap_topics import McapTopics
 from cns_drake.drives.message_rows import (
@@ -40,6 +40,8 @@ _SHARED_FRAME = "map"
 # If log times in a file step back by more than this, the messages are not late:
 # the clock was set back [s].
 _LATEST = 1.0
+# `image_transport` adds this to the names of topics of depth images.
+_DEPTH = "/compressedDepth"
 
 
 class McapDrive(Drive):
@@ -56,7 +58,7 @@ class McapDrive(Drive):
     composed with the pose of the LiDAR on the vehicle from `/tf_static`. Poses
     are not interpolated. At the start and end of the recording, scans without a
     pose or labels are left out, and a note says so. This happens, for example,
-    if the recording was cut off and repaired.
+    if the recording was cut off and recovered.
 
     Contradictions raise an error: two poses for one stamp, two mounts of a
     sensor, or a frame that changes during the drive.
@@ -98,7 +100,7 @@ class McapDrive(Drive):
             self._topics.require(_IMU_TOPIC, ros_types.IMU)
         self._has_tf = _TF_TOPIC in self._topics.find(ros_types.TF)
         self._all_scans = self._file.locate(self._lidar_topic)
-        self._images = McapImages(self._topics)
+        self._images = _McapImages(self._topics)
 
     def __len__(self) -> int:
         return len(self._scans)
@@ -444,6 +446,52 @@ class McapDrive(Drive):
         """Returns the stamp [ns] and the frame of a scan."""
         with self._topics.faults(self._lidar_topic):
             return mcap_messages.read_cloud_header(data)
+
+
+class _McapImages:
+    """The images of the first topic of compressed images, if there is one."""
+
+    def __init__(self, topics: McapTopics):
+        self._topics = topics
+        found = topics.find(ros_types.COMPRESSED_IMAGE)
+        cameras = [topic for topic in found if not topic.endswith(_DEPTH)]
+        self._topic = cameras[0] if cameras else None
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        """(M,) int64 stamp of each image, sorted [ns].
+
+        Raises:
+            InputError: an image has no stamp.
+        """
+        return self._sorted[0]
+
+    def image(self, index: int) -> bytes:
+        """Returns image `index`, in the order of the stamps, as encoded."""
+        if self._topic is None:
+            raise IndexError(f"image {index} of 0")
+        place = self._sorted[1][index]
+        return self._topics.message(self._topic, place).data.tobytes()
+
+    @cached_property
+    def _sorted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (M,) [ns] and places of the images, sorted by stamp."""
+        topic = self._topic
+        if topic is None:
+            return np.zeros(0, np.int64), np.zeros(0, LOCATION)
+        places = self._topics.file.locate(topic)
+        stamps_ns = self._topics.logged_stamps_ns(topic)
+        if stamps_ns is None:
+            stamps_ns = np.zeros(len(places), np.int64)
+            with self._topics.faults(topic):
+                for index, data in self._topics.file.visit(places):
+                    stamps_ns[index] = mcap_messages.read_stamp(data) or 0
+        if (stamps_ns == 0).any():
+            raise InputError(
+                f"{self._topics.path}: {topic}: an image has no stamp"
+            )
+        order = np.argsort(stamps_ns, kind="stable")
+        return stamps_ns[order], places[order]
 
 
 def holds_mcap(path: Path) -> bool:

@@ -8,39 +8,64 @@ opening a file of gigabytes reads a few kilobytes. The format makes this index
 optional. If the message counts at the end of the file do not confirm the index,
 the whole file is read once.
 
-The `mcap` package checks only the checksums of chunks, and trusts the sizes
-that a chunk declares. This module refuses damaged or hostile records.
+The package's records are used, but not its readers: they check only the
+checksums of chunks, and reserve the sizes that a record or a chunk declares.
+Here every size is checked against the file and a limit before memory is
+reserved, and every checksum is checked.
 """
 
-from collections.abc import Iterator
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
 import contextlib
+from dataclasses import dataclass, field
 import functools
+import io
 import os
 from pathlib import Path
 import struct
 from typing import Any, BinaryIO
+import zlib
 
+import lz4.frame
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Metadata
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    McapRecord,
+    Message,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 import numpy as np
 import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, user_errors
-from cns_drake.drives.mcap_contents import (
-    REPAIR_ADVICE,
-    Contents,
-    read_summary,
-)
-from cns_drake.drives.mcap_records import (
-    CHUNK_LIMIT_BYTES,
-    RECORD_HEADER,
-    RecordContent,
-    parse_attachment,
-    uncompress,
-)
 
+_MAGIC = b"\x89MCAP0\r\n"
+# Opcode and length.
+_RECORD_HEADER = struct.Struct("<BQ")
+# An index has a few megabytes; as Python objects it takes a hundred times as
+# much memory.
+_SUMMARY_LIMIT_BYTES = 1 << 25
+# The last record: its header, where the summary begins, its offsets, its
+# checksum.
+_FOOTER = struct.Struct("<BQQQI")
+# A chunk's index, after its record header: where the chunk begins, and the size
+# of the table of message indexes that follows.
+_CHUNK_INDEX = struct.Struct("<16xQ8xI")
+# An entry of this table: a channel id, and an offset.
+_CHUNK_INDEX_ENTRY = struct.Struct("<HQ")
+# A broken or hostile length must not be taken for the size of a buffer. A
+# chunk holds a few scans.
+CHUNK_LIMIT_BYTES = 1 << 26
 # A table of structures has a few megabytes, too.
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
 # Size of a chunk's record without its data.
@@ -67,17 +92,20 @@ LOCATION = np.dtype(
     ]
 )
 _ORDER = ("log_time_ns", "chunk", "offset")
-
-
-def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
-    """Returns the content of the record at the stream's position."""
-    _, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
-    if length > limit:
-        raise ValueError(f"{what} of {length} bytes")
-    body = stream.read(length)
-    if len(body) != length:
-        raise EOFError(f"{what} ends behind the file")
-    return body
+# How to read a damaged file, for error messages.
+_ADVICE = "(mcap recover IN -o OUT, of the program mcap, saves what is intact)"
+# What reading a damaged file can raise.
+_FAULTS = (
+    McapError,
+    EOFError,
+    StopIteration,
+    MemoryError,
+    OverflowError,
+    ValueError,
+    RuntimeError,
+    struct.error,
+    zstandard.ZstdError,
+)
 
 
 class McapFile:
@@ -103,8 +131,8 @@ class McapFile:
         self.path = Path(path)
         check_regular(self.path)
         with self._reading() as stream:
-            summary = read_summary(stream, self.path)
-            self._contents = Contents.of(summary)
+            summary = _read_summary(stream, self.path)
+            self._contents = _Contents.of(summary)
             if not self._contents.is_whole():
                 self._contents = self._contents.read_through(stream)
         self._channels: dict[str, list[Channel]] = {}
@@ -190,11 +218,10 @@ class McapFile:
         for found, offset in self._contents.attachments:
             if found != name:
                 continue
-            with self._reading() as stream:
-                stream.seek(offset)
+            with self._reading() as stream, _place_named(offset):
                 limit = _ATTACHMENT_LIMIT_BYTES
-                body = _read_body(stream, limit, "an attachment")
-                data = parse_attachment(body).data
+                _, body = _read_record(stream, offset, limit, "an attachment")
+                data = _parse_attachment(body).data
             if content not in (None, data):
                 raise InputError(
                     f"{self.path}: attachment {name}: two attachments of this "
@@ -212,11 +239,14 @@ class McapFile:
         found = []
         for record_name, offset in self._contents.metadata:
             if record_name == name:
-                with self._reading() as stream:
-                    stream.seek(offset)
-                    limit = _ATTACHMENT_LIMIT_BYTES
-                    body = _read_body(stream, limit, "a metadata record")
-                    content = Metadata.read(RecordContent(body))
+                with self._reading() as stream, _place_named(offset):
+                    _, body = _read_record(
+                        stream,
+                        offset,
+                        _ATTACHMENT_LIMIT_BYTES,
+                        "a metadata record",
+                    )
+                    content = Metadata.read(_RecordContent(body))
                     found.append(content.metadata)
         return found
 
@@ -286,7 +316,7 @@ class McapFile:
     @staticmethod
     def _read_index(stream: BinaryIO, offset: int, left: int) -> bytes:
         """Returns the entries of an index of at most `left` bytes."""
-        stream.seek(offset + RECORD_HEADER.size)
+        stream.seek(offset + _RECORD_HEADER.size)
         _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
         if length > left:
             raise ValueError("the indexes of the chunks overlap")
@@ -297,20 +327,20 @@ class McapFile:
 
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
-        with self._reading() as stream:
-            start = stream.seek(self._contents.blocks[number])
-            opcode = int.from_bytes(stream.read(1), "little")
-            stream.seek(start)
-            body = _read_body(stream, _RECORD_LIMIT_BYTES, "a chunk")
+        start = self._contents.blocks[number]
+        with self._reading() as stream, _place_named(start):
+            opcode, body = _read_record(
+                stream, start, _RECORD_LIMIT_BYTES, "a chunk"
+            )
             if opcode == Opcode.MESSAGE:
-                return memoryview(RECORD_HEADER.pack(opcode, len(body)) + body)
-            return memoryview(uncompress(Chunk.read(RecordContent(body))))
+                return memoryview(_RECORD_HEADER.pack(opcode, len(body)) + body)
+            return memoryview(_uncompress(Chunk.read(_RecordContent(body))))
 
     def _message(self, chunk: memoryview, place: Any) -> memoryview:
         _, offset, expected_time_ns, expected_channel_id = place
         with self._faults():
-            start = offset + RECORD_HEADER.size
-            _, length = RECORD_HEADER.unpack(chunk[offset:start])
+            start = offset + _RECORD_HEADER.size
+            _, length = _RECORD_HEADER.unpack(chunk[offset:start])
             body = chunk[start : start + length]
             if len(body) != length:
                 raise EOFError("a message ends behind its chunk")
@@ -337,19 +367,392 @@ class McapFile:
         """Turns the errors of a damaged file into an InputError of one line."""
         try:
             yield
-        except (
-            McapError,
-            EOFError,
-            StopIteration,
-            MemoryError,
-            OverflowError,
-            ValueError,
-            RuntimeError,
-            struct.error,
-            zstandard.ZstdError,
-        ) as error:
+        except _FAULTS as error:
             # Some of these errors have no message.
             fault = str(error) or type(error).__name__
             raise InputError(
-                f"{self.path}: damaged MCAP file ({fault}) {REPAIR_ADVICE}"
+                f"{self.path}: damaged MCAP file ({fault}) {_ADVICE}"
             ) from error
+
+
+@dataclass
+class _Contents:
+    """The contents of a file, by type of record.
+
+    Attributes:
+        schemas: id -> schema.
+        channels: id -> channel.
+        blocks: offset in the file of each chunk, or of each message outside of
+            chunks, in the file's order [bytes].
+        indexes: for each block, channel id -> offset of the message index
+            [bytes].
+        attachments: (name, offset in the file [bytes]) of each attachment.
+        metadata: (name, offset in the file [bytes]) of each metadata record.
+        found: maps a channel id to (block, offset in the block, log time [ns])
+            of each message; None if `indexes` are used to find the messages.
+        statistics: the file's statistics record; None without one.
+    """
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    blocks: list[int] = field(default_factory=list)
+    indexes: list[dict[int, int]] = field(default_factory=list)
+    attachments: list[tuple[str, int]] = field(default_factory=list)
+    metadata: list[tuple[str, int]] = field(default_factory=list)
+    found: dict[int, list[tuple[int, int, int]]] | None = None
+    statistics: Statistics | None = None
+
+    @classmethod
+    def of(cls, summary: bytes) -> _Contents:
+        """Returns the contents of a file, as its summary section lists them.
+
+        With the `mcap` package, reading this section would take longer than
+        reading all poses.
+        """
+        contents = cls()
+        chunks: list[tuple[int, dict[int, int]]] = []
+        position = 0
+        while position < len(summary):
+            start = position + _RECORD_HEADER.size
+            opcode, length = _RECORD_HEADER.unpack(summary[position:start])
+            position = start + length
+            if position > len(summary):
+                raise ValueError("a record reaches beyond the summary")
+            body = summary[start:position]
+            if opcode == Opcode.CHUNK_INDEX:
+                chunks.append(_chunk_offsets(body))
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(_RecordContent(body))
+                contents.schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(_RecordContent(body))
+                contents.channels[channel.id] = channel
+            elif opcode == Opcode.STATISTICS:
+                contents.statistics = Statistics.read(_RecordContent(body))
+            elif opcode == Opcode.ATTACHMENT_INDEX:
+                attachment = AttachmentIndex.read(_RecordContent(body))
+                contents.attachments.append(
+                    (attachment.name, attachment.offset)
+                )
+            elif opcode == Opcode.METADATA_INDEX:
+                other = MetadataIndex.read(_RecordContent(body))
+                contents.metadata.append((other.name, other.offset))
+        chunks.sort(key=lambda chunk: chunk[0])
+        contents.blocks = [start for start, _ in chunks]
+        contents.indexes = [offsets for _, offsets in chunks]
+        return contents
+
+    def is_whole(self) -> bool:
+        """Returns whether all contents are there that the statistics count.
+
+        Without statistics, the result is False.
+        """
+        counts = self.statistics
+        used = set().union(*self.indexes)
+        return counts is not None and (
+            len(self.schemas),
+            len(self.channels),
+            len(self.blocks),
+            len(self.attachments),
+            used | counts.channel_message_counts.keys() <= self.channels.keys(),
+            sum(counts.channel_message_counts.values()),
+        ) == (
+            counts.schema_count,
+            counts.channel_count,
+            counts.chunk_count,
+            counts.attachment_count,
+            True,
+            counts.message_count,
+        )
+
+    def read_through(self, stream: BinaryIO) -> _Contents:
+        """Returns the contents of the whole file, found without an index.
+
+        Schemas, channels and statistics of the summary are taken over.
+
+        Args:
+            stream: the file.
+
+        Raises:
+            ValueError: the file is damaged, or has fewer messages than its
+                statistics state.
+        """
+        told = self.statistics
+        contents = _Contents(
+            dict(self.schemas), dict(self.channels), statistics=told
+        )
+        found: dict[int, list[tuple[int, int, int]]] = {}
+        contents.found = found
+        there = 0
+        size = stream.seek(0, os.SEEK_END)
+        for start, offset, record in _locate_records(stream):
+            if isinstance(record, Schema):
+                contents.schemas.setdefault(record.id, record)
+            elif isinstance(record, Channel):
+                contents.channels.setdefault(record.id, record)
+            elif isinstance(record, Attachment):
+                contents.attachments.append((record.name, start))
+            elif isinstance(record, Metadata):
+                contents.metadata.append((record.name, start))
+            elif isinstance(record, Message):
+                if contents.blocks[-1:] != [start]:
+                    contents.blocks.append(start)
+                found.setdefault(record.channel_id, []).append(
+                    (len(contents.blocks) - 1, offset, record.log_time)
+                )
+                there += 1
+                # A few compressed bytes can hold any number of messages.
+                if there > size:
+                    raise ValueError("more messages than bytes")
+        unknown = found.keys() - contents.channels.keys()
+        if unknown:
+            raise ValueError(f"channel {min(unknown)} is defined nowhere")
+        if told is not None and there != told.message_count:
+            raise ValueError(
+                f"{there} of {told.message_count} messages are there"
+            )
+        return contents
+
+
+def _chunk_offsets(body: bytes) -> tuple[int, dict[int, int]]:
+    """Returns the offsets of a chunk, and of its message index by channel."""
+    start, size = _CHUNK_INDEX.unpack_from(body)
+    table = body[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
+    if len(table) != size:
+        raise ValueError("the index of a chunk is cut off")
+    return start, dict(_CHUNK_INDEX_ENTRY.iter_unpack(table))
+
+
+def _read_summary(stream: BinaryIO, path: Path) -> bytes:
+    """Returns the summary section; refuses a file that is not whole.
+
+    Args:
+        stream: the file.
+        path: path of the file, for error messages.
+
+    Returns:
+        The records of the section; empty for a file without this section.
+
+    Raises:
+        InputError: the file is not MCAP, or is cut off.
+        ValueError: the summary is damaged.
+    """
+    if stream.read(len(_MAGIC)) != _MAGIC:
+        raise InputError(f"{path}: not an MCAP file")
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(size - len(_MAGIC), len(_MAGIC)))
+    if stream.read() != _MAGIC:
+        raise InputError(
+            f"{path}: the MCAP file is cut off or was not finished; it is"
+            f" intact up to byte {_intact_bytes(stream)} of {size} {_ADVICE}"
+        )
+    end = stream.seek(max(size - len(_MAGIC) - _FOOTER.size, 0))
+    footer = stream.read(_FOOTER.size)
+    opcode, _, start, _, checksum = _FOOTER.unpack(footer)
+    if opcode != Opcode.FOOTER:
+        raise ValueError("the footer is missing")
+    if start == 0:
+        return b""
+    if start > end:
+        raise ValueError("the summary begins behind its end")
+    if end - start > _SUMMARY_LIMIT_BYTES:
+        raise ValueError(f"a summary of {end - start} bytes")
+    stream.seek(start)
+    summary = stream.read(end - start)
+    # The checksum is also that of the footer up to the checksum itself.
+    if checksum > 0 and zlib.crc32(summary + footer[:-4]) != checksum:
+        raise ValueError("the checksum of the summary is wrong")
+    return summary
+
+
+def _read_record(
+    stream: BinaryIO, position: int, limit: int, what: str
+) -> tuple[int, bytes]:
+    """Returns the opcode and the content of the record at a position.
+
+    Args:
+        stream: the file.
+        position: place of the record in the file [bytes].
+        limit: greatest size of the content [bytes].
+        what: kind of the record, for error messages.
+
+    Raises:
+        ValueError: there is no record, or it is too large.
+        EOFError: the record reaches beyond the end of the file.
+    """
+    stream.seek(position)
+    header = stream.read(_RECORD_HEADER.size)
+    if len(header) < _RECORD_HEADER.size:
+        raise EOFError("the file ends too early")
+    opcode, length = _RECORD_HEADER.unpack(header)
+    if opcode == 0:
+        raise ValueError("there is no record")
+    if length > limit:
+        raise ValueError(f"{what} of {length} bytes")
+    body = stream.read(length)
+    if len(body) != length:
+        raise EOFError(f"{what} ends behind the file")
+    return opcode, body
+
+
+def _parse_attachment(body: bytes) -> Attachment:
+    """Returns the attachment in the content of a record.
+
+    Raises:
+        ValueError: if its checksum is wrong, or a field is cut off.
+    """
+    # The checksum of all that precedes it ends the record; 0 is none.
+    checksum = int.from_bytes(body[-4:], "little")
+    if checksum not in (0, zlib.crc32(body[:-4])):
+        raise ValueError("the checksum of an attachment is wrong")
+    return Attachment.read(_RecordContent(body))
+
+
+class _RecordContent(ReadDataStream):
+    """The content of one record; reads beyond its end are refused.
+
+    Attributes:
+        left: how much of the content is still to be read [bytes].
+    """
+
+    def __init__(self, content: bytes):
+        super().__init__(io.BytesIO(content))
+        self.left = len(content)
+
+    def read(self, length: int) -> bytes:
+        """Returns the next bytes.
+
+        Raises:
+            ValueError: there are not that many bytes left.
+        """
+        if not 0 <= length <= self.left:
+            raise ValueError("a field reaches beyond the end of its record")
+        self.left -= length
+        return super().read(length)
+
+
+def _uncompress(chunk: Chunk) -> bytes:
+    """Returns the uncompressed records of a chunk.
+
+    The uncompressed size is limited, so that a small file cannot fill the
+    memory.
+
+    Raises:
+        ValueError: if the chunk is damaged, too large or of unknown
+            compression.
+        RuntimeError: if lz4 finds that the chunk is damaged.
+        zstandard.ZstdError: if zstd finds that the chunk is damaged.
+    """
+    size = chunk.uncompressed_size
+    if size > CHUNK_LIMIT_BYTES:
+        raise ValueError(f"a chunk of {size} bytes")
+    if chunk.compression == "zstd":
+        # The library reserves the size that the data claim.
+        claimed = zstandard.frame_content_size(chunk.data)
+        if claimed not in (-1, size):
+            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
+        data = zstandard.decompress(chunk.data, size)
+    elif chunk.compression == "lz4":
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        data = unpacker.decompress(chunk.data, max_length=size)
+        if not unpacker.eof:
+            raise ValueError(f"a chunk of more than {size} bytes")
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"unknown compression {chunk.compression!r}")
+    if len(data) != size:
+        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise ValueError("the checksum of a chunk is wrong")
+    return data
+
+
+# Opcode -> function that reads a record's content; first records in chunks.
+_IN_CHUNKS: dict[int, Callable[[bytes], McapRecord]] = {
+    Opcode.MESSAGE: lambda content: Message.read(
+        _RecordContent(content), len(content)
+    ),
+    Opcode.SCHEMA: lambda content: Schema.read(_RecordContent(content)),
+    Opcode.CHANNEL: lambda content: Channel.read(_RecordContent(content)),
+}
+_READERS = {
+    **_IN_CHUNKS,
+    Opcode.METADATA: lambda content: Metadata.read(_RecordContent(content)),
+    Opcode.ATTACHMENT: _parse_attachment,
+}
+
+
+def _locate_records(
+    stream: BinaryIO,
+) -> Iterator[tuple[int, int, McapRecord]]:
+    """Yields the records of an MCAP file, each with its place in the file.
+
+    These records are schemas, channels, messages, attachments and metadata. The
+    records inside chunks are yielded as well.
+
+    Yields:
+        Two offsets [bytes], and the record. For a record in a chunk, the first
+        offset is the place of the chunk in the file, and the second is the
+        place of the record in the uncompressed chunk. For any other record, the
+        first offset is the place of the record in the file, and the second is
+        0.
+
+    Raises:
+        ValueError: a part of the file cannot be read.
+    """
+    opcode, position = 0, len(_MAGIC)
+    while opcode != Opcode.FOOTER:
+        with _place_named(position):
+            opcode, content = _read_record(
+                stream, position, _RECORD_LIMIT_BYTES, "a record"
+            )
+            for offset, record in _records_in(opcode, content):
+                yield position, offset, record
+        position += _RECORD_HEADER.size + len(content)
+
+
+def _records_in(
+    opcode: int, content: bytes
+) -> Iterator[tuple[int, McapRecord]]:
+    """Yields a record itself or, for a chunk, the records in the chunk.
+
+    Types of records that no caller needs are left out. Each record comes with
+    its offset in the uncompressed chunk [bytes], which is 0 outside of chunks.
+    """
+    if opcode == Opcode.CHUNK:
+        chunk = Chunk.read(_RecordContent(content))
+        inner = _RecordContent(_uncompress(chunk))
+        while inner.left:
+            offset = chunk.uncompressed_size - inner.left
+            header = inner.read(_RECORD_HEADER.size)
+            opcode, length = _RECORD_HEADER.unpack(header)
+            content = inner.read(length)
+            if opcode in _IN_CHUNKS:
+                yield offset, _IN_CHUNKS[opcode](content)
+    elif opcode in _READERS:
+        yield 0, _READERS[opcode](content)
+
+
+def _intact_bytes(stream: BinaryIO) -> int:
+    """Returns the place behind the last whole record of a cut file [bytes]."""
+    size = stream.seek(0, os.SEEK_END)
+    position = end = len(_MAGIC)
+    while end <= size:
+        position = stream.seek(end)
+        header = stream.read(_RECORD_HEADER.size)
+        if len(header) < _RECORD_HEADER.size or header[0] == 0:
+            break
+        end += _RECORD_HEADER.size + _RECORD_HEADER.unpack(header)[1]
+    return position
+
+
+@contextlib.contextmanager
+def _place_named(position: int) -> Iterator[None]:
+    """Adds a place in the file to the error of a damaged record."""
+    try:
+        yield
+    except _FAULTS as error:
+        # Some of these errors have no message.
+        fault = str(error) or type(error).__name__
+        raise ValueError(f"byte {position}: {fault}") from error

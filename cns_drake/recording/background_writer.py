@@ -13,8 +13,7 @@ from typing import Any
 
 # Number of batches that may wait to be written: about two frames with one LiDAR
 # and traffic, so that a frame does not wait for the frame before. A batch is a
-# large message with the small messages before it. A killed process loses
-# waiting batches, at most eight frames.
+# large message with the small messages before it.
 _MOST_WAITING = 8
 # Messages with fewer bytes wait for the next large message: handing a small
 # message over takes longer than making it.

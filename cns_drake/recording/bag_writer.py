@@ -1,23 +1,28 @@
-"""Writes a rosbag2 folder with one MCAP file that survives interruptions.
+"""Writes a rosbag2 folder with one MCAP file.
 
-The recording grows in `<folder>/<name>_0.mcap.part`. The file gets its final
-name when it is complete, and `metadata.yaml` is written last. A folder with
-`metadata.yaml` is therefore complete and consistent.
+A recording is whole or not there. It grows in `<folder>/<name>_0.mcap.part`,
+and gets its final name when it is complete. What an exception leaves is
+removed; what a killed run leaves is replaced by the next run.
 
-An interrupted run leaves a part file. A later run of the same recording takes
-over the messages in this file by writing them again; see
-`cns_drake.recording.part_file.PartFile`.
+To read one message, a reader of MCAP has to uncompress the whole chunk that
+contains the message. If chunks contained all messages in the order of time, a
+reader of the poses would uncompress all clouds as well. Therefore the messages
+of a short span of time are collected, and then written topic by topic. The
+topics keep the order of their first messages: readers sort messages by their
+log times, and messages of equal time by their places in the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 import contextlib
-import io
 import json
 import os
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO
+
+from mcap.writer import CompressionType, Writer
 
 from cns_drake.base.complete_files import (
     complete_part,
@@ -25,39 +30,29 @@ from cns_drake.base.complete_files import (
     write_part,
 )
 from cns_drake.base.errors import InputError
+from cns_drake.base.file_locks import lock_file
 from cns_drake.base.files import user_errors
 from cns_drake.base.version import __version__
 from cns_drake.drives import ros_types
+from cns_drake.drives.mcap_messages import STAMPED_RECORD, read_stamp
 from cns_drake.recording import rosbag2_metadata
-from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import Topic, to_yaml
-from cns_drake.recording.topic_chunks import TopicChunks, messages_by_time
 
-
-class RecordedMessage(NamedTuple):
-    """A message of a recording.
-
-    Attributes:
-        topic: name of the message's topic.
-        stamp_ns: time of the message [ns].
-        data: the serialised message.
-        sequence: number of the message on its topic.
-    """
-
-    topic: str
-    stamp_ns: int
-    data: bytes
-    sequence: int
+# Length of a span [ns].
+_SPAN_NS = 800_000_000
+# Several LiDARs or cameras make more than that in a span. Their messages must
+# not fill the memory.
+_MOST_HELD_BYTES = 1 << 24
+# Size of a chunk, before compression, at which it ends [bytes].
+_CHUNK_BYTES = 1 << 20
 
 
 class BagWriter:
     """A context manager that writes one recording as a rosbag2 folder.
 
     Leaving the context normally completes the recording. Leaving the context by
-    an exception closes the file as an incomplete but valid MCAP file under its
-    `.part` name. The same calls always produce the same bytes, even if a run
-    was interrupted and another run continued the recording.
+    an exception removes it. The same calls always produce the same bytes.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -91,20 +86,17 @@ class BagWriter:
                 the attachments [ns].
             attachments: name -> value of each attachment of the MCAP file.
                 Values are written as YAML if the name ends with `.yaml`,
-                otherwise as JSON. An interrupted recording can be continued
-                only with the same attachments.
+                otherwise as JSON.
             scenario: the content of `scenario.yaml`, next to the MCAP file.
             beside: name -> content of further YAML files next to the MCAP file.
             custom_data: key -> text for `ros2 bag info`.
-            fingerprint: the content of `fingerprint.txt`; no file if empty. An
-                interrupted recording can be continued only with the same
-                fingerprint.
+            fingerprint: the content of `fingerprint.txt`; no file if empty.
             overwrite: whether an existing recording may be replaced. A finished
                 recording stays until the new one is complete.
 
         Raises:
-            InputError: if the folder contains a finished recording that must
-                not be replaced, or files that do not belong to a recording.
+            InputError: if the folder contains a recording that must not be
+                replaced, or files that do not belong to a recording.
         """
         self._files = RecordingFolder(folder)
         self._overwrite = overwrite
@@ -120,90 +112,55 @@ class BagWriter:
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
-        self._latched = {topic.name for topic in topics if topic.latched}
         self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
         # Topic -> stamp of its last message; least and greatest stamp of all
         # messages [ns].
         self._latest_ns: dict[str, int] = {}
         self._span_ns: tuple[int, int] | None = None
-        # Whether the writer's index describes the file: False while a record is
-        # being written, and after an error that interrupted the writing.
-        self._intact = False
 
     def __enter__(self) -> BagWriter:
         """Creates the folder, the MCAP and the records before the messages.
 
         Raises:
-            InputError: if the folder or the file cannot be written, another
-                process is writing it, or the part file of an interrupted run
-                belongs to another recording.
+            InputError: if the folder or the file cannot be written, or another
+                process is writing it.
         """
         with user_errors(self._files.path):
             self._files.path.mkdir(parents=True, exist_ok=True)
         self._files.check(self._overwrite)
-        with user_errors(self._part):
-            self._stream = self._open_part()
-        try:
-            with self._writing():
-                self._chunks, self._channel_ids = self._write_preamble(
-                    self._stream
-                )
-        except BaseException:
-            self._close_part()
-            raise
+        with contextlib.ExitStack() as stack, user_errors(self._part):
+            stack.callback(self._remove_folder)
+            lock_file(self._part, stack, self._refuse_to_wait)
+            stack.callback(self._remove_drafts)
+            # A run that was killed may have left one behind.
+            self._part.unlink(missing_ok=True)
+            self._stream = open(self._part, "xb")
+            stack.callback(self._close_stream)
+            self._chunks, self._channel_ids = self._write_preamble()
+            self._opened = stack.pop_all()
         self._is_open = True
         return self
 
     def __exit__(self, exception_type: type | None, *_: object) -> None:
-        """Completes the recording, or closes it as a part file.
+        """Completes the recording; after an exception, removes it.
 
         Raises:
             InputError: if the files cannot be completed, e.g. on a full disk;
-                no file has its final name then.
+                nothing is left then.
         """
         self._is_open = False
-        if exception_type is not None:
-            self._close_part()
-            return
-        try:
-            with self._writing():
+        with self._opened:
+            if exception_type is not None:
+                return
+            with user_errors(self._part):
                 self._write_ending()
-                self._stream.finish()
             self._complete_files()
-        finally:
-            self._close_stream()
-
-    def follows_interruption(self) -> bool:
-        """Whether messages of an interrupted run can be taken over now.
-
-        This is possible only before any other message is written.
-        """
-        return self._stream.replaying
-
-    def interrupted(self) -> Iterator[RecordedMessage]:
-        """Yields the messages that an interrupted run recorded.
-
-        To take over these messages, write each message as soon as it is
-        yielded, before any other message. The iterator ends where the file is
-        damaged.
-
-        Raises:
-            InputError: if the file cannot be read.
-        """
-        with user_errors(self._part), open(self._part, "rb") as stream:
-            for topic, message in messages_by_time(stream):
-                yield RecordedMessage(
-                    topic, message.log_time, message.data, message.sequence
-                )
 
     def write(
         self, topic: str, stamp_ns: int, data: bytes, sequence: int
     ) -> None:
         """Appends one message; on each topic, times must increase.
-
-        The message of a latched topic is skipped if it has already been taken
-        over from an interrupted run.
 
         Args:
             topic: name of one of the topics.
@@ -221,11 +178,9 @@ class BagWriter:
                 f"{self._files.path}: the recording is not open; simulate "
                 "within its `with` block"
             )
-        if topic in self._latched and topic in self._latest_ns:
-            return
         self._check_order(topic, stamp_ns)
         channel_id = self._channel_ids[topic]
-        with self._writing():
+        with user_errors(self._part):
             self._chunks.add_message(
                 channel_id, stamp_ns, data, stamp_ns, sequence
             )
@@ -251,75 +206,13 @@ class BagWriter:
             "clock goes back, begin a new recording"
         )
 
-    def _open_part(self) -> PartFile:
-        """Opens the part file, empty or with messages to take over."""
-        preamble = io.BytesIO()
-        self._write_preamble(preamble)
-        if (
-            self._files.mcap.is_file()
-            and not self._files.is_finished()
-            and not self._part.exists()
-        ):
-            # The earlier run was interrupted while it renamed the files.
-            with contextlib.closing(PartFile(self._files.mcap)) as stream:
-                if self._continues(stream, preamble):
-                    os.replace(self._files.mcap, self._part)
-                else:
-                    self._refuse_other_recording()
-        stream = PartFile(self._part)
-        try:
-            if not self._continues(stream, preamble):
-                self._refuse_other_recording()
-                stream.clear()
-            if self._fingerprint:
-                write_part(self._files.fingerprint, self._fingerprint)
-        except BaseException:
-            stream.close()
-            raise
-        return stream
-
-    def _continues(self, stream: PartFile, preamble: io.BytesIO) -> bool:
-        """Returns whether this recording can continue a file.
-
-        The result is True if the file is empty, because no run has begun it. A
-        file with content must have the fingerprint of this recording, and begin
-        with the same records.
-
-        Args:
-            stream: the file.
-            preamble: the records before the messages of this recording.
-        """
-        if not stream.replaying:
-            return True
-        found = ""
-        path = self._files.fingerprint
-        # The part file belongs to the interrupted run. The file with the final
-        # name may still belong to a finished recording that is being replaced.
-        if part_path(path).is_file():
-            path = part_path(path)
-        if path.is_file():
-            found = path.read_text(encoding="utf-8", errors="replace")
-        return found == self._fingerprint and stream.starts_like(
-            preamble.getvalue()
-        )
-
-    def _refuse_other_recording(self) -> None:
-        if not self._overwrite:
-            raise InputError(
-                f"{self._files.path}: the folder already exists and holds an "
-                "interrupted recording of another scenario, world or program "
-                "(--overwrite discards it)"
-            )
-
-    def _write_preamble(
-        self, stream: io.BytesIO | PartFile
-    ) -> tuple[TopicChunks, dict[str, int]]:
+    def _write_preamble(self) -> tuple[_TopicChunks, dict[str, int]]:
         """Writes the records before the messages.
 
         Returns:
             The writer of messages, and topic -> channel id.
         """
-        chunks = TopicChunks(stream)
+        chunks = _TopicChunks(self._stream)
         writer = chunks.writer
         writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
@@ -350,39 +243,36 @@ class BagWriter:
         )
         self._chunks.finish({v: k for k, v in self._channel_ids.items()})
         self._stream.flush()
+        os.fsync(self._stream.fileno())
 
     def _complete_files(self) -> None:
         """Writes the remaining files, and gives all files their final names.
 
         All files are whole under their `.part` names before the first is
-        renamed; `metadata.yaml` is renamed last. Old files that describe the
-        MCAP are removed first: they must never describe the new MCAP.
+        renamed. The MCAP is renamed last, and an old MCAP is removed first: no
+        file may describe another MCAP.
         """
         own = self._files
         metadata = {"rosbag2_bagfile_information": self._bag_information()}
+        if self._fingerprint:
+            write_part(own.fingerprint, self._fingerprint)
         write_part(own.scenario, to_yaml(self._scenario))
         write_part(own.metadata, to_yaml(metadata))
         for path, value in self._beside.items():
             write_part(path, to_yaml(value))
         with user_errors(own.path):
-            own.metadata.unlink(missing_ok=True)
+            own.mcap.unlink(missing_ok=True)
             own.fingerprint.unlink(missing_ok=True)
-        complete_part(own.mcap)
-        for path in (*self._beside, own.scenario):
+        for path in (*self._beside, own.scenario, own.metadata):
             complete_part(path)
         if self._fingerprint:
             complete_part(own.fingerprint)
-        complete_part(own.metadata)
+        complete_part(own.mcap)
 
-    def _close_part(self) -> None:
-        """Closes an incomplete file, as a valid MCAP file where possible."""
-        # The first exception is the one to report, not a second one that
-        # follows from it. If nothing new was written, the file stays as it is.
-        with contextlib.suppress(InputError):
-            if self._intact and not self._stream.replaying:
-                with self._writing():
-                    self._write_ending()
-        self._close_stream()
+    def _refuse_to_wait(self) -> None:
+        raise InputError(
+            f"{self._files.path}: another process is writing this recording"
+        )
 
     def _close_stream(self) -> None:
         # All data have been flushed, or that has failed already. Closing
@@ -390,13 +280,16 @@ class BagWriter:
         with contextlib.suppress(OSError):
             self._stream.close()
 
-    @contextlib.contextmanager
-    def _writing(self) -> Iterator[None]:
-        """Sets `_intact` to False until the context ends without an error."""
-        self._intact = False
-        with user_errors(self._part):
-            yield
-        self._intact = True
+    def _remove_drafts(self) -> None:
+        """Removes files that did not get their final names."""
+        with contextlib.suppress(OSError):
+            for path in (*self._files.files(), *self._beside):
+                part_path(path).unlink(missing_ok=True)
+
+    def _remove_folder(self) -> None:
+        """Removes the folder if nothing is in it."""
+        with contextlib.suppress(OSError):
+            self._files.path.rmdir()
 
     def _bag_information(self) -> dict:
         """Returns rosbag2's description of the file."""
@@ -425,3 +318,70 @@ def _encode_attachment(name: str, value: Any) -> tuple[str, bytes]:
         return "application/yaml", to_yaml(value).encode()
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     return "application/json", text.encode()
+
+
+class _TopicChunks:
+    """Writes an MCAP file in zstd-compressed chunks that hold one topic each.
+
+    Attributes:
+        writer: the writer of all records other than messages.
+    """
+
+    def __init__(self, stream: BinaryIO):
+        self.writer = Writer(
+            stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD
+        )
+        # Channel id -> the arguments of its messages.
+        self._held: dict[int, list[tuple[int, bytes, int, int]]] = {}
+        self._held_bytes = 0
+        self._start_ns: int | None = None
+        # Channel id -> number of messages with the log time as their stamp.
+        self._stamped: Counter[int] = Counter()
+
+    def add_message(
+        self,
+        channel_id: int,
+        log_time: int,
+        data: bytes,
+        publish_time: int,
+        sequence: int,
+    ) -> None:
+        """Holds a message, after messages of an earlier span were written."""
+        if self._start_ns is None:
+            self._start_ns = log_time
+        if (
+            log_time - self._start_ns >= _SPAN_NS
+            or self._held_bytes >= _MOST_HELD_BYTES
+        ):
+            self.flush()
+            self._start_ns = log_time
+        message = log_time, data, publish_time, sequence
+        self._held.setdefault(channel_id, []).append(message)
+        self._held_bytes += len(data)
+        self._stamped[channel_id] += read_stamp(data) == log_time
+
+    def flush(self) -> None:
+        """Writes all messages that are held."""
+        for channel_id, held in self._held.items():
+            for message in held:
+                self.writer.add_message(channel_id, *message)
+            self.writer.flush()
+            held.clear()
+        self._held_bytes = 0
+
+    def finish(self, topics: Mapping[int, str]) -> None:
+        """Completes the file.
+
+        Args:
+            topics: channel id -> name of its topic.
+        """
+        self.flush()
+        counts: Counter[str] = Counter()
+        for channel_id, count in self._stamped.items():
+            counts[topics[channel_id]] += count
+        stamped = {
+            topic: str(count) for topic, count in counts.items() if count
+        }
+        if stamped:
+            self.writer.add_metadata(STAMPED_RECORD, stamped)
+        self.writer.finish()

@@ -396,8 +396,6 @@ class McapRecorder(LeafSystem):
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
         if self._X_BCs and self._last_tick is None:
-            # Written at the first frame. A bag takes latched messages once: a
-            # resumed one has this already.
             tf = messages.make_tf(BASE_FRAME, self._X_BCs, stamp_ns)
             self._write_message(TF_STATIC_TOPIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}

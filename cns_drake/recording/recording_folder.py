@@ -13,8 +13,8 @@ class RecordingFolder:
 
     The name of the folder is the name of the recording. `fingerprint.txt`
     contains a hash of everything that determines the recording; see
-    `cns_drake.scenarios.provenance`. `metadata.yaml` is completed last, so a
-    folder with this file contains a finished recording.
+    `cns_drake.scenarios.provenance`. The MCAP file is completed last, so a
+    folder with this file and `metadata.yaml` contains a finished recording.
 
     Attributes:
         path: the folder, as an absolute path.
@@ -33,7 +33,11 @@ class RecordingFolder:
 
     def is_finished(self) -> bool:
         """Whether the folder contains a finished recording."""
-        return self.metadata.is_file()
+        return self.metadata.is_file() and self.mcap.is_file()
+
+    def files(self) -> tuple[Path, ...]:
+        """Returns the paths of all these files."""
+        return self.mcap, self.scenario, self.fingerprint, self.metadata
 
     def check(self, overwrite: bool) -> None:
         """Checks that a recording may be written to the folder.
@@ -42,10 +46,10 @@ class RecordingFolder:
             overwrite: whether the folder may contain anything.
 
         Raises:
-            InputError: the folder cannot be used, contains a finished
-                recording, or contains files, none of which belongs to a
-                recording of this name. With `overwrite`, only the first of
-                these faults is an error.
+            InputError: the folder cannot be used, contains a recording, or
+                contains files, none of which belongs to a recording of this
+                name. With `overwrite`, only the first of these faults is an
+                error. What a killed run has left is no recording.
         """
         with user_errors(self.path):
             if not self.path.is_dir():
@@ -57,13 +61,14 @@ class RecordingFolder:
                 return
             if overwrite:
                 return
-            if self.is_finished():
+            if self.mcap.exists():
                 raise InputError(
                     f"{self.path}: the folder already exists and holds a "
-                    "finished recording (--overwrite replaces it)"
+                    "recording (--overwrite replaces it)"
                 )
-            own = (self.mcap, self.scenario, self.fingerprint, self.metadata)
+            own = self.files()
             names = {file.name for file in (*own, *map(part_path, own))}
+            names.add(f"{part_path(self.mcap).name}.lock")
             found = sorted(entry.name for entry in self.path.iterdir())
         if found and names.isdisjoint(found):
             raise InputError(

@@ -46,7 +46,6 @@ def describe_topic(
     message_type: str,
     count: int,
     metadata: Mapping[str, str],
-    encoding: str = "cdr",
 ) -> dict:
     """Returns the entry of a topic for rosbag2's `metadata.yaml`.
 
@@ -55,13 +54,12 @@ def describe_topic(
         message_type: ROS type, such as `sensor_msgs/msg/Imu`.
         count: number of messages.
         metadata: metadata of the topic's channel in the MCAP file.
-        encoding: encoding of the messages.
     """
     return {
         "topic_metadata": {
             "name": name,
             "type": message_type,
-            "serialization_format": encoding,
+            "serialization_format": "cdr",
             "offered_qos_profiles": metadata.get("offered_qos_profiles", ""),
             "type_description_hash": metadata.get("topic_type_hash", ""),
         },

@@ -67,20 +67,6 @@ class Schedule:
             if tick % step == 0 and tick <= self.ends.get(name, tick)
         ]
 
-    def next_tick(self, tick: int) -> int | None:
-        """Returns the next tick at which a message is due.
-
-        The result is None if no stream has a message after `tick`.
-        """
-        last = None
-        if self.ends.keys() >= self.steps.keys():
-            last = max(self.ends.values())
-        while tick != last:
-            tick += 1
-            if self.due(tick):
-                return tick
-        return None
-
     def time_ns(self, tick: int) -> int:
         """Returns the time of a tick since the start [ns]."""
         # Integer arithmetic: fractions would take longer than a message.

@@ -27,8 +27,7 @@ class RecordingPlan:
     """The topics of a drive's recording, and the times of their messages.
 
     Attributes:
-        topics: the topics. The first topic has the scans of the first LiDAR;
-            each message on this topic begins a frame.
+        topics: the topics. The first topic has the scans of the first LiDAR.
         schedule: times of the messages, with a stream for each topic that is
             not latched.
         layouts: LiDAR name -> name of the layout of its recorded points.
@@ -37,11 +36,6 @@ class RecordingPlan:
     topics: tuple[Topic, ...]
     schedule: Schedule
     layouts: Mapping[str, str]
-
-    @property
-    def frame_topic(self) -> str:
-        """Name of the topic on which each frame begins."""
-        return self.topics[0].name
 
 
 def plan_recording(scenario: Scenario) -> RecordingPlan:

@@ -25,7 +25,6 @@ from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import make_calibration
 from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.recording.resuming import take_over_frames
 from cns_drake.recording.schedule import START_NS, frames_within
 from cns_drake.scenarios import provenance
 from cns_drake.scenarios.planning import DrivePlan
@@ -58,9 +57,7 @@ class FinishedSimulation:
         name: name of the drive.
         folder: folder of the recording.
         num_frames: number of frames in the recording.
-        resumed_frames: number of frames taken over from an interrupted run.
-        simulated_s: simulated time from the first to the last frame of this run
-            [s]; frames taken over do not count.
+        simulated_s: simulated time from the first to the last frame [s].
         wall_s: wall time of the simulation, without loading [s].
         loading_s: time to load the stage and plan the drive [s].
 
@@ -74,7 +71,6 @@ class FinishedSimulation:
     name: str
     folder: Path
     num_frames: int
-    resumed_frames: int
     simulated_s: float
     wall_s: float
     loading_s: float
@@ -98,10 +94,8 @@ def simulate(
 ) -> FinishedSimulation:
     """Simulates a scenario and records it in the folder `<output>/<name>`.
 
-    If this folder contains frames of an interrupted run of the same scenario,
-    world and version, these frames are kept, and the simulation starts with the
-    next frame; the recording is the same as without an interruption. If a web
-    page is requested, all frames are simulated again.
+    The recording is whole or not there: an interrupted run leaves nothing, and
+    what a killed run leaves is replaced.
 
     Args:
         scenario: the scenario to run.
@@ -113,8 +107,8 @@ def simulate(
             recording does not depend on this number.
         on_frame: called with the number of finished frames and the number of
             all frames.
-        on_note: called with notes for the user, for example about an
-            interrupted run or the world's table of structures.
+        on_note: called with notes for the user, for example about the world's
+            table of structures.
 
     Raises:
         InputError: the scenario cannot be run, or its output cannot be written.
@@ -151,12 +145,7 @@ def simulate(
             on_note(text)
         strike()
         page = None if page_file is None else _make_page(drive)
-        resumed_frames = 0
         with _make_bag(drive, inputs, folder, overwrite=overwrite) as bag:
-            if page is None:
-                resumed_frames = _keep_finished_frames(
-                    bag, drive, on_frame, on_note
-                )
 
             def report_frames(done: int) -> None:
                 strike()
@@ -176,7 +165,7 @@ def simulate(
             strike()
             loaded = time.perf_counter()
             simulated_s = _simulate_frames(
-                diagram, writer, drive, resumed_frames, report_frames
+                diagram, writer, drive, report_frames
             )
             doing("closing the recording")
         finished = time.perf_counter()
@@ -187,7 +176,6 @@ def simulate(
         name=scenario.name,
         folder=folder,
         num_frames=drive.num_frames,
-        resumed_frames=resumed_frames,
         simulated_s=simulated_s,
         wall_s=finished - loaded,
         loading_s=loaded - start,
@@ -272,32 +260,6 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
     )
 
 
-def _keep_finished_frames(
-    bag: BagWriter,
-    drive: LoadedDrive,
-    on_frame: ProgressCallback,
-    on_note: NoteCallback,
-) -> int:
-    """Keeps the frames of an interrupted run, and returns their number."""
-    if not bag.follows_interruption():
-        return 0
-    name, num_frames = drive.scenario.name, drive.num_frames
-    on_note(f"{name}: found an interrupted run")
-    doing("reading the interrupted run")
-    recording = drive.recording
-    frames = take_over_frames(
-        bag, recording.topics, recording.schedule, recording.frame_topic
-    )
-    on_note(
-        f"{name}: {frames} of {num_frames} frames are there; going on with "
-        "the next one"
-    )
-    if frames > 0:
-        doing("simulating", frames, num_frames, "frames")
-        on_frame(frames, num_frames)
-    return frames
-
-
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     scenario = drive.scenario
     other, other_name = other_stage(scenario)
@@ -325,16 +287,13 @@ def _simulate_frames(
     diagram: Diagram,
     writer: BackgroundWriter,
     drive: LoadedDrive,
-    first: int,
     on_frame: Callable[[int], None],
 ) -> float:
-    """Simulates frames and writes their messages.
+    """Simulates all frames and writes their messages.
 
     Returns:
-        Simulated time from the first to the last of these frames [s].
+        Simulated time from the first to the last frame [s].
     """
-    if first >= drive.num_frames:
-        return 0.0
     scenario = drive.scenario
     period = scenario.frame_period
     schedule = drive.recording.schedule
@@ -345,12 +304,9 @@ def _simulate_frames(
 
     simulator = Simulator(diagram)
     simulator.set_monitor(monitor)
-    # Messages come at ticks. The simulation begins and ends between two ticks,
-    # so that rounding cannot add or drop a message.
-    begin = first * schedule.steps[drive.recording.frame_topic]
+    # Messages come at ticks. The simulation ends between two ticks, so that
+    # rounding cannot add or drop a message.
     end = max(schedule.ends.values())
-    start = max(begin - 0.5, 0.0) * schedule.period
-    simulator.get_mutable_context().SetTime(start)
     with writer:
         simulator.AdvanceTo((end + 0.5) * schedule.period)
-    return (end - begin) * schedule.period
+    return end * schedule.period

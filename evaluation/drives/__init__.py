@@ -66,8 +66,7 @@ def open_drive(
         return fitting[0](path, columns)
     if path.is_dir() and any(path.glob("*.mcap.part")):
         raise InputError(
-            f"{path}: the recording was not finished (cns-drake export"
-            " --format mcap saves what is whole)"
+            f"{path}: the recording was not finished; simulate the drive again"
         )
     one = [path] if ".mcap.zst" in path.name else []
     for file in listed(path, "*.mcap.zst*") if path.is_dir() else one:

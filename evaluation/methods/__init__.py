@@ -10,8 +10,7 @@ own. Modules that only some methods need:
 - Layered overlap: `overlap_layers`, `overlap_maps`.
 - The learned descriptor: `polar_images`.
 - Networks with the weights of their authors: `published_networks`,
-  `pointnetvlad_clouds`, `network_layers`, `sparse_convolution`,
-  `torch_weights`, `torch_pickles`.
+  `pointnetvlad_clouds`, `network_layers`, `sparse_convolution`.
 """
 
 from evaluation.methods import (  # noqa: F401  (register themselves)

@@ -28,6 +28,7 @@ from cns_drake.base.npz_files import read_npz
 from cns_drake.base.poses import yaw_pose
 from cns_drake.base.terminal import note
 from evaluation.methods.method import Method, MethodConfig
+from evaluation.methods.network_layers import checked_weights
 from evaluation.methods.polar_images import (
     CHANNELS,
     polar_image,
@@ -256,11 +257,7 @@ def _load_checked(
             f"{path}: version: {version} instead of {WEIGHTS_VERSION}; train "
             "again with this version of the program"
         )
-    for name, shape in shapes.items():
-        if name not in values:
-            raise InputError(f"{path}: {name} is missing")
-        values[name] = _checked_weights(values[name], shape, f"{path}: {name}")
-    return values
+    return checked_weights(values, shapes, path)
 
 
 def _shapes_of_weights() -> dict[str, tuple[int, ...]]:
@@ -270,30 +267,6 @@ def _shapes_of_weights() -> dict[str, tuple[int, ...]]:
         shapes[f"kernel_{number}"] = (9 * before, after)
         shapes[f"bias_{number}"] = (after,)
     return shapes
-
-
-def _checked_weights(
-    found: np.ndarray, shape: tuple[int, ...], where: str
-) -> np.ndarray:
-    """Returns an array of weights as float32.
-
-    Args:
-        found: the array in the file.
-        shape: the shape that it must have.
-        where: file and name of the array, for error messages.
-
-    Raises:
-        InputError: the array has another shape, or not only finite numbers.
-    """
-    if found.shape != shape:
-        raise InputError(f"{where}: size {found.shape} instead of {shape}")
-    if found.dtype.kind == "f":
-        # Numbers of double precision may be too large for single.
-        with np.errstate(over="ignore"):
-            values = found.astype(np.float32)
-        if np.isfinite(values).all():
-            return values
-    raise InputError(f"{where}: not all are finite numbers")
 
 
 def _feature_map(

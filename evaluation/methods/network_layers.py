@@ -1,10 +1,13 @@
 """Layers of neural networks, for inference, with weights by their names."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import erf
+
+from cns_drake.base.errors import InputError
 
 # Name of a parameter, such as `layer.weight` -> its values.
 Weights = Mapping[str, np.ndarray]
@@ -12,6 +15,38 @@ Weights = Mapping[str, np.ndarray]
 _TINY = 1e-6
 # Added to distances before a division, as in the published programs.
 _LEAST_DISTANCE = 1e-8
+
+
+def checked_weights(
+    found: Weights, shapes: Mapping[str, tuple[int, ...]], path: Path
+) -> dict[str, np.ndarray]:
+    """Returns the weights of a network as float32.
+
+    Args:
+        found: name -> array in the file; other names are left out.
+        shapes: name -> shape of each array of the network.
+        path: the file, for error messages.
+
+    Raises:
+        InputError: an array is missing, has another shape, or not only finite
+            floating-point numbers.
+    """
+    weights = {}
+    for name, shape in shapes.items():
+        if name not in found:
+            raise InputError(f"{path}: {name} is missing")
+        values = found[name]
+        if values.shape != shape:
+            raise InputError(
+                f"{path}: {name}: size {values.shape} instead of {shape}"
+            )
+        if values.dtype.kind == "f":
+            # Numbers of double precision may be too large for single.
+            with np.errstate(over="ignore"):
+                weights[name] = values.astype(np.float32)
+        if name not in weights or not np.isfinite(weights[name]).all():
+            raise InputError(f"{path}: {name}: not all are finite numbers")
+    return weights
 
 
 def relu(x: np.ndarray) -> np.ndarray:

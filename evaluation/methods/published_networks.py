@@ -2,6 +2,10 @@
 
 The descriptor of a network is a vector; the distance of two descriptors is the
 dissimilarity of two places. No weights are shipped.
+
+The page `docs/notes/published_networks.md` shows how to convert the authors'
+weights to an .npz file. PyTorch's own files are not read, because they contain
+pickles, which can run code.
 """
 
 import abc
@@ -13,11 +17,19 @@ from typing import ClassVar
 import numpy as np
 from pydantic import computed_field
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.npz_files import read_npz
 from evaluation.methods.method import Method, MethodConfig
-from evaluation.methods.network_layers import Weights
+from evaluation.methods.network_layers import Weights, checked_weights
 from evaluation.methods.pointnetvlad_clouds import prepare_cloud
-from evaluation.methods.torch_weights import MOST_BYTES, read_weights
+
+# Greatest size of a file of weights, and of its arrays together [bytes].
+_MOST_BYTES = 200_000_000
+_ADVICE = (
+    "no .npz file of this network's weights; the page"
+    " docs/notes/published_networks.md shows how to make one"
+)
 
 
 class NetworkConfig(MethodConfig):
@@ -26,8 +38,8 @@ class NetworkConfig(MethodConfig):
     `sensor_height` has no effect.
 
     Attributes:
-        weights: file with the weights that the authors of the network
-            published.
+        weights: .npz file with the weights that the authors of the network
+            published: the arrays of the state dict, by their names.
     """
 
     weights: Path
@@ -40,7 +52,7 @@ class NetworkConfig(MethodConfig):
         Two files with the same name can contain different weights; their
         digests differ.
         """
-        content = read_bytes(self.weights, MOST_BYTES)
+        content = read_bytes(self.weights, _MOST_BYTES)
         return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -60,7 +72,7 @@ class Network(Method[np.ndarray, np.ndarray]):
 
     def __init__(self, config: NetworkConfig | None = None):
         super().__init__(config)
-        self._weights = read_weights(self.config.weights, self.shapes)
+        self._weights = _read_weights(self.config.weights, self.shapes)
 
     def build_database(self, places: Sequence[np.ndarray]) -> np.ndarray:
         return np.stack(places)
@@ -93,3 +105,25 @@ class CloudNetwork(Network):
     @abc.abstractmethod
     def infer(weights: Weights, cloud: np.ndarray) -> np.ndarray:
         """Returns the descriptor (256,) of a cloud from `prepare_cloud`."""
+
+
+def _read_weights(
+    path: Path, shapes: Mapping[str, tuple[int, ...]]
+) -> dict[str, np.ndarray]:
+    """Returns the weights (float32) of a network, by name.
+
+    Args:
+        path: the .npz file.
+        shapes: name -> shape of each array.
+
+    Raises:
+        InputError: the file cannot be read, or an array is missing, of another
+            shape or not finite.
+    """
+    try:
+        found = read_npz(path, shapes, _MOST_BYTES)
+    except ValueError as error:
+        raise InputError(f"{path}: {_ADVICE} ({error})") from error
+    if not found:
+        raise InputError(f"{path}: {_ADVICE} (no array {next(iter(shapes))})")
+    return checked_weights(found, shapes, path)

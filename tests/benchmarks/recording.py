@@ -36,7 +36,6 @@ from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import mcap_recorder, messages
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
@@ -66,7 +65,7 @@ STEPS = {
         (ros_types, "serialize"),
     ),
     "compression": ((zstandard, "compress"),),
-    "file": ((BagWriter, "write"), (PartFile, "write")),
+    "file": ((BagWriter, "write"),),
 }
 
 

@@ -70,20 +70,6 @@ COMMANDS = {
         (_DRAKE, "export", "town_07", "--format", "kitti", "--output", "out"),
         1,
     ),
-    "repair": (
-        "repair",
-        ("source.mcap",),
-        (
-            _DRAKE,
-            "export",
-            "source.mcap",
-            "--format",
-            "mcap",
-            "--output",
-            "out/new.mcap",
-        ),
-        1,
-    ),
     "tcr": (
         "clouds",
         ("*.pcd", "*.ply", "*.npy"),

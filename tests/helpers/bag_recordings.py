@@ -4,14 +4,10 @@ import numpy as np
 
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import recording_topics
-from cns_drake.recording.resuming import take_over_frames
-from cns_drake.recording.schedule import START_NS, frame_stamp_ns, make_schedule
+from cns_drake.recording.schedule import START_NS, frame_stamp_ns
 
 TOPICS = recording_topics(["lidar"])
 FRAMES = 50
-SCHEDULE = make_schedule(
-    {topic.name: 0.05 for topic in TOPICS if not topic.latched}
-)
 
 
 def open_bag(folder, title="drive", **kwargs):
@@ -26,12 +22,10 @@ def open_bag(folder, title="drive", **kwargs):
 
 
 def record(folder, frames=FRAMES, size=60, **kwargs):
-    """Records, or resumes a recording; returns the frames taken over."""
+    """Records frames with messages of random bytes."""
     with open_bag(folder, **kwargs) as bag:
-        taken_over = take_over_frames(bag, TOPICS, SCHEDULE, "/tf")
-        for frame in range(taken_over, frames):
+        for frame in range(frames):
             write_frame(bag, frame, size)
-    return taken_over
 
 
 def write_frame(bag, frame, size=60):

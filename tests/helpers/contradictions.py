@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import copy
 from dataclasses import dataclass, replace
 import io
@@ -60,8 +60,12 @@ def read_messages(data: bytes) -> tuple[list[RecordedMessage], list]:
     return messages, list(reader.iter_attachments())
 
 
-def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
-    """Returns a recording."""
+def write_messages(
+    messages: list[RecordedMessage],
+    attachments: list,
+    metadata: Mapping[str, dict[str, str]] | None = None,
+) -> bytes:
+    """Returns a recording; `metadata` has metadata records by their names."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=4000)
     writer.start(profile="ros2", library="test")
@@ -82,6 +86,8 @@ def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
         writer.add_message(
             channels[key], one.log_time, data, one.log_time, number
         )
+    for name, values in (metadata or {}).items():
+        writer.add_metadata(name, values)
     writer.finish()
     return stream.getvalue()
 

@@ -309,16 +309,6 @@ RECIPES = {
         after=("own city",),
         prints=("output/town_01", "output/town_02"),
     ),
-    "repair": Recipe(
-        ".venv/bin/cns-drake export damaged.mcap --format mcap",
-        changes=(
-            ("damaged.mcap", "output/town_01/town_01_0.mcap"),
-            ("whole.mcap", "repaired.mcap"),
-        ),
-        after=("own city",),
-        prints=("the file was whole",),
-        makes=("repaired.mcap",),
-    ),
     "help: scan": Recipe(
         "cns-drake scan worlds/metropolis/stage_01.sdf",
         changes=(
@@ -1003,6 +993,7 @@ NOT_RUN = {
     "all of them",
     ".venv/bin/python -m pytest -m unit": "the quick tests in one of "
     "them; `.ci/run` runs all",
+    "mcap recover": "a program of others",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
     ".venv/bin/cns-drake study ladder suburbia --quick --output": "measures "
@@ -1033,6 +1024,7 @@ NOT_RUN = {
     "weights, too",
     "# cns-drake study outside.yaml": "needs these weights, too",
     "for half in even odd": "needs scans that do not ship",
+    "import numpy as np, torch": "needs PyTorch and these weights, too",
     "cns-drake train": "needs an extra, and minutes; test_training trains",
     ".venv/bin/cns-drake train": "needs that extra, too",
     "pip install '.[train]'": "installs it",

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 import shutil
 
-from mcap.writer import CompressionType
 import numpy as np
 import yaml
 
@@ -21,8 +20,6 @@ from cns_drake.export.exporting import export_drive
 from cns_drake.imports.cityjson.city import import_cityjson
 from cns_drake.imports.openstreetmap.city import import_openstreetmap
 from cns_drake.pictures.camera_views import load_views
-from cns_drake.recording.recording_folder import RecordingFolder
-from cns_drake.recording.repair import repair_mcap
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
@@ -49,10 +46,8 @@ from helpers import (
     helipr_drive,
     mulran_drive,
 )
-from helpers.bag_recordings import contents, record
 from helpers.fuzz_mutations import mutate_osm
 from helpers.fuzzing import Target
-from helpers.mcap_bytes import write_mcap
 from helpers.opendrive_fuzzing import read_opendrive, write_opendrive
 from helpers.small_city import PLAN, ROADS, STAGES
 from helpers.small_cityjson import CityWriter
@@ -239,33 +234,6 @@ def _export(format_name: str):
     return write
 
 
-def _repair(folder: Path) -> None:
-    repair_mcap(folder / "source.mcap", folder / "out" / "repaired.mcap")
-
-
-def _write_source(folder: Path) -> None:
-    (folder / "source.mcap").write_bytes(
-        write_mcap(CompressionType.LZ4, profile="ros2")
-    )
-
-
-def _write_interrupted(folder: Path) -> None:
-    """Writes the files of a run that was killed just before its end."""
-    record(folder / "whole" / "drive", 20)
-    files = RecordingFolder(folder / "drive")
-    shutil.copytree(folder / "whole" / "drive", files.path)
-    files.mcap.rename(f"{files.mcap}.part")
-    for file in (files.metadata, files.scenario):
-        file.unlink()
-
-
-def _go_on(folder: Path) -> dict[str, bytes]:
-    """Resumes a copy; the result is the same for any remaining files."""
-    shutil.copytree(folder / "drive", folder / "out" / "drive")
-    record(folder / "out" / "drive", 20)
-    return contents(folder / "out" / "drive")
-
-
 def _write_clouds(folder: Path) -> None:
     points = dataset_folders.make_points(20)
     dataset_folders.write_pcd(folder / "binary.pcd", points)
@@ -395,10 +363,6 @@ TARGETS = (
         "mcap", 20, _write_recording, ("town_07/*",),
         lambda folder: _read_drive(folder / "town_07"),
         exact=True, only_bytes=True,
-    ),
-    Target("repair", 4, _write_source, ("source.mcap",), _repair),
-    Target(
-        "resume", 1.2, _write_interrupted, ("drive/*.part",), _go_on, exact=True
     ),
     Target("clouds", 20, _write_clouds, ("*.*",), _read_clouds),
     Target(

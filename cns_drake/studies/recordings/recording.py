@@ -42,8 +42,7 @@ def record_all(
 ) -> None:
     """Records scenarios as `<output>/<name>/`.
 
-    A finished recording of the same scenario and world is kept; an interrupted
-    recording is continued.
+    A finished recording of the same scenario and world is kept.
 
     Args:
         scenarios: the scenarios to record.

@@ -2,6 +2,8 @@
 
 import io
 import os
+import struct
+import tracemalloc
 import zipfile
 
 import numpy as np
@@ -47,6 +49,33 @@ def test_a_small_archive_takes_little_memory(tmp_path, kind):
         read_npz(path, ("a",), 20_000)
     # It is not unpacked if nobody asks for it.
     assert read_npz(path, ("b",), 20_000) == {}
+
+
+def test_an_array_that_is_larger_than_declared(tmp_path):
+    path = archive(tmp_path / "a.npz", zipfile.ZIP_DEFLATED, a=bytes(1 << 26))
+    content = bytearray(path.read_bytes())
+    # The size before compression, in the record of the member and in that of
+    # the archive.
+    for start, field in ((0, 22), (content.index(b"PK\x01\x02"), 24)):
+        assert struct.unpack_from("<I", content, start + field) == (1 << 26,)
+        struct.pack_into("<I", content, start + field, 100)
+    path.write_bytes(content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError):  # noqa: PT011  # zipfile's own words.
+            read_npz(path, ("a",), 1 << 20)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 5_000_000
+
+
+def test_the_arrays_together_are_bounded(tmp_path):
+    values = {name: np.zeros(1000) for name in "abc"}
+    np.savez_compressed(tmp_path / "a.npz", **values)
+    assert read_npz(tmp_path / "a.npz", "ab", 20_000).keys() == {"a", "b"}
+    with pytest.raises(ValueError, match="c: more than 20000 bytes"):
+        read_npz(tmp_path / "a.npz", "abc", 20_000)
 
 
 @pytest.mark.parametrize(

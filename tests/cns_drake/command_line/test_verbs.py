@@ -57,7 +57,6 @@ def test_options_of_other_formats_are_refused(capsys, tmp_path, option):
     [
         ("cns", 2, "one drive"),
         ("film", 0, "one drive"),
-        ("mcap", 3, "one drive"),
         ("map-truth", 1, "two drives"),
         ("map-sessions", 3, "two drives"),
         ("bev-images", 2, "one drive"),

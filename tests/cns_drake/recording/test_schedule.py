@@ -42,14 +42,3 @@ def test_a_stream_ends_with_its_last_message():
     assert schedule.due(13) == ["a"]
     assert schedule.due(14) == []
     assert schedule.due(15) == []
-    assert schedule.next_tick(12) == 13
-    assert schedule.next_tick(13) is None
-
-
-def test_the_next_tick_skips_those_without_a_message():
-    schedule = make_schedule({"a": 1 / 128, "b": 0.05}, {"b": 0.1})
-    with_messages = [t for t in range(101) if t % 5 == 0 or t in (32, 64)]
-    found = [0]
-    while found[-1] < 100:
-        found.append(schedule.next_tick(found[-1]))
-    assert found == with_messages

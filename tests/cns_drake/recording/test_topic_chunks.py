@@ -1,7 +1,6 @@
 """Chunks of one topic each: readers see the same messages in the same order."""
 
 import io
-import itertools
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 from mcap.reader import make_reader
@@ -13,9 +12,7 @@ from rosbags.highlevel import AnyReader
 from cns_drake.base.errors import InputError
 from cns_drake.drives.mcap_messages import STAMPED_RECORD
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.repair import repair_mcap
 from cns_drake.recording.rosbag2_metadata import Topic
-from cns_drake.recording.topic_chunks import messages_by_time
 from evaluation.drives import open_drive
 
 FRAMES = 40
@@ -64,14 +61,9 @@ def write(folder, written):
     return folder / f"{folder.name}_0.mcap"
 
 
-@pytest.fixture(params=["recorded", "repaired"])
-def sorted_file(request, mixed, tmp_path):
-    if request.param == "recorded":
-        return write(tmp_path / "town_01", read(mixed))
-    (tmp_path / "town_01").mkdir()
-    output = tmp_path / "town_01" / "town_01_0.mcap"
-    repair_mcap(mixed, output)
-    return output
+@pytest.fixture
+def sorted_file(mixed, tmp_path):
+    return write(tmp_path / "town_01", read(mixed))
 
 
 def test_a_chunk_holds_one_topic_of_a_short_span(mixed, sorted_file):
@@ -102,28 +94,6 @@ def test_readers_keep_the_order_of_messages_of_equal_time(mixed, sorted_file):
             for connection, time, data in reader.messages()
         ]
     assert found == [message[:3] for message in wanted]
-
-
-def test_messages_of_a_cut_file_come_in_the_order_of_time(mixed, sorted_file):
-    wanted = [message[:3] for message in read(mixed)]
-    data = sorted_file.read_bytes()
-    full = 0
-    for size in range(2000, len(data), 60_000):
-        found = [
-            (topic, one.log_time, one.data)
-            for topic, one in messages_by_time(io.BytesIO(data[:size]))
-        ]
-        # Whole spans, then what is there of the last one.
-        same = sum(
-            itertools.takewhile(
-                bool, (a == b for a, b in zip(found, wanted, strict=False))
-            )
-        )
-        assert set(found) <= set(wanted)
-        assert [one[1] for one in found] == sorted(one[1] for one in found)
-        assert same >= full
-        full = same
-    assert full > 64
 
 
 def damage_clouds(path, first, last):

@@ -7,7 +7,6 @@ import base64
 import io
 import math
 import re
-import shutil
 
 from helpers.message_digests import message_digests
 from helpers.tiny_drive import tiny_scenario
@@ -20,7 +19,6 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.simulating import _camera_fields
 from cns_drake.drives.mcap_drive import McapDrive
-from cns_drake.recording import topic_chunks
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.sensors.camera import renderer
 from cns_drake.simulation.simulation import simulate
@@ -245,25 +243,6 @@ def test_camera_of_the_command_line():
     for text in ("640x480", "640@2", "-1x3@2", "640x480@2.5", "a", "6x4@2 "):
         with pytest.raises(InputError, match="not of the form WxH@RATE"):
             _camera_fields(text)
-
-
-@pytest.mark.slow
-@pytest.mark.night
-def test_an_interrupted_recording_goes_on_to_the_same_bytes(
-    recording, tmp_path, monkeypatch
-):
-    # Each frame is written when the next one begins.
-    monkeypatch.setattr(topic_chunks, "_SPAN_NS", 1)
-    scenario = load_scenario(recording / "scenario.yaml")
-    whole = simulate(scenario, tmp_path / "whole").folder
-    mcap = (whole / "tiny_01_0.mcap").read_bytes()
-    folder = tmp_path / "tiny_01"
-    folder.mkdir()
-    (folder / "tiny_01_0.mcap.part").write_bytes(mcap[: len(mcap) * 7 // 10])
-    shutil.copy(whole / "fingerprint.txt", folder / "fingerprint.txt.part")
-    run = simulate(scenario, tmp_path)
-    assert 0 < run.resumed_frames < FRAMES
-    assert (folder / "tiny_01_0.mcap").read_bytes() == mcap
 
 
 def test_drive_page_shows_each_image_from_its_time(recording, tmp_path):

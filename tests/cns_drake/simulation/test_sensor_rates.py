@@ -170,27 +170,6 @@ def test_layouts_hold_the_same_points(recording, tmp_path):
             )
 
 
-def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
-    scenario, recording, tmp_path
-):
-    mcap = (recording / "tiny_01_0.mcap").read_bytes()
-    resumed = []
-    for size in (len(mcap), len(mcap) * 3 // 4, len(mcap) * 9 // 10):
-        output = tmp_path / str(size)
-        folder = output / "tiny_01"
-        folder.mkdir(parents=True)
-        (folder / "tiny_01_0.mcap.part").write_bytes(mcap[:size])
-        shutil.copy(
-            recording / "fingerprint.txt", folder / "fingerprint.txt.part"
-        )
-        run = simulate(scenario, output)
-        resumed.append(run.resumed_frames)
-        assert (folder / "tiny_01_0.mcap").read_bytes() == mcap
-        assert (folder / "imu.yaml").is_file()
-    assert resumed[0] == FRAMES
-    assert 0 < min(resumed) < FRAMES
-
-
 def test_a_shorter_run_begins_alike(scenario, recording, tmp_path):
     short = scenario.model_copy(update={"frames": 5})
     cut = McapDrive(simulate(short, tmp_path).folder)

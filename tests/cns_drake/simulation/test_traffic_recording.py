@@ -1,7 +1,5 @@
 """Recordings with traffic: interrupted, cut short, exported."""
 
-import shutil
-
 from helpers.meshcat_pages import objects, read_commands, tracks
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
@@ -74,25 +72,6 @@ def messages(folder):
             (channel.topic, message.log_time, message.data)
             for _, channel, message in make_reader(stream).iter_messages()
         ]
-
-
-def test_a_resumed_recording_has_the_same_bytes(scenario, recording, tmp_path):
-    name = recording.name
-    mcap = (recording / f"{name}_0.mcap").read_bytes()
-    resumed = []
-    for k, part in enumerate((0.95, 1.0)):
-        folder = tmp_path / str(k) / name
-        folder.mkdir(parents=True)
-        (folder / f"{name}_0.mcap.part").write_bytes(
-            mcap[: int(part * len(mcap))]
-        )
-        shutil.copy(
-            recording / "fingerprint.txt", folder / "fingerprint.txt.part"
-        )
-        resumed.append(simulate(scenario, folder.parent).resumed_frames)
-        assert (folder / f"{name}_0.mcap").read_bytes() == mcap
-    assert resumed[-1] == FRAMES
-    assert 0 < min(resumed) < FRAMES
 
 
 def test_a_shorter_recording_begins_alike(scenario, recording, tmp_path):

@@ -1,8 +1,11 @@
 """Published networks: clouds, closed forms, and weights of other shapes."""
 
+import io
 import math
+import pickle
+import tracemalloc
+import zipfile
 
-from helpers.torch_files import save_weights
 import numpy as np
 import pytest
 from scipy.special import expit
@@ -15,6 +18,11 @@ from evaluation.methods.svt_net import SVT_NET_SHAPES, svt_net
 from evaluation.study.chosen_methods import choose_methods
 
 RNG = np.random.default_rng(11)
+
+
+def save_weights(path, weights):
+    np.savez(path, **weights)
+    return path
 
 
 def test_farthest_points():
@@ -81,18 +89,24 @@ def test_clouds_at_one_place_have_no_descriptor():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["svt-net", "dpa-net"])
-def test_collapsed_clouds_are_no_candidates(tmp_path, monkeypatch, name):
-    shapes = {"svt-net": SVT_NET_SHAPES, "dpa-net": DPA_NET_SHAPES}[name]
+def test_collapsed_clouds_are_no_candidates(tmp_path, name):
+    shapes, infer = {
+        "svt-net": (SVT_NET_SHAPES, svt_net),
+        "dpa-net": (DPA_NET_SHAPES, dpa_net),
+    }[name]
     weights = {
         key: RNG.uniform(0.5, 1.0, shape).astype(np.float32) * 0.1
         for key, shape in shapes.items()
     }
-    path = save_weights(tmp_path / "w.pth", weights, monkeypatch)
+    path = save_weights(tmp_path / "w.npz", weights)
     method = make_method(name, {"weights": path})
     ground = next(collapsed())
     clouds = [street(4000), *collapsed()]
     clouds.append(np.r_[ground, [[5.0, 3.0, 1.0], [8.0, -3.0, 4.0]]])
     described = [method.describe(one) for one in clouds]
+    np.testing.assert_array_equal(
+        described[0], infer(weights, prepare_cloud(clouds[0]))
+    )
     scores = method.score(described[0], method.build_database(described))
     assert np.isfinite(scores[[0, -1]]).all()
     assert np.isnan(scores[1:-1]).all()
@@ -169,22 +183,102 @@ def test_dpa_net_in_closed_form():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"pooling.p": None}, "pooling.p: no such tensor"),
+        ({"pooling.p": None}, "pooling.p is missing"),
         ({"pooling.p": np.ones(2, np.float32)}, r"\(2,\) instead of \(1,\)"),
         ({"pooling.p": np.full(1, np.nan, np.float32)}, "not all are finite"),
+        ({"pooling.p": np.full(1, 1e300)}, "not all are finite"),
+        ({"pooling.p": np.ones(1, np.complex64)}, "not all are finite"),
     ],
 )
-def test_other_weights(tmp_path, monkeypatch, changes, message):
+def test_other_weights(tmp_path, changes, message):
     values = {**svt_weights(), **changes}
     values = {k: v for k, v in values.items() if v is not None}
-    path = save_weights(tmp_path / "w.pth", values, monkeypatch)
-    with pytest.raises(InputError, match=rf"w\.pth: .*{message}") as error:
+    path = save_weights(tmp_path / "w.npz", values)
+    with pytest.raises(InputError, match=rf"w\.npz: .*{message}") as error:
         make_method("svt-net", {"weights": path})
     assert "\n" not in str(error.value)
 
 
-def test_as_a_method(tmp_path, monkeypatch):
-    path = save_weights(tmp_path / "w.pth", svt_weights(), monkeypatch)
+@pytest.mark.parametrize("kind", ["f2", "f8"])
+def test_weights_in_other_precisions(tmp_path, kind):
+    weights = {k: v.astype(kind) for k, v in svt_weights().items()}
+    path = save_weights(tmp_path / "w.npz", weights)
+    method = make_method("svt-net", {"weights": path})
+    exact = {k: v.astype(np.float32) for k, v in weights.items()}
+    np.testing.assert_array_equal(
+        method.describe(street()), svt_net(exact, prepare_cloud(street()))
+    )
+
+
+class Ran:
+    """Runs code when it is unpickled."""
+
+    ran = False
+
+    def __reduce__(self):
+        return setattr, (Ran, "ran", True)
+
+
+def torch_file():
+    """Returns a pickle in an archive, as `torch.save` writes it."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr("archive/data.pkl", pickle.dumps({"state": Ran()}))
+    return content.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        torch_file(),
+        # Files of `torch.save` before PyTorch 1.6 begin like this.
+        b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19.\x80\x02.",
+        pickle.dumps(Ran()),
+        b"text",
+    ],
+    ids=["zip", "legacy", "pickle", "text"],
+)
+@pytest.mark.parametrize("name", ["w.pth", "w.pth.tar", "w.npz"])
+def test_files_of_pytorch_are_refused(tmp_path, content, name):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(
+        InputError, match=rf"{name}: no \.npz .*docs/notes/published_networks"
+    ) as error:
+        make_method("dpa-net", {"weights": path})
+    assert "\n" not in str(error.value)
+    assert not Ran.ran
+
+
+@pytest.mark.slow
+def test_weights_can_neither_run_code_nor_fill_the_memory(tmp_path):
+    path = tmp_path / "w.npz"
+    code = np.array([Ran()], object)
+    np.savez(path, **svt_weights() | {"pooling.p": code})
+    with pytest.raises(InputError, match=r"w\.npz: .*pickle"):
+        make_method("svt-net", {"weights": path})
+    assert not Ran.ran
+    np.savez_compressed(path, **{"pooling.p": np.zeros(80_000_000, np.float32)})
+    assert path.stat().st_size < 1_000_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"w\.npz: .*pooling.p: more than"):
+            make_method("svt-net", {"weights": path})
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 300_000_000
+
+
+def test_weights_must_be_given(tmp_path):
+    with pytest.raises(InputError, match=r"w\.npz: No such file"):
+        make_method("dpa-net", {"weights": tmp_path / "w.npz"})
+    with pytest.raises(InputError, match="svt-net: weights: Field required"):
+        choose_methods(["svt-net"])
+
+
+def test_as_a_method(tmp_path):
+    path = save_weights(tmp_path / "w.npz", svt_weights())
     chosen = choose_methods(["svt-net"], [f"svt-net.weights={path}"])[-1]
     method = chosen.make()
     assert len(chosen.identity()["parameters"]["digest"]) == 16

@@ -1,4 +1,4 @@
-"""`cns-drake generate`: skipping, resuming, errors and remaining files."""
+"""`cns-drake generate`: skipping, errors and remaining files."""
 
 import json
 import os
@@ -68,9 +68,8 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     assert not (output / "long" / "metadata.yaml").exists()
 
     # A parent that is killed cannot end its processes; they do so themselves.
-    # The first run may have left few frames, so there may be no further line.
     run = Generation(files, output, "--jobs", "2")
-    run.wait_for("going on with the next one")
+    run.wait_for("simulating, ")
     run.process.kill()
     status, _ = run.end()
     assert status == -signal.SIGKILL
