@@ -33,7 +33,8 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
         load_experiment,
         shipped_experiments,
     )
-    from cns_drake.studies.study import Study
+    from cns_drake.studies.maps.experiment_maps import ExperimentRun
+    from cns_drake.studies.study import study_drives
 
     if vary not in shipped_experiments():
         values = read_yaml(Path(vary))
@@ -45,7 +46,7 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()), on_note=note)
-    study = Study(experiment, output.absolute(), vary, cluster, note)
-    members = study.drives()
+    run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
+    members = study_drives(run)
     write_scenarios(members, output / "scenarios")
     return members

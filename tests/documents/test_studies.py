@@ -12,7 +12,6 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.drives import changed_drives, side_fields
 from cns_drake.studies.drives.lost_structures import Losses
 from cns_drake.studies.experiments import experiment
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import (
     load_experiment,
@@ -155,7 +154,7 @@ def test_examples_have_their_conditions(tmp_path, page, start, number):
     )
     path = tmp_path / "example.yaml"
     path.write_text(block)
-    found = conditions(load_experiment(path))
+    found = load_experiment(path).conditions
     assert len(found) == number
     assert sum(one.is_baseline for one in found) == 1
     # No two are the same.
@@ -201,7 +200,7 @@ def test_inline_examples_load(tmp_path):
 def test_examples_of_several_drives_have_one_query(name, number, years):
     """Whatever the database, the city of the query has the same age."""
     path = documents.ROOT / f"docs/examples/{name}.yaml"
-    found = conditions(load_experiment(path))
+    found = load_experiment(path).conditions
     assert len(found) == number
-    for one in (*found, *conditions(load_experiment(path, quick=True))):
+    for one in (*found, *load_experiment(path, quick=True).conditions):
         assert one.changes["database"]["years"] == years
