@@ -232,9 +232,9 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
     extracted = (FeatureFiles(tmp_path / "a"), FeatureFiles(tmp_path / "b"))
-    extract(Source(recorded), (solid,), extracted[0])
+    extract(Source(recorded), (solid,), extracted[0], with_scans=True)
     other = Source(Elsewhere(recorded))
-    extract(other, (solid,), extracted[1])
+    extract(other, (solid,), extracted[1], with_scans=True)
     part = Part(tmp_path / "results" / "solid.data")
     database, query = (
         (one.scans, one.described(solid.name)) for one in extracted
