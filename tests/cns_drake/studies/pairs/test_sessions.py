@@ -498,30 +498,6 @@ def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
     assert kinds == ["describe", "describe", "localise"]
 
 
-@pytest.mark.parametrize(
-    "database",
-    [
-        {"sessions": [{}, {"years": 2}]},
-        {
-            "sessions": [{"viewpoint": "near"}, {"viewpoint": "lane"}],
-            "redraw": 1,
-        },
-    ],
-)
-def test_no_map_is_updated_by_drives_through_a_city_to_come(
-    town, tmp_path, database
-):
-    """Before the city is made, a drive stands for one through another city."""
-    wanted = experiment(
-        maps=[str(town)],
-        database={**database, "maintain": "distance"},
-        tasks=["place"],
-        **SIMULATED,
-    )
-    jobs = plan_study(run_of(wanted, tmp_path)).jobs
-    assert not any(name.startswith("upkeep ") for name in jobs)
-
-
 @pytest.mark.slow
 def test_maps_are_maintained(town, tmp_path, jobs_done):
     """Cars park elsewhere on the second day, as they do at the query."""
