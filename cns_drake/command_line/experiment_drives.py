@@ -30,12 +30,13 @@ def varied_drives(vary: str, output: Path, cluster: Cluster) -> list[Scenario]:
     from cns_drake.studies.experiments.experiment_files import (
         load_experiment,
     )
-    from cns_drake.studies.study import Study
+    from cns_drake.studies.maps.experiment_maps import ExperimentRun
+    from cns_drake.studies.study import study_drives
 
     # Nothing is measured, and no program of the experiment runs.
     unused = {"tasks": {"place": {}}, "methods": {"solid": {}}, "charts": []}
     experiment = load_experiment(vary, list(unused.items()))
-    study = Study(experiment, output.absolute(), vary, cluster, note)
-    members = study.drives()
+    run = ExperimentRun(experiment, output.absolute(), vary, cluster, note)
+    members = study_drives(run)
     write_scenarios(members, output / "scenarios")
     return members

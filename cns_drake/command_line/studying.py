@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -15,9 +14,6 @@ from cns_drake.base.terminal import note, resumable
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.protocol_options import with_protocol
-
-if TYPE_CHECKING:
-    from cns_drake.studies.experiments.experiment import Experiment
 
 
 @with_protocol
@@ -142,6 +138,7 @@ def study(
             parse_override,
             shipped_experiments,
         )
+        from evaluation.study.chosen_methods import expanded_names
 
     if list_all:
         for known in shipped_experiments():
@@ -154,7 +151,13 @@ def study(
         path = shipped_experiments().get(name, Path(name))
         typer.echo(path.read_text("utf-8"), nl=False)
         return
-    experiment = _chosen_experiment(name, override or (), task, method, quick)
+    experiment = load_experiment(
+        name,
+        override or (),
+        quick=quick,
+        tasks=task or (),
+        methods=expanded_names(method or ()),
+    )
     if output is None:
         raise InputError("--output: missing")
     if not allow_code:
@@ -187,43 +190,3 @@ def study(
     typer.echo(page)
     name_tables(output)
     suggest_comparison(output)
-
-
-def _chosen_experiment(
-    name: str,
-    overrides: Sequence[str],
-    tasks: list[str] | None,
-    methods: list[str] | None,
-    quick: bool,
-) -> Experiment:
-    """Returns an experiment with the tasks, methods and values of options.
-
-    Args:
-        name: name of a shipped experiment, or an experiment file.
-        overrides: `--set`.
-        tasks: `--task`; None keeps the tasks of the experiment.
-        methods: `--method`; None keeps the methods of the experiment.
-        quick: `--quick`.
-
-    Raises:
-        InputError: the experiment or an option cannot be used.
-    """
-    with uninterrupted():
-        from cns_drake.studies.experiments.experiment_files import (
-            load_experiment,
-        )
-        from evaluation.study.chosen_methods import expanded_names
-
-    experiment = load_experiment(name, overrides, quick=quick)
-    chosen: list[str | tuple[str, Any]] = list(overrides)
-    for field, names in (
-        ("tasks", tasks),
-        ("methods", expanded_names(methods or ())),
-    ):
-        if names:
-            # Methods of the experiment keep their settings.
-            given = getattr(experiment, field) or {}
-            chosen.append(
-                (field, {name: given.get(name, {}) for name in names})
-            )
-    return load_experiment(name, chosen, quick=quick)

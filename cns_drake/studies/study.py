@@ -1,7 +1,7 @@
 """Makes and measures the pairs of drives of an experiment on maps."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,17 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import (
     Condition,
-    conditions,
     levels_by_case,
 )
-from cns_drake.studies.experiments.experiment import FLEET, SESSIONS, Experiment
+from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.method_variants import method_variants
+from cns_drake.studies.experiments.nested_fields import FLEET, SESSIONS
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
-from cns_drake.studies.maps.experiment_maps import ExperimentMaps, MapPairs
-from cns_drake.studies.maps.made_maps import MadeMaps
+from cns_drake.studies.maps.experiment_maps import (
+    ExperimentRun,
+    MapPairs,
+    pairs_by_map,
+)
 from cns_drake.studies.pairs.distractors import distracting_drives
 from cns_drake.studies.pairs.frozen_drives import (
     check_frozen,
@@ -29,7 +32,10 @@ from cns_drake.studies.pairs.frozen_drives import (
     frozen_drives,
 )
 from cns_drake.studies.pairs.recorded_conditions import recorded_conditions
-from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.pairs.simulated_pairs import (
+    ChangedPair,
+    SimulatedPairs,
+)
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.methods import optional_methods
@@ -49,7 +55,7 @@ from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.tasks.change import ChangeTask
 from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import LocaliseTask
-from evaluation.study.tasks.pair import NamedDrive, Pair
+from evaluation.study.tasks.pair import Pair
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
 from evaluation.study.tasks.task import Task
 
@@ -100,241 +106,213 @@ def run_study(
         InputError: a field of the experiment, a map or the folder cannot be
             used, or a step failed.
     """
-    study = Study(
+    run = ExperimentRun(
         experiment,
         output.absolute(),
         source or experiment.name,
         cluster,
         on_note,
     )
-    return study.run(maps)
+    for chart in experiment.charts:
+        with errors_at(run.source):
+            check_chart(chart)
+    protocol = condition_protocol(experiment.conditions[0], run.source)
+    engine = plan_study(run, maps)
+    results, queries = engine.run(cluster)
+    return write_page(
+        results,
+        queries,
+        run.output,
+        title=experiment.name,
+        about=experiment.about,
+        charts=experiment.charts,
+        experiment_text=experiment.text,
+        notes=[protocol.to_text()],
+        on_note=on_note,
+    )
 
 
-@dataclass
-class Study:
-    """Measures an experiment on maps, and writes its results.
+def plan_study(run: ExperimentRun, maps: Sequence[str] = ()) -> Engine:
+    """Returns the engine that measures all pairs of drives in all conditions.
 
-    Attributes:
-        experiment: description of the experiment.
-        output: folder of the results.
-        source: file of the experiment, for error messages.
-        cluster: runs the jobs.
-        on_note: is called with notes on what is left out.
+    Args:
+        run: the experiment.
+        maps: names or folders of maps that replace the experiment's maps.
+
+    Raises:
+        InputError: a field of the experiment, a map or the folder cannot be
+            used, there is nothing to measure, or a drive differs from the
+            frozen drive.
     """
-
-    experiment: Experiment
-    output: Path
-    source: str
-    cluster: Cluster
-    on_note: Callable[[str], None] = lambda text: None
-
-    def __post_init__(self) -> None:
-        self._conditions = conditions(self.experiment)
-        self._tasks = made_tasks(self._wanted_tasks(), TASKS, self.source)
-        with errors_at(f"{self.source}: methods", "--method: "):
-            self._variants = _choose_variants(self.experiment.methods)
-        if self.experiment.frozen is not None:
-            with errors_at(f"{self.source}: frozen"):
-                frozen_drives(self.experiment.frozen)
-        for chart in self.experiment.charts:
-            with errors_at(self.source):
-                check_chart(chart)
-        self._protocol = condition_protocol(self._conditions[0], self.source)
-        self._made = MadeMaps(self.output / "cities")
-        self._maps = ExperimentMaps(
-            self.experiment,
-            self.output,
-            self.source,
-            self.cluster,
-            self.on_note,
-        )
-        self._simulated = SimulatedPairs(
-            self.experiment,
-            self._conditions,
-            self.output,
-            self.source,
-            self._made,
-            self.on_note,
-        )
-
-    def run(self, maps: Sequence[str] = ()) -> Path:
-        """Measures all conditions; returns the path of the study's page.
-
-        Args:
-            maps: names or folders of maps that replace the experiment's maps.
-
-        Raises:
-            InputError: a map or the folder cannot be used, or a step failed.
-        """
-        for name in _OF_REPORTS:
-            if (self.output / name).exists():
-                raise InputError(
-                    f"{self.output / name}: results of another command; give"
-                    " another folder"
-                )
-        self._note_lower_levels()
-        found = list(self._maps.pairs(maps))
-        doing("looking at all conditions")
-        # Errors in the file are found before all slow work.
-        for some in found:
-            self._simulated.request_maps(some)
-        for name in (RESULTS, QUERIES, "index.html"):
-            is_there(self.output / name)  # Nothing else may have its name.
-        self._made.make(self.cluster)
-        engine = self._plan(found)
-        results, queries = engine.run(self.cluster)
-        return write_page(
-            results,
-            queries,
-            self.output,
-            title=self.experiment.name,
-            about=self.experiment.about,
-            charts=self.experiment.charts,
-            experiment_text=self.experiment.text,
-            notes=[self._protocol.to_text()],
-            on_note=self.on_note,
-        )
-
-    def _note_lower_levels(self) -> None:
-        """Notes the cases that lack the highest level of the experiment."""
-        wanted = max(self.experiment.levels or (0,))
-        fewer = [
-            f"{name} ({number})"
-            for name, number in levels_by_case(self.experiment).items()
-            if number < wanted
-        ]
-        if fewer:
-            self.on_note(f"measured at their last level: {', '.join(fewer)}")
-
-    def drives(self, maps: Sequence[str] = ()) -> list[Scenario]:
-        """Returns all drives that the study compares, after making their maps.
-
-        Args:
-            maps: names or folders of maps that replace the experiment's maps.
-
-        Raises:
-            InputError: a map cannot be used, or its drives are recordings.
-        """
-        found = list(self._maps.pairs(maps))
-        for some in found:
-            if some.city is not None:
-                raise InputError(
-                    f"{self.source}: {some.map_name}: its drives are recorded"
-                )
-            self._simulated.request_maps(some)
-        self._made.make(self.cluster)
-        drives: dict[str, Scenario] = {}
-        for some in found:
-            for one in self._simulated.changed(some, made=True):
-                for drive in one.compared.drives:
-                    if drives.setdefault(drive.name, drive) != drive:
-                        raise InputError(
-                            f"{self.source}: two drives are named {drive.name}"
-                        )
-        return list(drives.values())
-
-    def _wanted_tasks(self) -> Mapping[str, Mapping[str, Any]]:
-        """Returns the experiment's tasks with their settings.
-
-        If a database has several drives, a study of place recognition also
-        measures the cost of the methods.
-
-        Raises:
-            InputError: a task compares exactly two drives, but the database has
-                several.
-        """
-        wanted = self.experiment.tasks
-        if not any(map(_has_several, self._conditions)):
-            return wanted
-        for name in (DrivenMapTask.name, ChangeTask.name):
-            if name in wanted:
-                raise InputError(
-                    f"{self.source}: tasks: {name}: it compares two drives, and"
-                    f" the database has several (database.{SESSIONS})"
-                )
-        if PlaceTask.name in wanted and CostTask.name not in wanted:
-            self.on_note(
-                f"{CostTask.name} is measured, too: what a database of several"
-                " drives costs"
-            )
-            return {**wanted, CostTask.name: {}}
-        return wanted
-
-    def _plan(self, maps: Iterable[MapPairs]) -> Engine:
-        """Returns the engine that measures all pairs in all conditions.
-
-        Raises:
-            InputError: there is nothing to measure, or a drive differs from the
-                frozen drive.
-        """
-        engine = Engine(
-            self.experiment.name,
-            self._tasks,
-            dict(self._variants),
-            self.output,
-            self.on_note,
-        )
-        prints: dict[tuple[str, int], list[str]] = {}
-        worlds: dict[Path, str] = {}
-        for some in maps:
-            found: list[Pair] = []
-            if some.city is not None:
-                found += self._recorded_pairs(some.city)
-            else:
-                for one, compared in self._simulated.pairs(some):
-                    found.append(one)
-                    if self.experiment.frozen is not None:
-                        place = one.map_name, one.factors.get(LEVEL, 0)
-                        drawn = prints.setdefault(place, [])
-                        drawn.append(drives_fingerprint(compared, worlds))
-            if not found:
-                self.on_note(f"{some.map_name}: no two drives to compare")
+    experiment = run.experiment
+    # What is quick to check comes before all slow work.
+    tasks = made_tasks(_wanted_tasks(run), TASKS, run.source)
+    with errors_at(f"{run.source}: methods", "--method: "):
+        methods = _choose_variants(experiment)
+    if experiment.frozen is not None:
+        with errors_at(f"{run.source}: frozen"):
+            frozen_drives(experiment.frozen)
+    _check_folder(run.output)
+    _note_lower_levels(run)
+    found = list(pairs_by_map(run, maps))
+    doing("looking at all conditions")
+    simulated = SimulatedPairs(run)
+    changed = simulated.changed(found)
+    engine = Engine(
+        experiment.name, tasks, dict(methods), run.output, run.on_note
+    )
+    for some, simulations in zip(found, changed, strict=True):
+        if some.city is None:
+            pairs = [simulated.named(some, one) for one in simulations]
             jobs: Callable[..., Jobs] = Jobs
-            if some.city is not None:
-                with_map = ChangeTask.name in self._tasks
-                jobs = partial(ExtractionJobs, with_map=with_map)
-            engine.add(found, self._distractors(some, found), jobs)
-        if not engine.jobs:
-            raise InputError(
-                f"{self.source}: no condition that can be measured"
-            )
-        engine.jobs = {**self._simulated.upkeep, **engine.jobs}
-        if self.experiment.frozen is not None:
-            check_frozen(self.experiment.frozen, prints)
-        return engine
-
-    def _recorded_pairs(self, city: MapDrives) -> Iterator[Pair]:
-        """Returns the pairs of recordings in all conditions."""
-        return recorded_pairs(
-            city,
-            recorded_conditions(city, self._conditions, self.source),
-            self.experiment.seeds[0],
-            self.on_note,
-            both_ways=self.experiment.drives == "both-ways",
-        )
-
-    def _distractors(
-        self, some: MapPairs, found: Iterable[Pair]
-    ) -> list[NamedDrive]:
-        """Returns the drives whose places are added to databases."""
-        most = max((one.distractors for one in found), default=0)
-        if not most:
-            return []
-        # The same LiDARs see all places.
-        database, _ = some.pairs[0]
-        if self.experiment.drives == "same-route":
-            database = with_lidars_beside(database, *VIEWPOINTS["near"])
-        return [
-            self._simulated.named_drive(one)
-            for one in distracting_drives(
-                database,
-                most,
-                self._protocol.place_spacing,
-                self.output / "cities",
-                self.cluster,
-                self.on_note,
-            )
+        else:
+            pairs = list(_recorded_pairs(run, some.city))
+            with_map = ChangeTask.name in tasks
+            jobs = partial(ExtractionJobs, with_map=with_map)
+        if not pairs:
+            run.on_note(f"{some.map_name}: no two drives to compare")
+        others = [
+            simulated.named_drive(one) for one in _distractors(run, some, pairs)
         ]
+        engine.add(pairs, others, jobs)
+    if not engine.jobs:
+        raise InputError(f"{run.source}: no condition that can be measured")
+    engine.jobs = {**simulated.upkeep, **engine.jobs}
+    if experiment.frozen is not None:
+        _check_drives_are_frozen(experiment.frozen, found, changed)
+    return engine
+
+
+def study_drives(
+    run: ExperimentRun, maps: Sequence[str] = ()
+) -> list[Scenario]:
+    """Returns all drives that a study compares, after making their maps.
+
+    Args:
+        run: the experiment.
+        maps: names or folders of maps that replace the experiment's maps.
+
+    Raises:
+        InputError: a map cannot be used, or its drives are recordings.
+    """
+    found = list(pairs_by_map(run, maps))
+    for some in found:
+        if some.city is not None:
+            raise InputError(
+                f"{run.source}: {some.map_name}: its drives are recorded"
+            )
+    drives: dict[str, Scenario] = {}
+    for changed in SimulatedPairs(run).changed(found):
+        for one in changed:
+            for drive in one.compared.drives:
+                if drives.setdefault(drive.name, drive) != drive:
+                    raise InputError(
+                        f"{run.source}: two drives are named {drive.name}"
+                    )
+    return list(drives.values())
+
+
+def _wanted_tasks(run: ExperimentRun) -> Mapping[str, Mapping[str, Any]]:
+    """Returns the experiment's tasks with their settings.
+
+    If a database has several drives, a study of place recognition also measures
+    the cost of the methods.
+
+    Raises:
+        InputError: a task compares exactly two drives, but the database has
+            several.
+    """
+    wanted = run.experiment.tasks
+    if not any(map(_has_several, run.experiment.conditions)):
+        return wanted
+    for name in (DrivenMapTask.name, ChangeTask.name):
+        if name in wanted:
+            raise InputError(
+                f"{run.source}: tasks: {name}: it compares two drives, and"
+                f" the database has several (database.{SESSIONS})"
+            )
+    if PlaceTask.name in wanted and CostTask.name not in wanted:
+        run.on_note(
+            f"{CostTask.name} is measured, too: what a database of several"
+            " drives costs"
+        )
+        return {**wanted, CostTask.name: {}}
+    return wanted
+
+
+def _check_folder(output: Path) -> None:
+    """Checks that a folder has no results of other commands."""
+    for name in _OF_REPORTS:
+        if (output / name).exists():
+            raise InputError(
+                f"{output / name}: results of another command; give another"
+                " folder"
+            )
+    for name in (RESULTS, QUERIES, "index.html"):
+        is_there(output / name)  # Nothing else may have its name.
+
+
+def _note_lower_levels(run: ExperimentRun) -> None:
+    """Notes the cases that lack the highest level of the experiment."""
+    wanted = max(run.experiment.levels or (0,))
+    fewer = [
+        f"{name} ({number})"
+        for name, number in levels_by_case(run.experiment).items()
+        if number < wanted
+    ]
+    if fewer:
+        run.on_note(f"measured at their last level: {', '.join(fewer)}")
+
+
+def _recorded_pairs(run: ExperimentRun, city: MapDrives) -> Iterator[Pair]:
+    """Returns the pairs of recordings in all conditions."""
+    experiment = run.experiment
+    return recorded_pairs(
+        city,
+        recorded_conditions(city, experiment.conditions, run.source),
+        experiment.seeds[0],
+        run.on_note,
+        both_ways=experiment.drives == "both-ways",
+    )
+
+
+def _distractors(
+    run: ExperimentRun, some: MapPairs, found: Iterable[Pair]
+) -> list[Scenario]:
+    """Returns the drives whose places are added to databases."""
+    most = max((one.distractors for one in found), default=0)
+    if not most:
+        return []
+    # The same LiDARs see all places.
+    database, _ = some.pairs[0]
+    if run.experiment.drives == "same-route":
+        database = with_lidars_beside(database, *VIEWPOINTS["near"])
+    protocol = condition_protocol(run.experiment.conditions[0], run.source)
+    return distracting_drives(
+        database,
+        most,
+        protocol.place_spacing,
+        run.output / "cities",
+        run.cluster,
+        run.on_note,
+    )
+
+
+def _check_drives_are_frozen(
+    table: str,
+    maps: Iterable[MapPairs],
+    changed: Iterable[Iterable[ChangedPair]],
+) -> None:
+    """Checks that the drives of each map and level are those of a table."""
+    prints: dict[tuple[str, int], list[str]] = {}
+    worlds: dict[Path, str] = {}
+    for some, pairs in zip(maps, changed, strict=True):
+        for one in pairs:
+            factors = {**some.factors, **one.condition.factors}
+            place = some.map_name, factors.get(LEVEL, 0)
+            drawn = drives_fingerprint(one.compared, worlds)
+            prints.setdefault(place, []).append(drawn)
+    check_frozen(table, prints)
 
 
 def _has_several(condition: Condition) -> bool:
@@ -351,24 +329,23 @@ def _has_several(condition: Condition) -> bool:
 
 
 def _choose_variants(
-    wanted: Mapping[str, Mapping[str, Any]] | None,
+    experiment: Experiment,
 ) -> Mapping[str, tuple[MethodChoice, Mapping[str, Any]]]:
     """Returns the chosen methods by key, each with columns of its settings.
-
-    Args:
-        wanted: maps a method's name or Python file to the method's settings;
-            None for all standard methods.
 
     Raises:
         InputError: a method is unknown, or a setting is wrong.
     """
-    files = [Path(one) for one in wanted or () if one.endswith(".py")]
+    files = [
+        Path(one) for one in experiment.methods or () if one.endswith(".py")
+    ]
     known = {one.name: one for one in choose_methods([STANDARD, *files])}
-    if wanted is None:
-        wanted = {name: {} for name in known}
+    variants = experiment.method_variants
+    if experiment.methods is None:
+        variants = method_variants({name: {} for name in known})
     known |= {name: MethodChoice(name) for name in optional_methods()}
     found = {}
-    for name, settings, given in method_variants(wanted):
+    for name, settings, given in variants:
         place = f"methods.{name}."
         if name.endswith(".py"):
             path = Path(name).absolute()

@@ -4,13 +4,12 @@ Frames: world W, LiDAR S. An error has three components relative to the
 vehicle's path: along it, across it (to the left) and up.
 """
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 import math
-import multiprocessing
 from pathlib import Path
 import time
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +35,6 @@ from evaluation.recognition.pose_errors import pose_error
 # A query is localised if the map's drive, or a point of the map's file, is this
 # near to its LiDAR [m].
 NEAR = 7.5
-# Number of queries that wait, per process.
-_WAITING = 4
 # A sensor that moves less than this between two frames stands [m].
 _STANDS = 1e-3
 # Least horizontal share of the direction of a path that is not straight up.
@@ -101,6 +98,44 @@ def path_axes(p_WS: np.ndarray, X_WS: np.ndarray) -> np.ndarray:
     return np.stack([along, left, np.cross(along, left)], axis=2)
 
 
+class Query(NamedTuple):
+    """A scan to localise, with its ground truth.
+
+    Attributes:
+        frame: number of the scan.
+        stamp_ns: time of the scan [ns].
+        scan: structured array (N,), in S.
+        X_WS: (4, 4) ground-truth pose.
+        R_WT: (3, 3) axes of the path: along, to the left, and up.
+    """
+
+    frame: int
+    stamp_ns: int
+    scan: np.ndarray
+    X_WS: np.ndarray
+    R_WT: np.ndarray
+
+
+def read_queries(drive: Drive, frames: Sequence[int]) -> Iterator[Query]:
+    """Yields the scans of a drive to localise; each is read when its turn is.
+
+    Args:
+        drive: the drive.
+        frames: frames of the scans, in any order.
+
+    Raises:
+        InputError: a scan cannot be read.
+    """
+    X_WS, stamps = drive.X_WS, drive.stamps_ns
+    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
+    with errors_at(drive.name):
+        for frame in frames:
+            # Coordinates alone, since queries may be stored.
+            scan = clouds.from_xyz(clouds.xyz(drive.scan(frame)))
+            stamp_ns = int(stamps[frame])
+            yield Query(frame, stamp_ns, scan, X_WS[frame], R_WT[frame])
+
+
 @dataclass(frozen=True, eq=False)
 class Localiser:
     """Localises scans in one map by one estimator.
@@ -117,31 +152,22 @@ class Localiser:
     settings: Settings
 
     def query(
-        self,
-        frame: int,
-        stamp_ns: int,
-        scan: np.ndarray,
-        X_WS: np.ndarray,
-        R_WT: np.ndarray,
-        initial: InitialPose,
+        self, asked: Query, initial: InitialPose
     ) -> tuple[np.ndarray, np.ndarray | None]:
         """Localises one scan and compares the result with the ground truth.
 
         Args:
-            frame: number of the scan.
-            stamp_ns: time of the scan [ns].
-            scan: structured array, in S.
-            X_WS: (4, 4) ground-truth pose.
-            R_WT: (3, 3) axes of the path: along, to the left, and up.
+            asked: the scan.
             initial: the initial pose.
 
         Returns:
             A record of `QUERY`; and the estimated pose X_WS (4, 4), or None. A
             scan with too few points has no pose.
         """
-        measured = cropped(scan, MAX_RANGE)
+        X_WS, R_WT = asked.X_WS, asked.R_WT
+        measured = cropped(asked.scan, MAX_RANGE)
         points = downsample(measured, self.settings.scan_voxel)
-        row = _record_of_start(frame, stamp_ns, initial)
+        row = _record_of_start(asked.frame, asked.stamp_ns, initial)
         if len(points) < FEWEST_POINTS:
             return row, None
         begin = time.process_time()
@@ -208,100 +234,40 @@ def _record_errors(
         row[f"std_{name}"] = math.sqrt(spread[k, k])
 
 
-# The localisers in a forked process.
-_localisers: Sequence[Localiser]
-
-
-def _localise_from_all_starts(
-    starts: Sequence[Starts],
-    frame: int,
-    stamp_ns: int,
-    scan: np.ndarray,
-    X_WS: np.ndarray,
-    R_WT: np.ndarray,
-) -> list[np.ndarray]:
-    """Returns a record for each localiser and each initial pose of a scan.
-
-    The localisers are those of the process. For the other arguments, see
-    `Localiser.query`.
-
-    Args:
-        starts: how the initial poses are sampled.
-    """
-    found = []
-    for localiser in _localisers:
-        for drawn in starts:
-            initial = InitialPose.moved(X_WS, *drawn.draw(frame))
-            row, _ = localiser.query(frame, stamp_ns, scan, X_WS, R_WT, initial)
-            found.append(row)
-    return found
-
-
 def localise(
     localisers: Sequence[Localiser],
-    query: Drive,
-    frames: Sequence[int],
+    queries: Iterable[Query],
     starts: Sequence[Starts],
-    jobs: int = 1,
+    label: str,
+    number: int,
 ) -> list[np.ndarray]:
-    """Localises scans of a drive, each independently of the others.
-
-    Each scan is read once.
+    """Localises scans, each independently of the others.
 
     Args:
         localisers: maps with their estimators.
-        query: the drive.
-        frames: frames of the scans, in any order.
+        queries: the scans, each of which is taken once.
         starts: how the initial poses are sampled.
-        jobs: number of processes, where the system can fork.
+        label: name of the scans' drive, for the progress.
+        number: number of scans, for the progress.
 
     Returns:
         For each localiser and each entry of `starts`, (K,) records of `QUERY`,
-        in the order of the frames. The records of the first localiser come
+        in the order of the queries. The records of the first localiser come
         first.
-
-    Raises:
-        InputError: a scan cannot be read.
     """
-    global _localisers
-    X_WS, stamps = query.X_WS, query.stamps_ns
-    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
-    jobs = max(1, min(jobs, len(frames)))
-
-    def arguments(frame: int) -> tuple:
-        """Returns what `_localise_from_all_starts` needs for a frame."""
-        scan = query.scan(frame)
-        # Only the coordinates are passed on: a scan would be copied to the
-        # process with all its fields.
-        scan = clouds.from_xyz(clouds.xyz(scan))
-        stamp_ns = int(stamps[frame])
-        return starts, frame, stamp_ns, scan, X_WS[frame], R_WT[frame]
-
-    def rows() -> Iterator[list[np.ndarray]]:
-        """Yields the records of each frame, in order."""
-        if jobs == 1 or "fork" not in multiprocessing.get_all_start_methods():
-            for frame in frames:
-                yield _localise_from_all_starts(*arguments(frame))
-            return
-        context = multiprocessing.get_context("fork")
-        with ProcessPoolExecutor(jobs, context) as pool:
-            for first in range(0, len(frames), _WAITING * jobs):
-                batch = frames[first : first + _WAITING * jobs]
-                waiting = [
-                    pool.submit(_localise_from_all_starts, *arguments(f))
-                    for f in batch
-                ]
-                for future in waiting:
-                    yield future.result()
-
-    _localisers = localisers
-    with errors_at(query.name):
-        done = list(
-            track(rows(), f"localising {query.name}", len(frames), "scans")
-        )
-    return [
-        np.array(list(records), QUERY) for records in zip(*done, strict=True)
+    done: list[list[np.ndarray]] = [
+        [] for _ in range(len(localisers) * len(starts))
     ]
+    for asked in track(queries, f"localising {label}", number, "scans"):
+        ends = iter(done)
+        for localiser in localisers:
+            for drawn in starts:
+                offset, turn = drawn.draw(asked.frame)
+                initial = InitialPose.moved(asked.X_WS, offset, turn)
+                with errors_at(label):
+                    row, _ = localiser.query(asked, initial)
+                next(ends).append(row)
+    return [np.array(rows, QUERY) for rows in done]
 
 
 def query_frames(

@@ -11,7 +11,7 @@ from cns_drake.base.progress import track
 from cns_drake.drives.drive import Drive
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
-from evaluation.localisation.localise import Localiser, path_axes
+from evaluation.localisation.localise import Localiser, Query, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
 from evaluation.recognition.result_number import Number
 
@@ -122,14 +122,9 @@ def track_drive(
             initial = InitialPose.moved(X_WS[frame], *starts.draw(frame))
         else:
             initial = InitialPose.compared(last @ steps[k - 1], X_WS[frame])
-        row, end = localiser.query(
-            frame,
-            int(query.stamps_ns[frame]),
-            query.scan(frame),
-            X_WS[frame],
-            R_WT[frame],
-            initial,
-        )
+        stamp_ns, scan = int(query.stamps_ns[frame]), query.scan(frame)
+        asked = Query(frame, stamp_ns, scan, X_WS[frame], R_WT[frame])
+        row, end = localiser.query(asked, initial)
         last = end
         if last is None:
             # The estimate continues by odometry.

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 import math
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -40,55 +40,124 @@ _LONGEST_MS = 3.6e6
 _MANY = 5000
 
 
+class PlaceComparison(NamedTuple):
+    """What is compared with what, and how.
+
+    Attributes:
+        database: the drive of the places: either the source from which its
+            scans are read, or the files that already contain its scans and each
+            method's descriptors of them.
+        query: the drive of the queries, in the same world, like `database`.
+        methods: the methods.
+        protocol: the protocol of the comparison; its field `radius` does not
+            matter.
+        radii: radii of a match [m].
+        distractors: for each drive through another city, and for each method,
+            the file with the method's descriptors of its places.
+        num_distractors: number of places of the drives in `distractors` that
+            are added to the database.
+        beside: the files of further drives in the same world, like the files of
+            `database`.
+        keep, leaves_out_itself: see `Pair`.
+        truth: (Q, D) overlap of each query with each place, if the protocol
+            says that matches are by overlap.
+        shows_overlaps: whether outcomes contain the share of each query's scan
+            that its best match shows.
+        overlaps: file with this share, the result of `shown_overlaps`; None to
+            compute it from the scans.
+        leaves_out_slow: whether to leave out a method that would take more than
+            an hour for all queries.
+    """
+
+    database: DescribedSource
+    query: DescribedSource
+    methods: tuple[MethodChoice, ...]
+    protocol: RetrievalProtocol
+    radii: tuple[float, ...]
+    distractors: tuple[tuple[Part, ...], ...] = ()
+    num_distractors: int = 0
+    beside: tuple[tuple[Part, ...], ...] = ()
+    keep: str | int = KEEP_ALL
+    leaves_out_itself: bool = False
+    truth: np.ndarray | None = None
+    shows_overlaps: bool = True
+    overlaps: Part | None = None
+    leaves_out_slow: bool = True
+
+    def by_method(self, number: int) -> "PlaceComparison":
+        """Returns the comparison by one method, given its number.
+
+        Both drives must be in files.
+        """
+        (scans, *described), (asked, *descriptors) = self.stored
+        return self._replace(
+            database=(scans, described[number]),
+            query=(asked, descriptors[number]),
+            methods=(self.methods[number],),
+            distractors=tuple((parts[number],) for parts in self.distractors),
+            beside=tuple((one, parts[number]) for one, *parts in self.beside),
+        )
+
+    @property
+    def stored(self) -> tuple[tuple[Part, ...], tuple[Part, ...]]:
+        """The files of both drives, which must be in files."""
+        assert isinstance(self.database, tuple)
+        assert isinstance(self.query, tuple)
+        return self.database, self.query
+
+    def searched(
+        self, number: int, database: DriveDescriptors | Part, method: Method
+    ) -> Searched:
+        """Returns the database that a method searches.
+
+        Args:
+            number: number of the method.
+            database: the method's descriptors of the drive of the places.
+            method: the method.
+        """
+        return searched_database(
+            database,
+            [parts[number] for parts in self.distractors],
+            self.num_distractors,
+            [parts[1 + number] for parts in self.beside],
+            self.keep,
+            self.protocol.place_spacing,
+            divides=method.divides,
+        )
+
+
 def shown_overlaps(
-    reporter: Reporter,
-    scans: tuple[Part, Part],
-    described: tuple[Part, Part],
-    choice: MethodChoice,
-    protocol: RetrievalProtocol,
-    radii: tuple[float, ...],
-    beside: tuple[tuple[Part, Part], ...] = (),
-    leaves_out_itself: bool = False,
-    keep: str | int = KEEP_ALL,
+    reporter: Reporter, compared: PlaceComparison
 ) -> dict[float, np.ndarray]:
     """Returns the share of each query's scan that its best match shows.
 
     Args:
         reporter: unused.
-        scans: files with the scans of database and query: a `KeptScans`, or a
-            list of scans.
-        described: files with a method's descriptors of database and query, from
-            which the poses are read.
-        choice: the method.
-        protocol: protocol that says how the scans of queries are changed.
-        radii: radii of a match [m].
-        beside: files with the scans of further drives in the same world, and
-            with a method's descriptors of their places.
-        leaves_out_itself, keep: see `Pair`.
+        compared: the comparison by any method, from whose descriptors the poses
+            are read. The files of scans contain a `KeptScans`, or a list of
+            scans.
 
     Returns:
         Radius -> (Q,) overlaps; NaN without a match.
     """
-    choice.make()  # It registers the type of its descriptors.
-    _, query = described[1].read()
-    asked = scans[1].read()
+    # The method registers the type of its descriptors.
+    method = compared.methods[0].make()
+    (scans, described), (asked_scans, described_query) = compared.stored
+    protocol, radii = compared.protocol, compared.radii
+    _, query = described_query.read()
+    asked = asked_scans.read()
     if not isinstance(asked, list):
         asked = [
             protocol.query_scan(asked, frame).astype(np.float32)
             for frame in query.queries.frames.tolist()
         ]
-    searched = searched_database(
-        described[0],
-        (),
-        0,
-        [places for _, places in beside],
-        keep,
-        protocol.place_spacing,
-        divides=True,
-    )
+    here = compared._replace(distractors=(), num_distractors=0)
+    searched = here.searched(0, described, method)
     database = searched.described
     names = searched.drives
-    allowed = _other_places(query, names) if leaves_out_itself else True
+    allowed = (
+        _other_places(query, names) if compared.leaves_out_itself else True
+    )
     matches = {
         radius: matches_within_radius(
             database, query, replace(protocol, radius=radius)
@@ -102,7 +171,9 @@ def shown_overlaps(
         drive_of = np.zeros(len(searched.rows), np.int64)
     # The scans of one drive are in memory at a time.
     first = 0
-    for number, (part, _) in enumerate([(scans[0], None), *beside]):
+    for number, part in enumerate(
+        [scans, *(parts[0] for parts in compared.beside)]
+    ):
         of = drive_of == number
         kept = part.read()
         if isinstance(kept, list):
@@ -125,75 +196,8 @@ def shown_overlaps(
     return found
 
 
-def measure_method(
-    reporter: Reporter,
-    database: Part,
-    query: Part,
-    distractors: tuple[Part, ...],
-    num_distractors: int,
-    choice: MethodChoice,
-    overlaps: Part | None,
-    protocol: RetrievalProtocol,
-    radii: tuple[float, ...],
-    beside: tuple[Part, ...] = (),
-    leaves_out_itself: bool = False,
-    keep: str | int = KEEP_ALL,
-) -> list[PlaceOutcome]:
-    """Returns the outcomes of one method, as `measure_places` does.
-
-    Args:
-        reporter: reports notes.
-        database, query: files with the method's descriptors of the places and
-            of the queries.
-        distractors: for each drive through another city, the file with the
-            method's descriptors of its places.
-        num_distractors: see `measure_places`.
-        choice: the method.
-        overlaps: file with the result of `shown_overlaps`; None to leave
-            overlaps unknown.
-        protocol, radii: see `measure_places`.
-        beside: files with the method's descriptors of the places of further
-            drives in the same world.
-        leaves_out_itself, keep: see `Pair`.
-    """
-    # The method comes first, because it registers the type of its
-    # descriptors.
-    method = choice.make()
-    placed, (placed_query, asked) = database.read()[0], query.read()
-    check_same_world(placed, placed_query, across_maps=True)
-    shown = {} if overlaps is None else overlaps.read()
-    return _method_outcomes(
-        choice,
-        method,
-        searched_database(
-            database,
-            distractors,
-            num_distractors,
-            beside,
-            keep,
-            protocol.place_spacing,
-            divides=method.divides,
-        ),
-        asked,
-        protocol,
-        radii,
-        lambda radius, matches: shown.get(radius),
-        reporter,
-        leaves_out_itself=leaves_out_itself,
-    )
-
-
 def measure_places(
-    reporter: Reporter,
-    database: DescribedSource,
-    query: DescribedSource,
-    distractors: tuple[tuple[Part, ...], ...],
-    num_distractors: int,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    radii: tuple[float, ...],
-    truth: np.ndarray | None = None,
-    leaves_out_slow: bool = True,
+    reporter: Reporter, compared: PlaceComparison
 ) -> list[PlaceOutcome]:
     """Returns the outcomes of methods, for several radii of a match.
 
@@ -203,64 +207,55 @@ def measure_places(
     estimate.
 
     Args:
-        reporter: reports progress.
-        database: the drive of the places: either the source from which its
-            scans are read, or the files that already contain its scans and each
-            method's descriptors of them.
-        query: the drive of the queries, in the same world, like `database`.
-        distractors: for each drive through another city, and for each method,
-            the file with the method's descriptors of its places.
-        num_distractors: number of places of the drives in `distractors` that
-            are added to the database.
-        methods: the methods.
-        protocol: the protocol of the comparison; its field `radius` does not
-            matter.
-        radii: radii of a match [m].
-        truth: (Q, D) overlap of each query with each place, if the protocol
-            says that matches are by overlap.
-        leaves_out_slow: whether to leave out a method that would take more than
-            an hour for all queries.
+        reporter: reports progress and notes.
+        compared: the drives, the methods and the protocol.
+
+    Raises:
+        InputError: a drive cannot be read, the drives are not in one world, or
+            a method returns an invalid result.
     """
-    places = _described_drive(database, "places", methods, protocol)
-    queries = _described_drive(query, "queries", methods, protocol)
+    methods, protocol = compared.methods, compared.protocol
+    places = _described_drive(compared.database, "places", methods, protocol)
+    queries = _described_drive(compared.query, "queries", methods, protocol)
     overlaps: dict[float, np.ndarray] = {}
+    if compared.overlaps is not None:
+        overlaps = compared.overlaps.read()
     outcomes = []
     for k, choice in enumerate(
         track(methods, "comparing", len(methods), "methods")
     ):
+        # The method comes first, because it registers the type of its
+        # descriptors.
         method = choice.make()
         mapped, asked = places.take(k), queries.take(k)
+        if isinstance(asked, Part):
+            names, asked = asked.read()
+            if isinstance(mapped, Part):
+                check_same_world(mapped.read()[0], names, across_maps=True)
+        searched = compared.searched(k, mapped, method)
         outcomes += _method_outcomes(
             choice,
             method,
-            searched_database(
-                mapped,
-                [parts[k] for parts in distractors],
-                num_distractors,
-                divides=method.divides,
-            ),
+            searched,
             asked,
-            protocol,
-            radii,
+            compared,
             partial(
                 _overlaps_of_matches,
                 overlaps,
-                places.scans,
-                queries.scans,
-                mapped,
+                places,
+                queries,
+                searched.described,
                 asked,
             ),
             reporter,
-            truth,
-            leaves_out_slow=leaves_out_slow,
         )
     return outcomes
 
 
 def _overlaps_of_matches(
     overlaps: dict[float, np.ndarray],
-    place_scans: list[np.ndarray],
-    query_scans: list[np.ndarray],
+    places: "_DescribedDrive",
+    queries: "_DescribedDrive",
     database: DriveDescriptors,
     query: DriveDescriptors,
     radius: float,
@@ -273,21 +268,21 @@ def _overlaps_of_matches(
 
     Args:
         overlaps: radius -> known overlaps; new overlaps are added here.
-        place_scans: scans of the P places of the drive itself, which come first
-            in the database.
-        query_scans: scans of the Q queries.
+        places: the drive of the places, which come first in the database.
+        queries: the drive of the queries.
         database: the described places.
         query: the described queries.
         radius: radius of a match [m].
         matches: (Q, D) which places match the queries within the radius.
     """
     if radius not in overlaps:
+        scans = places.scans
         overlaps[radius] = overlaps_with_best_match(
-            place_scans,
-            database.places.X_WS,
-            query_scans,
+            scans,
+            database.places.X_WS[: len(scans)],
+            queries.scans,
             query.queries.X_WS,
-            matches[:, : len(place_scans)],
+            matches[:, : len(scans)],
         )
     return overlaps[radius]
 
@@ -297,14 +292,9 @@ def _method_outcomes(
     method: Method,
     database: Searched,
     query: DriveDescriptors,
-    protocol: RetrievalProtocol,
-    radii: tuple[float, ...],
-    shown: Callable[[float, np.ndarray], np.ndarray | None],
+    compared: PlaceComparison,
+    shown: Callable[[float, np.ndarray], np.ndarray],
     reporter: Reporter,
-    truth: np.ndarray | None = None,
-    *,
-    leaves_out_itself: bool = False,
-    leaves_out_slow: bool = True,
 ) -> list[PlaceOutcome]:
     """Returns a method's outcomes; none if the method would take too long.
 
@@ -313,16 +303,16 @@ def _method_outcomes(
         method: the method, as it was made.
         database: the places that are searched.
         query: the described queries.
-        protocol, radii: see `measure_places`.
+        compared: the comparison.
         shown: function that takes a radius, and the matches (Q, D) within this
             radius, and returns the overlaps (Q,) of the queries.
         reporter: reports notes.
-        truth, leaves_out_slow: see `measure_places`.
-        leaves_out_itself: see `Pair`.
     """
     searched, drives, num_here, _ = database
+    protocol, radii = compared.protocol, compared.radii
+    truth = compared.truth
     if (
-        leaves_out_slow
+        compared.leaves_out_slow
         and len(searched.places.frames) > _MANY
         and _takes_long(method, searched, query)
     ):
@@ -337,14 +327,16 @@ def _method_outcomes(
         protocol,
         [None, *radii],
         truth,
-        _other_places(query, drives) if leaves_out_itself else None,
+        _other_places(query, drives) if compared.leaves_out_itself else None,
     )
     outcomes = []
     for radius, one in zip(radii, by_gate, strict=True):
         matches = plain.matches
         if truth is None:
             matches = (plain.distances <= radius) & plain.is_known
-        overlaps = shown(radius, matches)
+        overlaps = None
+        if compared.shows_overlaps:
+            overlaps = shown(radius, matches)
         outcomes += [
             PlaceOutcome.of(
                 choice.key,
@@ -384,10 +376,13 @@ class _DescribedDrive(Protocol):
         scans: the scans, in the order of the places or queries.
     """
 
-    scans: list[np.ndarray]
+    @property
+    def scans(self) -> list[np.ndarray]: ...
 
-    def take(self, number: int) -> DriveDescriptors:
+    def take(self, number: int) -> DriveDescriptors | Part:
         """Returns the descriptors by one method, and keeps no copy of them.
+
+        If they are in a file, the result is the file.
 
         Only the descriptors of a method that is compared should be in memory.
         Call this function only once for each method.
@@ -401,17 +396,21 @@ class _StoredDrive:
     """A drive whose scans and descriptors are in files."""
 
     def __init__(self, scans: Part, *described: Part):
-        """Reads the scans.
+        """Reads nothing yet.
 
         Args:
             scans: file with the scans.
             described: for each method, the file with its descriptors.
         """
-        self.scans: list[np.ndarray] = scans.read()
+        self._scans = scans
         self._described = described
 
-    def take(self, number: int) -> DriveDescriptors:
-        return self._described[number].read()[1]
+    @cached_property
+    def scans(self) -> list[np.ndarray]:
+        return self._scans.read()
+
+    def take(self, number: int) -> Part:
+        return self._described[number]
 
 
 class _ReadDrive:
@@ -434,7 +433,7 @@ class _ReadDrive:
         """
         asked = {one.key: (one.make(), {role}, protocol) for one in methods}
         found = describe_recording(source(), {role}, asked, protocol)
-        self.scans = found.shown_scans
+        self.scans: list[np.ndarray] = found.shown_scans
         self._described = found.described
         self._methods = methods
 

@@ -7,7 +7,6 @@ from helpers import documents
 import pytest
 import yaml
 
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import (
     load_experiment,
@@ -92,7 +91,7 @@ def test_examples_have_their_conditions(tmp_path, page, start, number):
     )
     path = tmp_path / "example.yaml"
     path.write_text(block)
-    found = conditions(load_experiment(path))
+    found = load_experiment(path).conditions
     assert len(found) == number
     assert sum(one.is_baseline for one in found) == 1
     # No two are the same.
@@ -138,7 +137,7 @@ def test_inline_examples_load(tmp_path):
 def test_examples_of_several_drives_have_one_query(name, number, years):
     """Whatever the database, the city of the query has the same age."""
     path = documents.ROOT / f"docs/examples/{name}.yaml"
-    found = conditions(load_experiment(path))
+    found = load_experiment(path).conditions
     assert len(found) == number
-    for one in (*found, *conditions(load_experiment(path, quick=True))):
+    for one in (*found, *load_experiment(path, quick=True).conditions):
         assert one.changes["database"]["years"] == years

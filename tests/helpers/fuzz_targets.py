@@ -34,9 +34,9 @@ from cns_drake.sensors.lidar.presets import make_beam_pattern
 from cns_drake.simulation.scan_files import save_scan
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment_files import load_experiment
-from cns_drake.studies.study import Study
+from cns_drake.studies.maps.experiment_maps import ExperimentRun
+from cns_drake.studies.study import study_drives
 from evaluation import drives
 from evaluation.clouds.cloud_files import read_cloud
 from helpers import (
@@ -149,9 +149,9 @@ def _is_small(scenario: Scenario) -> bool:
 
 def _vary(folder: Path) -> None:
     experiment = load_experiment(folder / "vary.yaml")
-    if len(conditions(experiment)) * len(experiment.seeds) < 100:
-        study = Study(experiment, folder / "out", "vary.yaml", Cluster(1))
-        write_scenarios(study.drives(), folder / "out" / "scenarios")
+    if len(experiment.conditions) * len(experiment.seeds) < 100:
+        run = ExperimentRun(experiment, folder / "out", "vary.yaml", Cluster(1))
+        write_scenarios(study_drives(run), folder / "out" / "scenarios")
 
 
 def _load_roads(folder: Path) -> None:

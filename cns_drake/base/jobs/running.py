@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -42,7 +43,13 @@ class Job:
     cost: float = 1.0
 
 
-def run_jobs(jobs: Iterable[Job], cluster: Cluster, unit: str = "jobs") -> None:
+def run_jobs(
+    jobs: Iterable[Job],
+    cluster: Cluster,
+    unit: str = "jobs",
+    *,
+    resumes: bool = True,
+) -> None:
     """Runs jobs on a cluster, the longest chains of dependent jobs first.
 
     Notes of the jobs are printed on stderr. A job whose process or worker dies
@@ -52,6 +59,8 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster, unit: str = "jobs") -> None:
         jobs: the jobs.
         cluster: runs them.
         unit: what the jobs are, such as `cities`.
+        resumes: whether another run can use the files of finished jobs; if the
+            work is interrupted, a note says so.
 
     Raises:
         FailedJobsError: if jobs could not be done; the error names all of these
@@ -79,7 +88,7 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster, unit: str = "jobs") -> None:
     messages: queue.SimpleQueue = queue.SimpleQueue()
     costs = {name: job.cost for name, job in left.items()}
     with (
-        resumable(),
+        resumable() if resumes else nullcontext(),
         listener().jobs(costs, len(done), unit) as shown,
         cluster.connect(lambda *message: messages.put(message)) as workers,
     ):

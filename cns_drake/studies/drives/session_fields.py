@@ -6,8 +6,12 @@ from typing import Any
 from cns_drake.base.errors import InputError, validated
 from cns_drake.studies.drives.sampled_drives import Fleet
 from cns_drake.studies.drives.side_fields import DATABASE_FIELDS
-from cns_drake.studies.experiments.experiment import FLEET, SESSIONS
-from cns_drake.studies.experiments.nested_fields import Changes, merged
+from cns_drake.studies.experiments.nested_fields import (
+    FLEET,
+    SESSIONS,
+    Changes,
+    merged,
+)
 
 # Fields that all drives of a database share.
 _SHARED_FIELDS = (*DATABASE_FIELDS, "rates")

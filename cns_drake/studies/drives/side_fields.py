@@ -6,8 +6,11 @@ from typing import Any
 
 from cns_drake.ageing.years import LAST_YEAR
 from cns_drake.base.errors import InputError
-from cns_drake.studies.experiments.experiment import FLEET, SESSIONS
-from cns_drake.studies.experiments.nested_fields import Changes
+from cns_drake.studies.experiments.nested_fields import (
+    FLEET,
+    SESSIONS,
+    Changes,
+)
 from evaluation.map_update.upkeep import MAINTAINERS, NOT_MAINTAINED
 
 # Fields that only the query can have: they change its scans.

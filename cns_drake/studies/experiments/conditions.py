@@ -1,12 +1,13 @@
 """Conditions: the combinations of an experiment's factors and cases."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass
 import itertools
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cns_drake.studies.experiments.experiment import SIDES, Case, Experiment
 from cns_drake.studies.experiments.factors import (
     FactorValues,
     leaves,
@@ -14,12 +15,17 @@ from cns_drake.studies.experiments.factors import (
     table_value,
 )
 from cns_drake.studies.experiments.nested_fields import (
+    SIDES,
+    Case,
     Changes,
     merged,
     nested,
     set_field,
 )
 from evaluation.results.keys import CAUSE, FROZEN_REDRAW, LEVEL, NO_CAUSE
+
+if TYPE_CHECKING:
+    from cns_drake.studies.experiments.experiment import Experiment
 
 # Places in the file of an experiment where a list of values is a factor.
 _FACTORED = (*SIDES, "protocol")

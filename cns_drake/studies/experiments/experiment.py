@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import contextlib
-from typing import Annotated, Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 import yaml
@@ -18,17 +19,16 @@ from cns_drake.base.errors import InputError, validated
 from cns_drake.base.repetitions import check_once
 from cns_drake.scenarios.scenario import Name
 from cns_drake.sensors.sensor_config import Section
+from cns_drake.studies.experiments.conditions import Condition, conditions
+from cns_drake.studies.experiments.method_variants import (
+    MethodVariant,
+    method_variants,
+)
+from cns_drake.studies.experiments.nested_fields import SIDES, Case
 from cns_drake.studies.experiments.spread_values import expand_spread
 
-# Sections of an experiment with fields of both drives, or of one of them.
-SIDES = ("both", "database", "query")
-# Field of the database with its drives, each with fields of its own.
-SESSIONS = "sessions"
-# Field of the database with drives that are sampled at random.
-FLEET = "fleet"
-
-# The section of each drive -> the fields that a case sets there.
-Case = dict[str, dict[str, Any]]
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 def _listed(value: Any) -> Any:
@@ -250,6 +250,35 @@ class Experiment(Section):
         if isinstance(redraw, Mapping):
             found = expand_spread(redraw.get("frozen", []))
         return found if isinstance(found, list) else [found]
+
+    @cached_property
+    def conditions(self) -> list[Condition]:
+        """The conditions: the combinations of factors and cases.
+
+        The baseline is the first.
+
+        Raises:
+            ValueError: a factor has no values or the same value twice, the
+                baseline names an unknown factor or value, or there are too many
+                conditions.
+        """
+        return conditions(self)
+
+    @cached_property
+    def method_variants(self) -> list[MethodVariant]:
+        """The methods that the experiment names, with their settings.
+
+        Raises:
+            ValueError: a setting has no values, or the same value twice.
+        """
+        return method_variants(self.methods or {})
+
+    def replaced(self, **fields: Any) -> Self:
+        copy = super().replaced(**fields)
+        # They follow from the fields.
+        for name in ("conditions", "method_variants"):
+            copy.__dict__.pop(name, None)
+        return copy
 
     @property
     def text(self) -> str:

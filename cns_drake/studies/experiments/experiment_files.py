@@ -1,6 +1,6 @@
 """Reads experiments from files, with changes to single fields."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,7 @@ from cns_drake.base.errors import (
     value_errors,
 )
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment, in_long_form
-from cns_drake.studies.experiments.method_variants import method_variants
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
 
 _FOLDER = Path(__file__).parent
@@ -30,6 +28,8 @@ def load_experiment(
     overrides: Iterable[str | tuple[str, Any]] = (),
     *,
     quick: bool = False,
+    tasks: Sequence[str] = (),
+    methods: Sequence[str] = (),
 ) -> Experiment:
     """Reads an experiment.
 
@@ -40,6 +40,9 @@ def load_experiment(
             separate nested fields, as in `database.years=[0, 5]`.
         quick: whether the fields in the section `quick` of the experiment
             replace its other fields.
+        tasks: tasks to measure instead of the experiment's tasks; the settings
+            of the experiment stay.
+        methods: methods to run, in the same way.
 
     Raises:
         InputError: there is no such experiment, or a field is unknown or not
@@ -50,22 +53,51 @@ def load_experiment(
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of an experiment's fields")
     values = in_long_form({"name": path.stem, **values})
+    short = values.get("quick")
+    if quick and not isinstance(short, dict):
+        raise InputError(
+            f"{path}: quick: missing, or no mapping; --quick needs this"
+            " section, with the fields to replace"
+        )
+    overrides = list(overrides)
+    chosen = {"tasks": tasks, "methods": methods}
     if quick:
-        if not isinstance(values.get("quick"), dict):
-            raise InputError(
-                f"{path}: quick: missing, or no mapping; --quick needs this"
-                " section, with the fields to replace"
-            )
-        values = _chosen_anew(values, values["quick"])
+        values = _chosen_anew(values, short)
+        return _checked(values, path, overrides, chosen)
+    found = _checked(values, path, overrides, chosen)
+    if isinstance(short, dict) and short:
+        # A fault of the section is told before it is used.
+        with errors_at(f"{path}: quick", f"{path}: "):
+            values = _chosen_anew(values, short)
+            _checked(values, path, overrides, chosen)
+    return found
+
+
+def _checked(
+    values: Changes,
+    path: Path,
+    overrides: Iterable[str | tuple[str, Any]],
+    chosen: Mapping[str, Sequence[str]],
+) -> Experiment:
+    """Returns an experiment whose conditions are known to be usable.
+
+    Args:
+        values: the fields of the file, in long form.
+        path: the file.
+        overrides: see `load_experiment`.
+        chosen: names of tasks and methods that replace those of the experiment.
+    """
     for one in overrides:
         values = _overridden(values, one)
+    values = in_long_form(dict(values))
+    for field, names in chosen.items():
+        if names:
+            given = values.get(field)
+            given = given if isinstance(given, dict) else {}
+            values[field] = {name: given.get(name, {}) for name in names}
     experiment = validated(Experiment, values, path)
     with value_errors(path):
-        conditions(experiment)
-        method_variants(experiment.methods or {})
-    if not quick and experiment.quick:
-        with errors_at(f"{path}: quick", f"{path}: "):
-            load_experiment(name_or_file, overrides, quick=True)
+        _ = experiment.conditions, experiment.method_variants
     return experiment
 
 

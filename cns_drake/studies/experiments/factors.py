@@ -5,8 +5,7 @@ import json
 from typing import Any
 
 from cns_drake.base.repetitions import check_once
-from cns_drake.studies.experiments.experiment import SESSIONS
-from cns_drake.studies.experiments.nested_fields import Changes
+from cns_drake.studies.experiments.nested_fields import SESSIONS, Changes
 from cns_drake.studies.experiments.spread_values import expand_spread, is_spread
 
 # Fields with a list as a single value -> types of what the list contains.

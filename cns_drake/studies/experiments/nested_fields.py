@@ -5,6 +5,14 @@ from typing import Any
 
 # Name of a field -> its value, which can be a mapping of further fields.
 Changes = Mapping[str, Any]
+# Sections of an experiment with fields of both drives, or of one of them.
+SIDES = ("both", "database", "query")
+# Field of the database with its drives, each with fields of its own.
+SESSIONS = "sessions"
+# Field of the database with drives that are sampled at random.
+FLEET = "fleet"
+# The section of each drive -> the fields that a case sets there.
+Case = dict[str, dict[str, Any]]
 
 
 def merged(values: Any, changes: Any) -> Any:

@@ -26,6 +26,25 @@ from evaluation.study.recordings.recording_search import find_recordings
 
 
 @dataclass(frozen=True)
+class ExperimentRun:
+    """An experiment, and where and by what it is run.
+
+    Attributes:
+        experiment: the experiment.
+        output: folder of the results.
+        source: file of the experiment, for errors.
+        cluster: runs the jobs.
+        on_note: is called with notes on what is left out.
+    """
+
+    experiment: Experiment
+    output: Path
+    source: str
+    cluster: Cluster
+    on_note: Callable[[str], None] = lambda text: None
+
+
+@dataclass(frozen=True)
 class MapPairs:
     """The pairs of drives of one map, before a condition changes them.
 
@@ -53,129 +72,111 @@ class MapPairs:
         return names | {one.name for pair in self.pairs for one in pair}
 
 
-class ExperimentMaps:
-    """Finds the maps of an experiment, and makes maps that do not exist."""
+def pairs_by_map(run: ExperimentRun, maps: Sequence[str]) -> Iterator[MapPairs]:
+    """Yields the pairs of all maps; makes aged and imported maps.
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        output: Path,
-        source: str,
-        cluster: Cluster,
-        on_note: Callable[[str], None],
-    ) -> None:
-        """Finds nothing yet.
+    Args:
+        run: the experiment.
+        maps: names or folders of maps that replace the experiment's maps.
 
-        Args:
-            experiment: the experiment.
-            output: folder of the study's results.
-            source: file of the experiment, for errors.
-            cluster: makes maps.
-            on_note: is called with notes on what is left out.
-        """
-        self._experiment = experiment
-        self._output = output
-        self._source = source
-        self._cluster = cluster
-        self._on_note = on_note
-
-    def pairs(self, maps: Sequence[str]) -> Iterator[MapPairs]:
-        """Yields the pairs of all maps; makes aged and imported maps.
-
-        Args:
-            maps: names or folders of maps that replace the experiment's maps.
-
-        Raises:
-            InputError: a map cannot be used, or two maps or drives have the
-                same name.
-        """
-        made = {
-            one.name: one
-            for one in self._experiment.maps or ()
-            if isinstance(one, MadeMap)
-        }
-        wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
-        if not maps:
-            wanted = self._experiment.maps or recordable_maps()
-        known: set[str] = set()
-        for one in wanted:
-            # A wrong name is found before any map is made.
-            if self._experiment.frozen_redraws and (
-                isinstance(one, MadeMap) or one not in shipped_maps()
-            ):
-                raise InputError(
-                    f"{self._source}: {FROZEN_REDRAW}:"
-                    f" {getattr(one, 'name', one)}: no shipped map"
-                )
-            if isinstance(one, str) and not Path(one).is_dir():
-                try:
-                    recordable_map(one)
-                except InputError as error:
-                    place = "" if maps else f"{self._source}: maps: "
-                    raise InputError(f"{place}{error}") from None
-        for one in wanted:
-            for some in self._pairs_of(one):
-                names = {some.map_name, *some.drive_names}
-                if some.factors:
-                    names.remove(some.map_name)
-                for name in sorted(names & known):
-                    raise InputError(
-                        f"{getattr(one, 'name', one)}: another map, or a drive"
-                        f" of one, has the name {name}, too"
-                    )
-                known |= names
-                yield some
-
-    def _pairs_of(self, one: str | MadeMap) -> Iterator[MapPairs]:
-        if isinstance(one, MadeMap):
-            folder = self._output / "cities" / one.name
-            step = made_map_step(one, self._experiment, folder, shipped_maps())
-            make_maps([step], folder.parent, self._cluster)
-            yield MapPairs(one.name, {}, self._drive_pairs(folder))
-            return
-        path = shipped_maps().get(one, Path(one))
-        versions = self._experiment.frozen_redraws
-        if versions:
-            cities = redraw_frozen(
-                [one],
-                versions,
-                self._output / "cities",
-                self._cluster,
-                self._source,
+    Raises:
+        InputError: a map cannot be used, or two maps or drives have the same
+            name.
+    """
+    made = {
+        one.name: one
+        for one in run.experiment.maps or ()
+        if isinstance(one, MadeMap)
+    }
+    wanted: Sequence[str | MadeMap] = [made.get(one, one) for one in maps]
+    if not maps:
+        wanted = run.experiment.maps or recordable_maps()
+    known: set[str] = set()
+    for one in wanted:
+        # A wrong name is found before any map is made.
+        if run.experiment.frozen_redraws and (
+            isinstance(one, MadeMap) or one not in shipped_maps()
+        ):
+            raise InputError(
+                f"{run.source}: {FROZEN_REDRAW}:"
+                f" {getattr(one, 'name', one)}: no shipped map"
             )
-            for number, folder in zip(sorted(versions), cities, strict=True):
-                yield MapPairs(
-                    one, {FROZEN_REDRAW: number}, self._drive_pairs(folder)
+        if isinstance(one, str) and not Path(one).is_dir():
+            try:
+                recordable_map(one)
+            except InputError as error:
+                place = "" if maps else f"{run.source}: maps: "
+                raise InputError(f"{place}{error}") from None
+    for one in wanted:
+        for some in _pairs_of(run, one):
+            names = {some.map_name, *some.drive_names}
+            if some.factors:
+                names.remove(some.map_name)
+            for name in sorted(names & known):
+                raise InputError(
+                    f"{getattr(one, 'name', one)}: another map, or a drive"
+                    f" of one, has the name {name}, too"
                 )
-            return
-        if path.is_dir() and not MapFolder(path).drives():
-            for city in drives_by_map(find_recordings(path, self._on_note)):
-                yield MapPairs(city.name, {}, city=city)
-            return
-        yield MapPairs(path.name, {}, self._drive_pairs(recordable_map(one)))
+            known |= names
+            yield some
 
-    def _drive_pairs(self, folder: Path) -> list[tuple[Scenario, Scenario]]:
-        """Returns the pairs of drives of a map: database and query."""
-        map_folder = MapFolder(folder)
-        files = map_folder.recordable_drives()
-        kind = self._experiment.drives
-        if kind == "first-and-last":
-            stages = list(map_folder.stages())
-            # In an imported city with several stages, the other drive of the
-            # last stage follows the same route as the first drive.
-            last = (map_folder.other_drives() or files)[-1]
-            return [
-                (
-                    load_scenario(files[0]).replaced(stage=stages[0]),
-                    load_scenario(last).replaced(stage=stages[-1]),
-                )
-            ]
-        drives = [load_scenario(path) for path in files]
-        if kind == "same-route":
-            query = drives[-1]
-            return [(query.replaced(name=f"{query.name}_database"), query)]
-        query = max(drives, key=lambda drive: natural_key(drive.stage or ""))
-        pairs = [(one, query) for one in drives if one is not query]
-        if kind == "both-ways" and len(drives) == 2:
-            pairs += [(query, one) for one, _ in pairs]
-        return pairs
+
+def _pairs_of(run: ExperimentRun, one: str | MadeMap) -> Iterator[MapPairs]:
+    kind = run.experiment.drives
+    if isinstance(one, MadeMap):
+        folder = run.output / "cities" / one.name
+        step = made_map_step(one, run.experiment, folder, shipped_maps())
+        make_maps([step], folder.parent, run.cluster)
+        yield MapPairs(one.name, {}, _drive_pairs(folder, kind))
+        return
+    path = shipped_maps().get(one, Path(one))
+    versions = run.experiment.frozen_redraws
+    if versions:
+        cities = redraw_frozen(
+            [one],
+            versions,
+            run.output / "cities",
+            run.cluster,
+            run.source,
+        )
+        for number, folder in zip(sorted(versions), cities, strict=True):
+            yield MapPairs(
+                one, {FROZEN_REDRAW: number}, _drive_pairs(folder, kind)
+            )
+        return
+    if path.is_dir() and not MapFolder(path).drives():
+        for city in drives_by_map(find_recordings(path, run.on_note)):
+            yield MapPairs(city.name, {}, city=city)
+        return
+    yield MapPairs(path.name, {}, _drive_pairs(recordable_map(one), kind))
+
+
+def _drive_pairs(folder: Path, kind: str) -> list[tuple[Scenario, Scenario]]:
+    """Returns the pairs of drives of a map: database and query.
+
+    Args:
+        folder: folder of the map.
+        kind: which drives are compared, see `Experiment.drives`.
+    """
+    map_folder = MapFolder(folder)
+    files = map_folder.recordable_drives()
+    if kind == "first-and-last":
+        stages = list(map_folder.stages())
+        # In an imported city with several stages, the other drive of the
+        # last stage follows the same route as the first drive.
+        last = (map_folder.other_drives() or files)[-1]
+        return [
+            (
+                load_scenario(files[0]).replaced(stage=stages[0]),
+                load_scenario(last).replaced(stage=stages[-1]),
+            )
+        ]
+    drives = [load_scenario(path) for path in files]
+    if kind == "same-route":
+        query = drives[-1]
+        return [(query.replaced(name=f"{query.name}_database"), query)]
+    query = max(drives, key=lambda drive: natural_key(drive.stage or ""))
+    pairs = [(one, query) for one in drives if one is not query]
+    if kind == "both-ways" and len(drives) == 2:
+        pairs += [(query, one) for one, _ in pairs]
+    return pairs

@@ -99,25 +99,29 @@ class ImportCity(MakeMap):
 class MadeMaps:
     """The maps that the conditions of an experiment need, in one folder.
 
-    First call `want_age` and `want_redrawn` for all maps; `make` then makes all
-    maps together. In this way, a city that is aged by several numbers of years
-    becomes one map with a stage for each number.
+    A map is requested when a drive asks for it; `make` then makes all maps
+    together. In this way, a city that is aged by several numbers of years
+    becomes one map with a stage for each number. A drive that asks before
+    `make` stays in its present city.
 
     Attributes:
         folder: the folder for all maps.
+        num_requests: how often a map was asked for that does not exist yet.
     """
 
     folder: Path
+    num_requests: int = 0
+    _are_made: bool = False
     # (Map, rates, seed) -> years.
     _ages: dict[tuple[Path, tuple[tuple[str, float], ...], int], set[int]] = (
         field(default_factory=dict)
     )
     _steps: dict[Path, RedrawCity] = field(default_factory=dict)
 
-    def want_age(
+    def aged(
         self, drive: Scenario, years: Any, rates: Any, seed: int
     ) -> tuple[str, str]:
-        """Requests that `make` ages a drive's city by some years.
+        """Returns map and stage of a drive's city, aged by some years.
 
         Args:
             drive: the drive.
@@ -126,26 +130,23 @@ class MadeMaps:
                 -> rate per year.
             seed: seed of the events.
 
-        Returns:
-            Map and stage of the drive without the ageing, because the aged map
-            does not exist yet.
-
         Raises:
             InputError: years, or a rate, are out of range.
         """
         if type(years) is not int or not 1 <= years <= LAST_YEAR:
             raise InputError(f"years: {years!r} is not from 1 to {LAST_YEAR}")
-        key = self._ageing_key(drive, rates, seed)
+        path = drive.folder.path.resolve()
+        key = path, tuple(sorted(_all_rates(rates).items())), seed
+        if self._are_made:
+            number = sorted(self._ages[key]).index(years)
+            return str(self._aged_folder(*key)), f"{number + 2:02d}"
         self._ages.setdefault(key, set()).add(years)
-        return str(drive.map), str(drive.stage)
+        return self._present(drive)
 
-    def want_redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
-        """Requests that `make` generates a drive's city anew from a seed.
+    def redrawn(self, drive: Scenario, seed: Any) -> tuple[str, str]:
+        """Returns map and stage of a drive's city, generated anew from a seed.
 
-        Returns:
-            Folder of the drive's present map, and the present stage. For the
-            folder and the stage of the new map, which `make` makes, call
-            `redrawn`.
+        The map has the streets of the drive's own map.
 
         Raises:
             InputError: the seed is out of range.
@@ -155,34 +156,19 @@ class MadeMaps:
                 f"redraw: {seed!r} is no whole number from 0 to {_SEEDS - 1}"
             )
         source = drive.folder.path.resolve()
-        folder, stage = self.redrawn(drive, seed)
-        path = Path(folder)
-        self._steps[path] = RedrawCity(path, source, stage, seed)
+        path = self.folder / f"{source.name}_c{seed}"
+        if self._are_made:
+            return str(path), ONLY_STAGE
+        self._steps[path] = RedrawCity(path, source, ONLY_STAGE, seed)
+        return self._present(drive)
+
+    def _present(self, drive: Scenario) -> tuple[str, str]:
+        """Counts a request; returns a drive's map and stage as they are."""
+        self.num_requests += 1
         return str(drive.map), str(drive.stage)
 
-    def aged(
-        self, drive: Scenario, years: int, rates: Any, seed: int
-    ) -> tuple[str, str]:
-        """Returns the map folder and the stage of a drive's aged city.
-
-        The arguments must have been given to `want_age` before.
-        """
-        key = self._ageing_key(drive, rates, seed)
-        number = sorted(self._ages[key]).index(years)
-        return str(self._aged_folder(*key)), f"{number + 2:02d}"
-
-    def redrawn(self, drive: Scenario, seed: int) -> tuple[str, str]:
-        """Returns the folder and the stage of a redrawn map for a drive.
-
-        The redrawn map has the streets of the drive's own map, and another
-        city, which is generated from `seed`. Call `want_redrawn` first, with
-        the same arguments.
-        """
-        source = drive.folder.path.resolve()
-        return str(self.folder / f"{source.name}_c{seed}"), ONLY_STAGE
-
     def make(self, cluster: Cluster) -> None:
-        """Makes all registered maps that do not exist yet.
+        """Makes all requested maps that do not exist yet.
 
         Raises:
             InputError: maps could not be made; the error names all of them.
@@ -198,12 +184,7 @@ class MadeMaps:
             for (path, rates, seed), years in self._ages.items()
         ]
         make_maps([*aged, *self._steps.values()], self.folder, cluster)
-
-    def _ageing_key(
-        self, drive: Scenario, rates: Any, seed: int
-    ) -> tuple[Path, tuple[tuple[str, float], ...], int]:
-        path = drive.folder.path.resolve()
-        return path, tuple(sorted(_all_rates(rates).items())), seed
+        self._are_made = True
 
     def _aged_folder(
         self, path: Path, rates: tuple[tuple[str, float], ...], seed: int

@@ -30,8 +30,11 @@ from cns_drake.studies.drives.side_fields import (
 from cns_drake.studies.drives.unique_names import UniqueNames
 from cns_drake.studies.drives.viewpoints import VIEWPOINTS, with_lidars_beside
 from cns_drake.studies.experiments.conditions import Condition
-from cns_drake.studies.experiments.experiment import SESSIONS
-from cns_drake.studies.experiments.nested_fields import Changes, merged
+from cns_drake.studies.experiments.nested_fields import (
+    SESSIONS,
+    Changes,
+    merged,
+)
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update.upkeep import NOT_MAINTAINED
 from evaluation.recognition.kept_places import KEEP_ALL, checked_keep

@@ -1,9 +1,8 @@
 """Pairs of simulated drives, changed as the conditions of an experiment say."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.running import Job
@@ -11,14 +10,14 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.experiments.conditions import Condition
-from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
-from cns_drake.studies.maps.experiment_maps import MapPairs
+from cns_drake.studies.maps.experiment_maps import ExperimentRun, MapPairs
 from cns_drake.studies.maps.made_maps import MadeMaps
 from cns_drake.studies.pairs.comparisons import ComparedDrives, PairMaker
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource, update_maps
 from cns_drake.studies.recordings.recording import is_recorded
 from evaluation.map_update.upkeep import NOT_MAINTAINED
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import CAUSE
 from evaluation.study.sources import RecordingSource
 from evaluation.study.storage.parts import MakePart
@@ -39,6 +38,7 @@ class ChangedPair(NamedTuple):
         query: the query drive before the change.
         compared: the changed drives.
         condition: the condition.
+        stated: the protocol of the condition.
         seed: seed of the condition's random choices.
     """
 
@@ -46,99 +46,76 @@ class ChangedPair(NamedTuple):
     query: Scenario
     compared: ComparedDrives
     condition: Condition
+    stated: RetrievalProtocol
     seed: int
 
 
+@dataclass
 class SimulatedPairs:
     """Makes the pairs of simulated drives of an experiment.
 
     Attributes:
-        upkeep: name -> job, for the jobs that update the maps of the pairs made
-            so far.
+        run: the experiment.
+        upkeep: name -> job, for the jobs that update the maps of the pairs
+            named so far.
     """
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        conditions: Sequence[Condition],
-        output: Path,
-        source: str,
-        made: MadeMaps,
-        on_note: Callable[[str], None],
-    ) -> None:
-        """Makes nothing yet.
+    run: ExperimentRun
+    upkeep: dict[str, Job] = field(default_factory=dict)
 
-        Args:
-            experiment: the experiment.
-            conditions: its conditions.
-            output: folder of the study's results.
-            source: file of the experiment, for errors.
-            made: the maps that conditions need.
-            on_note: is called with notes on what is left out.
-        """
-        self.upkeep: dict[str, Job] = {}
-        self._experiment = experiment
-        self._conditions = conditions
-        self._output = output
-        self._source = source
-        self._made = made
-        self._on_note = on_note
+    def changed(self, maps: Sequence[MapPairs]) -> list[list[ChangedPair]]:
+        """Returns the pairs of each map, changed as its conditions say.
 
-    def request_maps(self, some: MapPairs) -> None:
-        """Requests the maps that conditions need, which `MadeMaps.make` makes.
+        All pairs are built before a city is made, because faults come before
+        slow work. Only the pairs of a map whose drives need new cities are
+        then built anew.
 
         Raises:
-            InputError: a field of a condition cannot be used.
+            InputError: a field of a condition cannot be used, or a city cannot
+                be made.
         """
-        for one in self.changed(some, made=False):
-            condition_protocol(one.condition, self._source)
+        made = MadeMaps(self.run.output / "cities")
+        found = []
+        for some in maps:
+            before = made.num_requests
+            built = self._built(some, made)
+            found.append((some, *built, made.num_requests > before))
+        made.make(self.run.cluster)
+        pairs = []
+        for some, changed, notes, lacks_cities in found:
+            if lacks_cities:
+                changed, notes = self._built(some, made)
+            for text in notes:
+                self.run.on_note(f"{some.map_name}: {text}")
+            pairs.append(changed)
+        return pairs
 
-    def pairs(self, some: MapPairs) -> Iterator[tuple[Pair, ComparedDrives]]:
-        """Yields the pairs of a map in all conditions possible on the map.
-
-        Each item is a pair to measure, and the changed drives of the pair.
-        """
-        for one in self.changed(some, made=True):
-            yield (
-                self._pair(
-                    one.compared,
-                    one.query,
-                    map_name=some.map_name,
-                    names=one.names,
-                    factors={**some.factors, **one.condition.factors},
-                    seed=one.seed,
-                    is_baseline=one.condition.is_baseline,
-                    stated=condition_protocol(one.condition, self._source),
-                ),
-                one.compared,
-            )
-
-    def changed(self, some: MapPairs, *, made: bool) -> Iterator[ChangedPair]:
-        """Yields a map's pairs, changed as each possible condition says.
+    def _built(
+        self, some: MapPairs, made: MadeMaps
+    ) -> tuple[list[ChangedPair], Iterable[str]]:
+        """Returns a map's pairs in each possible condition, and notes.
 
         Args:
             some: the pairs of the map.
-            made: whether the maps that conditions need exist; if not, they are
-                requested.
+            made: the maps that conditions need.
         """
+        experiment, source = self.run.experiment, self.run.source
         noted: dict[str, None] = {}
-        age, redraw = self._made.want_age, self._made.want_redrawn
-        if made:
-            age, redraw = self._made.aged, self._made.redrawn
+        found = []
         for database, query in some.pairs:
             pair = PairMaker(
                 database,
                 query,
-                self._experiment.drives == "same-route",
-                self._source,
-                age,
-                redraw,
+                experiment.drives == "same-route",
+                source,
+                made.aged,
+                made.redrawn,
                 noted.setdefault,
             )
             names = _base_name(database), query.name
             known: set[str] = set()
-            for condition in self._conditions:
-                for seed in self._experiment.seeds:
+            for condition in experiment.conditions:
+                for seed in experiment.seeds:
                     try:
                         compared = pair.build(condition, seed)
                     except MissingError as error:
@@ -149,16 +126,17 @@ class SimulatedPairs:
                     key = f"{condition.factors} {compared.fingerprint()}"
                     if key not in known:
                         known.add(key)
-                        yield ChangedPair(
-                            names, query, compared, condition, seed
+                        stated = condition_protocol(condition, source)
+                        found.append(
+                            ChangedPair(
+                                names, query, compared, condition, stated, seed
+                            )
                         )
-        for text in noted if made else ():
-            self._on_note(f"{some.map_name}: {text}")
+        return found, noted
 
-    def _pair(
-        self, compared: ComparedDrives, query: Scenario, **shown: Any
-    ) -> Pair:
-        """Returns a pair of drives, which tables show with given fields."""
+    def named(self, some: MapPairs, one: ChangedPair) -> Pair:
+        """Returns a pair of a map as it is measured."""
+        compared, query = one.compared, one.query
         *drives, asked = (
             replace(self.named_drive(drive), length=length)
             for drive, length in zip(
@@ -167,7 +145,7 @@ class SimulatedPairs:
         )
         database, *beside = self._with_upkept_maps(drives, compared.maintain)
         way = database
-        if self._experiment.drives == "same-route":
+        if self.run.experiment.drives == "same-route":
             city = {
                 name: getattr(compared.database, name)
                 for name in ("map", "stage", "without", "transient")
@@ -186,7 +164,12 @@ class SimulatedPairs:
         }
         digest = fingerprint(asked_how)[:8]
         return Pair(
-            **shown,
+            map_name=some.map_name,
+            names=one.names,
+            factors={**some.factors, **one.condition.factors},
+            seed=one.seed,
+            is_baseline=one.condition.is_baseline,
+            stated=one.stated,
             key=f"{database.name} {asked.name} {digest}",
             database=database,
             query=asked,
@@ -207,7 +190,7 @@ class SimulatedPairs:
             return drives
         sources = tuple(one.source for one in drives)
         content = fingerprint({"drives": [one.name for one in drives]})[:8]
-        part = StudyFiles(self._output).part(
+        part = StudyFiles(self.run.output).part(
             "upkeep", drives[0].name, f"{content} {maintain}"
         )
         job = Job(
@@ -229,9 +212,9 @@ class SimulatedPairs:
 
     def named_drive(self, drive: Scenario) -> NamedDrive:
         """Returns a drive that is simulated, or read if it is recorded."""
-        if is_recorded(drive, self._output):
+        if is_recorded(drive, self.run.output):
             return NamedDrive(
-                drive.name, RecordingSource(self._output / drive.name)
+                drive.name, RecordingSource(self.run.output / drive.name)
             )
         return NamedDrive(drive.name, SimulationSource(drive))
 

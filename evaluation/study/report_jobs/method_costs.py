@@ -8,6 +8,7 @@ from evaluation.drives.scan_clouds import cloud_at
 from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.place_measurements import PlaceComparison
 from evaluation.study.sources import DriveSource
 from evaluation.study.storage.parts import Part
 from evaluation.study.tasks.place import measure_costs
@@ -32,11 +33,12 @@ def measure_method_costs(
         summary: file with the `DriveSummary` of the query drive, from which
             the drive's poses are read.
         methods: the methods.
-        described: files with the descriptors of a database, and of the
-            queries, one for each method.
+        described: files with the scans and descriptors of a database, and of
+            the queries; see `PlaceComparison`.
         protocol: protocol of the comparison.
     """
-    searches = measure_costs(reporter, *described, (), 0, methods)
+    compared = PlaceComparison(*described, methods, protocol, ())
+    searches = measure_costs(reporter, compared)
     drive = source()
     known = summary.read()
     # A recording would be unpacked as a whole for its poses.

@@ -172,7 +172,7 @@ class StagesReport:
         """Returns the job that measures costs, after all other jobs."""
         places, queries = (self.files.features(one.name) for one in pair)
         described = tuple(
-            tuple(files.described(one.key) for one in self.methods)
+            (files.scans, *(files.described(one.key) for one in self.methods))
             for files in (places, queries)
         )
         source = pair[1].source

@@ -1,16 +1,20 @@
 """The task `localise`: scans are localised in a map of the database."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 import math
 from pathlib import Path
+import tempfile
 from typing import Any, ClassVar
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.localisation import localise, results, tracking
 from evaluation.localisation.estimators import make_estimator
 from evaluation.localisation.initial_poses import InitialPose, Starts
@@ -33,6 +37,7 @@ from evaluation.study.sources import (
     DriveSource,
     JoinedSource,
 )
+from evaluation.study.storage.parts import MakePart, Part
 from evaluation.study.tasks.jobs import OPENING_COST, Jobs
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task, check_positive
@@ -221,7 +226,7 @@ def measure_localisation(
         odometry_drift: drift of the odometry with which the drive is tracked,
             see `evaluation.localisation.tracking`; None to localise single
             scans, `spacing` apart.
-        processes: number of processes, where the system can fork.
+        processes: number of processes that localise single scans.
 
     Returns:
         An array for each pair of a method and an entry of `starts`. The arrays
@@ -234,18 +239,15 @@ def measure_localisation(
     asked = query()
     columns = getattr(database, "columns", None)
     keep = database.keep if isinstance(database, JoinedSource) else KEEP_ALL
-    maps: dict[tuple[float, int], LocalisationMap] = {}
-    localisers = []
-    for method in map(str, methods):
-        settings = default_settings(method)
-        settings = settings.with_values(values, method)
-        estimator = make_estimator(method, settings)
-        key = settings.voxel, settings.neighbours
-        if key not in maps:
-            # The drive is opened anew for each other map.
-            source = mapped if not maps else database()
-            maps[key] = make_map(source, settings, columns, reporter.note, keep)
-        localisers.append(localise.Localiser(maps[key], estimator, settings))
+    made: list[LocalisationMap] = []
+
+    def make(settings: Settings) -> LocalisationMap:
+        # The drive is opened anew for each other map.
+        source = database() if made else mapped
+        made.append(make_map(source, settings, columns, reporter.note, keep))
+        return made[-1]
+
+    localisers = _localisers(methods, values, make)
     try:
         is_mapped = localise.mapped_frames(
             mapped, localisers[0].surroundings, asked
@@ -255,7 +257,15 @@ def measure_localisation(
         return []
     if odometry_drift is None:
         frames = localise.query_frames(asked, is_mapped, spacing)
-        found = localise.localise(localisers, asked, frames, starts, processes)
+        if min(processes, len(frames)) == 1:
+            queries = localise.read_queries(asked, frames)
+            found = localise.localise(
+                localisers, queries, starts, asked.name, len(frames)
+            )
+        else:
+            found = _localised_in_jobs(
+                asked, frames, made, (methods, values, starts), processes
+            )
     else:
         found = [
             # A drive may be simulated while it is read: each track opens it.
@@ -265,6 +275,106 @@ def measure_localisation(
         ]
     results.note_sparse(asked.name, found[0], reporter.note)
     return found
+
+
+def _localisers(
+    methods: Sequence[str | Path],
+    values: tuple[tuple[str, Any], ...],
+    make: Callable[[Settings], LocalisationMap],
+) -> list[localise.Localiser]:
+    """Returns a localiser for each method.
+
+    Args:
+        methods, values: see `measure_localisation`.
+        make: makes the map of some settings; it is called once for all methods
+            with the same map.
+    """
+    maps: dict[tuple[float, int], LocalisationMap] = {}
+    found = []
+    for method in map(str, methods):
+        settings = default_settings(method).with_values(values, method)
+        estimator = make_estimator(method, settings)
+        key = settings.voxel, settings.neighbours
+        if key not in maps:
+            maps[key] = make(settings)
+        found.append(localise.Localiser(maps[key], estimator, settings))
+    return found
+
+
+def _localised_in_jobs(
+    drive: Drive,
+    frames: Sequence[int],
+    maps: Sequence[LocalisationMap],
+    how: tuple[Any, ...],
+    processes: int,
+) -> list[np.ndarray]:
+    """Localises scans as `localise.localise` does, in several processes.
+
+    The drive can be of a kind that no other process can open, so its scans and
+    the points of the maps are passed on in files.
+
+    Args:
+        drive: the drive.
+        frames: frames of the scans.
+        maps: the maps, in the order in which `_localisers` asks for them.
+        how: the last arguments of `localise_queries`.
+        processes: number of processes.
+    """
+    number = min(processes, len(frames))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        points = Part(folder / "maps.data")
+        points.write({}, [(one.name, one.surface.points) for one in maps])
+        parts = []
+        jobs = []
+        for k in range(number):
+            queries = Part(folder / f"queries {k}.data")
+            queries.write(
+                {}, [*localise.read_queries(drive, frames[k::number])]
+            )
+            parts.append(Part(folder / f"results {k}.data"))
+            arguments = drive.name, queries, points, *how
+            step = MakePart(parts[-1], localise_queries, arguments)
+            label = f"scans {k + 1} of {number}"
+            jobs.append(Job(f"localise {drive.name}, {label}", step))
+        run_jobs(jobs, Cluster(number), resumes=False)
+        done = [one.read() for one in parts]
+    found = []
+    for some in zip(*done, strict=True):
+        rows = np.empty(len(frames), results.QUERY)
+        for k, one in enumerate(some):
+            rows[k::number] = one
+        found.append(rows)
+    return found
+
+
+def localise_queries(
+    reporter: Reporter,
+    name: str,
+    queries: Part,
+    maps: Part,
+    methods: tuple[str | Path, ...],
+    values: tuple[tuple[str, Any], ...],
+    starts: tuple[Starts, ...],
+) -> list[np.ndarray]:
+    """Localises scans in maps that are in files; see `localise.localise`.
+
+    Args:
+        reporter: unused.
+        name: name of the scans' drive.
+        queries: file with the scans, a list of `localise.Query`.
+        maps: file with a list of maps, each as its name and points (M, 3) in W.
+        methods, values, starts: see `measure_localisation`.
+    """
+    asked = queries.read()
+    clouds = iter(maps.read())
+
+    def make(settings: Settings) -> LocalisationMap:
+        map_name, points = next(clouds)
+        return map_of(points, map_name, settings.neighbours)
+
+    localisers = _localisers(methods, values, make)
+    return localise.localise(localisers, asked, starts, name, len(asked))
 
 
 def localise_among_others(
@@ -307,12 +417,13 @@ def localise_among_others(
             mapped.centroids_W, drive.name, Settings.neighbours
         )
         stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
+        asked = localise.Query(k, stamp_ns, scan, X_WS[k], R_WT[k])
         ends = iter(found)
         for estimator, settings in made:
             one = localise.Localiser(surroundings, estimator, settings)
             for some in starts:
                 initial = InitialPose.moved(X_WS[k], *some.draw(k))
-                row, _ = one.query(k, stamp_ns, scan, X_WS[k], R_WT[k], initial)
+                row, _ = one.query(asked, initial)
                 next(ends).append(row)
     number = len(found[0])
     if number < len(drive):

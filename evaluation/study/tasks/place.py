@@ -2,25 +2,21 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-import math
 from typing import Any
 
 from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
-from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.place_numbers import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.result_number import Number
-from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.databases import searched_database
 from evaluation.study.place_measurements import (
-    measure_method,
+    PlaceComparison,
     measure_places,
     shown_overlaps,
 )
-from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.parts import MakePart
 from evaluation.study.tasks.jobs import Jobs, num_described
 from evaluation.study.tasks.pair import Pair, Result
 from evaluation.study.tasks.task import Answered, Task
@@ -49,79 +45,36 @@ class PoseTask(Task):
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         needs: list[str] = []
-        radii = tuple(sorted(jobs.radii[pair.key]))
-        protocol = replace(pair.protocol, radius=radii[0])
-        database, query = (
-            jobs.described(
-                drive, role, pair.protocol, needs, kept=pair.is_composed
-            )
-            for drive, role in pair.roles
-        )
-        others = jobs.distractor_places(pair, needs)
-        beside = jobs.beside(pair, needs)
+        compared = _comparison(pair, jobs, needs, kept=pair.is_composed)
         num_queries = num_described(pair.query, "queries", pair.protocol)
+        cost = _search_cost(pair, jobs, num_queries)
+        cost += _OVERLAP_COST * num_queries
+        sides = compared.database, compared.query
         # The task `place` reads the same files.
-        if not (isinstance(database, tuple) and isinstance(query, tuple)):
-            part = jobs.files.part("place", pair.key)
-            arguments = (
-                database,
-                query,
-                others,
-                pair.distractors,
-                jobs.methods,
-                protocol,
-                radii,
-                pair.overlaps,
-                jobs.leaves_out_slow,
-            )
-            cost = _search_cost(pair, jobs, num_queries)
-            cost += _OVERLAP_COST * num_queries
-            for (drive, role), found in zip(
-                pair.roles, (database, query), strict=True
-            ):
-                if not isinstance(found, tuple):
+        if not all(isinstance(one, tuple) for one in sides):
+            for (drive, role), side in zip(pair.roles, sides, strict=True):
+                if not isinstance(side, tuple):
                     cost += jobs.description_cost(drive, role, pair.protocol)
-            return (jobs.add(part, measure_places, arguments, needs, cost),)
+            part = jobs.files.part("place", pair.key)
+            return (jobs.add(part, measure_places, (compared,), needs, cost),)
         # Each method has a file, so that another method leaves it as it is.
-        shown = MakePart(
-            jobs.files.part("overlaps", pair.key),
-            shown_overlaps,
-            (
-                (database[0], query[0]),
-                (database[1], query[1]),
-                jobs.methods[0],
-                protocol,
-                radii,
-                tuple((parts[0], parts[1]) for parts in beside),
-                pair.leaves_out_itself,
-                pair.keep,
-            ),
-        )
-        overlaps = (shown,) if jobs.shows_overlaps else ()
+        overlaps: list[MakePart] = []
+        if jobs.shows_overlaps:
+            part = jobs.files.part("overlaps", pair.key)
+            alone = compared.by_method(0)
+            overlaps = [MakePart(part, shown_overlaps, (alone,))]
+            compared = compared._replace(overlaps=part)
         steps = [
             MakePart(
                 jobs.files.part("place", pair.key, choice.key),
-                measure_method,
-                (
-                    database[k],
-                    query[k],
-                    tuple(parts[k - 1] for parts in others),
-                    pair.distractors,
-                    choice,
-                    shown.part if overlaps else None,
-                    protocol,
-                    radii,
-                    tuple(parts[k] for parts in beside),
-                    pair.leaves_out_itself,
-                    pair.keep,
-                ),
+                measure_places,
+                (compared.by_method(k),),
             )
-            for k, choice in enumerate(jobs.methods, start=1)
+            for k, choice in enumerate(jobs.methods)
         ]
         name = f"place {pair.key}"
-        whole = Steps((*overlaps, *steps)[0].part.path, (*overlaps, *steps))
-        cost = _search_cost(pair, jobs, num_queries)
-        cost += _OVERLAP_COST * num_queries
+        every = (*overlaps, *steps)
+        whole = Steps(every[0].part.path, every)
         jobs.jobs[name] = Job(name, whole, tuple(needs), cost)
         return tuple(one.part for one in steps)
 
@@ -160,25 +113,10 @@ class CostTask(Task):
 
     def measure(self, pair: Pair, jobs: Jobs) -> tuple[Result, ...]:
         needs: list[str] = []
-        database, query = (
-            jobs.described(drive, role, pair.protocol, needs, kept=True)
-            for drive, role in pair.roles
-        )
-        assert isinstance(database, tuple)
-        assert isinstance(query, tuple)
-        arguments = (
-            database[1:],
-            query[1:],
-            jobs.distractor_places(pair, needs),
-            pair.distractors,
-            jobs.methods,
-            tuple(parts[1:] for parts in jobs.beside(pair, needs)),
-            pair.keep,
-            pair.protocol.place_spacing,
-        )
+        compared = _comparison(pair, jobs, needs, kept=True)
         part = jobs.files.part("cost", pair.key)
         cost = _search_cost(pair, jobs, NUM_TRIALS)
-        return (jobs.add(part, measure_costs, arguments, needs, cost),)
+        return (jobs.add(part, measure_costs, (compared,), needs, cost),)
 
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         for method, cost in found.items():
@@ -188,6 +126,39 @@ class CostTask(Task):
                 ("memory", float(cost.memory)),
             ):
                 yield Number(method, False, name, value, n=cost.places)
+
+
+def _comparison(
+    pair: Pair, jobs: Jobs, needs: list[str], *, kept: bool
+) -> PlaceComparison:
+    """Returns what is compared for a pair, and adds the jobs it needs.
+
+    Args:
+        pair: the pair.
+        jobs: the jobs.
+        needs: list to which the names of the added jobs are appended.
+        kept: whether both drives must be in files.
+    """
+    database, query = (
+        jobs.described(drive, role, pair.protocol, needs, kept=kept)
+        for drive, role in pair.roles
+    )
+    radii = tuple(sorted(jobs.radii[pair.key]))
+    return PlaceComparison(
+        database,
+        query,
+        jobs.methods,
+        replace(pair.protocol, radius=radii[0]),
+        radii,
+        jobs.distractor_places(pair, needs),
+        pair.distractors,
+        tuple(jobs.beside(pair, needs)),
+        pair.keep,
+        pair.leaves_out_itself,
+        pair.overlaps,
+        jobs.shows_overlaps,
+        leaves_out_slow=jobs.leaves_out_slow,
+    )
 
 
 def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
@@ -202,48 +173,22 @@ def _search_cost(pair: Pair, jobs: Jobs, num_queries: float) -> float:
 
 
 def measure_costs(
-    reporter: Reporter,
-    database: tuple[Part, ...],
-    query: tuple[Part, ...],
-    distractors: tuple[tuple[Part, ...], ...],
-    num_distractors: int,
-    methods: tuple[MethodChoice, ...],
-    beside: tuple[tuple[Part, ...], ...] = (),
-    keep: str | int = KEEP_ALL,
-    cell: float = math.inf,
+    reporter: Reporter, compared: PlaceComparison
 ) -> dict[str, QueryCost]:
     """Returns the cost of searching a database, by the key of each method.
 
     Args:
         reporter: reports progress.
-        database, query: files with the descriptors of places and of queries,
-            one file for each method.
-        distractors: for each drive through another city, files with the
-            descriptors of its places, one file for each method.
-        num_distractors: number of places of the drives through other cities
-            that are added to the database.
-        methods: methods to measure.
-        beside: for each further drive in the same world, files with the
-            descriptors of its places, one file for each method.
-        keep, cell: which places in this world are kept, see
-            `evaluation.recognition.kept_places.kept_places`.
+        compared: the drives, which are in files, and the methods to measure.
     """
+    (_, *database), (_, *query) = compared.stored
     found = {}
+    methods = compared.methods
     for k, choice in enumerate(
         track(methods, "measuring methods", len(methods), "methods")
     ):
         method = choice.make()
-        others = [parts[k] for parts in distractors]
-        near = [parts[k] for parts in beside]
-        searched = searched_database(
-            database[k],
-            others,
-            num_distractors,
-            near,
-            keep,
-            cell,
-            divides=method.divides,
-        )
+        searched = compared.searched(k, database[k], method)
         asked = query[k].read()[1]
         found[choice.key] = measure_search(
             method, searched.described.places, asked

@@ -19,8 +19,9 @@ from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies import study as study_module
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import load_experiment
-from cns_drake.studies.maps import map_step
-from cns_drake.studies.study import Study, run_study
+from cns_drake.studies.maps import experiment_maps, map_step
+from cns_drake.studies.maps.experiment_maps import ExperimentRun, pairs_by_map
+from cns_drake.studies.study import plan_study, run_study
 from evaluation.change.drive_maps import DriveMap
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator
 from evaluation.methods import make_method
@@ -69,11 +70,8 @@ def measure(wanted, output, **options):
 
 def planned(wanted, output, **options):
     """The jobs of an experiment, and the comparisons that they measure."""
-    study = Study(wanted, output, "mine.yaml", Cluster(), **options)
-    drives = list(study._maps.pairs(()))
-    for some in drives:
-        study._simulated.request_maps(some)
-    made = study._plan(drives)
+    run = ExperimentRun(wanted, output, "mine.yaml", Cluster(), **options)
+    made = plan_study(run)
     return made.jobs, made.measured
 
 
@@ -692,7 +690,9 @@ def test_maps_of_conditions_are_made_first(town, tmp_path, monkeypatch):
 )
 def test_faults_before_any_work(town, tmp_path, fields, fault):
     with pytest.raises(InputError, match=f"^mine.yaml: {fault}") as error:
-        Study(experiment(town, **fields), tmp_path, "mine.yaml", Cluster())
+        run_study(
+            experiment(town, **fields), tmp_path, Cluster(), source="mine.yaml"
+        )
     assert "\n" not in str(error.value)
     assert not list(tmp_path.iterdir())
 
@@ -762,9 +762,7 @@ def test_a_case_with_fewer_levels_is_noted(town, tmp_path):
     )
     notes = []
     with pytest.raises(InputError, match="no-map"):
-        Study(wanted, tmp_path, "mine.yaml", Cluster(), notes.append).run(
-            ["no-map"]
-        )
+        run_study(wanted, tmp_path, Cluster(), ["no-map"], on_note=notes.append)
     assert notes == ["measured at their last level: returns (1)"]
 
 
@@ -774,13 +772,13 @@ def test_fresh_cities_have_their_numbers(tmp_path, monkeypatch, given):
         map_step, "run_jobs", lambda jobs, cluster, unit="": None
     )
     wanted = experiment("suburbia", both={"redraw": {"frozen": given}})
-    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
     monkeypatch.setattr(
-        study._maps, "_drive_pairs", lambda folder: [(folder, folder)]
+        experiment_maps, "_drive_pairs", lambda folder, _: [(folder, folder)]
     )
+    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
     found = {
         one.factors["both.redraw.frozen"]: one.pairs[0][0].name
-        for one in study._maps._pairs_of("suburbia")
+        for one in pairs_by_map(run, ["suburbia"])
     }
     numbers = given if isinstance(given, list) else [given]
     assert found == {one: f"suburbia_f{one:02d}" for one in numbers}
@@ -830,11 +828,11 @@ def test_maps_on_the_command_line(town, tmp_path):
         town,
         maps=["suburbia", {"name": "a", "age": "x", "years": 2, "seed": 1}],
     )
-    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    (drives,) = study._maps.pairs([str(town)])
+    run = ExperimentRun(wanted, tmp_path, "mine.yaml", Cluster())
+    (drives,) = pairs_by_map(run, [str(town)])
     assert drives.map_name == "town"
     with pytest.raises(InputError, match="maps: a: no map 'x'"):
-        list(study._maps.pairs(["a"]))
+        list(pairs_by_map(run, ["a"]))
 
 
 def test_each_part_of_years_has_a_job_of_its_own(tmp_path):

@@ -1,6 +1,7 @@
 """Localisation of scans in a map, against scenes with known answers."""
 
 from contextlib import nullcontext
+from csv import DictReader
 from dataclasses import fields
 import json
 import math
@@ -26,9 +27,11 @@ from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import make_map, map_of
 from evaluation.localisation.localise import (
     Localiser,
+    Query,
     localise,
     mapped_frames,
     path_axes,
+    read_queries,
 )
 from evaluation.localisation.results import (
     COLUMNS,
@@ -84,7 +87,7 @@ def one_query(found, X_WS, scan_W, offset, turn, R_WT=None):
     scan = from_xyz(poses.transform(poses.inverse(X_WS), scan_W))
     R_WT = np.eye(3) if R_WT is None else R_WT
     initial = InitialPose.moved(X_WS, offset, turn)
-    return found.query(3, 0, scan, X_WS, R_WT, initial)[0]
+    return found.query(Query(3, 0, scan, X_WS, R_WT), initial)[0]
 
 
 def a_pose(*p, far=0.0):
@@ -394,7 +397,7 @@ def test_a_cloud_as_map_and_a_cloud_as_query(streets, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_order_and_jobs_do_not_matter(streets):
+def test_order_does_not_matter(streets):
     drive = open_drive(streets["query"])
     place = make_map(open_drive(streets["map"]), Settings())
     assert mapped_frames(streets["map"], place, drive).all()
@@ -403,13 +406,43 @@ def test_order_and_jobs_do_not_matter(streets):
     for method in SHIPPED:
         settings = Settings()
         found = Localiser(place, make_estimator(method, settings), settings)
-        (rows,) = localise([found], drive, range(0, 12, 4), [starts])
-        jobs = 2 if method == "gicp" else 1
-        (backwards,) = localise(
-            [found], drive, range(8, -1, -4), [starts], jobs
+        there, back = (
+            localise(
+                [found], read_queries(drive, frames), [starts], drive.name, 3
+            )[0]
+            for frames in (range(0, 12, 4), range(8, -1, -4))
         )
         for name in columns:
-            assert np.array_equal(rows[name], backwards[::-1][name])
+            assert np.array_equal(there[name], back[::-1][name])
+
+
+@pytest.mark.slow
+def test_processes_change_nothing(streets, tmp_path, capsys):
+    both = ["localise", streets["map"], streets["query"], "--method", "gicp"]
+    rows = []
+    for jobs in 1, 2:
+        output = tmp_path / str(jobs)
+        options = ["--query-spacing", "4", "--jobs", jobs, "--output", output]
+        assert run(capsys, *both, *options)[0] == 0
+        with open(output / "localisation.csv", newline="") as stream:
+            rows.append([{**row, "seconds": ""} for row in DictReader(stream)])
+    assert len(rows[0]) > 2
+    assert rows[0] == rows[1]
+
+
+@pytest.mark.slow
+def test_a_process_that_is_killed_is_an_error(streets, tmp_path, capsys):
+    path = tmp_path / "hungry.py"
+    path.write_text(
+        "import os, signal\n"
+        "def localise(map, scan, start):\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    command = ["localise", streets["map"], streets["query"], "--method", path]
+    status, out, err = run(capsys, *command, "--jobs", "2")
+    assert (status, out) == (1, "")
+    assert "Traceback" not in err
+    assert "SIGKILL, perhaps for lack of memory" in err.splitlines()[-1]
 
 
 def test_far_coordinates_lose_nothing():
@@ -528,8 +561,13 @@ def test_faults_of_an_own_method(streets, tmp_path, capsys, name):
     path = tmp_path / f"{name}.py"
     path.write_text(text)
     command = ["localise", streets["map"], streets["query"], "--method", path]
-    for jobs in 1, 2:
-        assert_refused(capsys, [*command, "--jobs", jobs], str(path), fault)
+    assert_refused(capsys, [*command, "--jobs", "1"], str(path), fault)
+    status, out, err = run(capsys, *command, "--jobs", "2")
+    assert status in (1, 2)
+    assert out == ""
+    assert "Traceback" not in err
+    assert str(path) in err.splitlines()[-1]
+    assert fault in err.splitlines()[-1]
 
 
 def test_numbers_of_jobs(streets, capsys):

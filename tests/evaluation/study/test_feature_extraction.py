@@ -21,7 +21,7 @@ from evaluation.study.feature_extraction import (
     FeatureExtraction,
     extract_features,
 )
-from evaluation.study.place_measurements import measure_method
+from evaluation.study.place_measurements import PlaceComparison, measure_places
 from evaluation.study.sources import RecordingSource
 from evaluation.study.storage.parts import MakePart, Part
 from evaluation.study.storage.study_files import FeatureFiles
@@ -232,13 +232,22 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
     extracted = (FeatureFiles(tmp_path / "a"), FeatureFiles(tmp_path / "b"))
-    extract(Source(recorded), (solid,), extracted[0])
+    extract(Source(recorded), (solid,), extracted[0], with_scans=True)
     other = Source(Elsewhere(recorded))
-    extract(other, (solid,), extracted[1])
+    extract(other, (solid,), extracted[1], with_scans=True)
     part = Part(tmp_path / "results" / "solid.data")
-    described = tuple(one.described(solid.name) for one in extracted)
-    arguments = (*described, (), 0, solid, None, PAPER_PROTOCOL, (7.5,))
-    step = MakePart(part, measure_method, arguments)
+    database, query = (
+        (one.scans, one.described(solid.name)) for one in extracted
+    )
+    compared = PlaceComparison(
+        database,
+        query,
+        (solid,),
+        PAPER_PROTOCOL,
+        (7.5,),
+        shows_overlaps=False,
+    )
+    step = MakePart(part, measure_places, (compared,))
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         step.run(Reporter())
     assert not part.path.parent.exists()

@@ -15,7 +15,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study import place_measurements
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.feature_extraction import FeatureExtraction
-from evaluation.study.place_measurements import measure_places
+from evaluation.study.place_measurements import PlaceComparison, measure_places
 from evaluation.study.sources import RecordingSource
 from evaluation.study.storage.parts import MakePart, Part
 from evaluation.study.storage.study_files import FeatureFiles
@@ -82,14 +82,12 @@ def pair(folder, part, **changes):
     values = {
         "database": described(folder, "metropolis_01", "places"),
         "query": Once(folder / "metropolis_04"),
-        "distractors": (),
-        "num_distractors": 0,
         "methods": METHODS,
         "protocol": PROTOCOL,
         "radii": (PROTOCOL.radius,),
     }
-    arguments = tuple((values | changes).values())
-    return MakePart(Part(part), measure_places, arguments)
+    compared = PlaceComparison(**(values | changes))
+    return MakePart(Part(part), measure_places, (compared,))
 
 
 def _done(step):

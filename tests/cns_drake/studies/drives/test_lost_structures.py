@@ -13,7 +13,6 @@ from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.studies.drives.lost_structures import Losses, lost_structures
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment_files import load_experiment
 from cns_drake.studies.pairs.comparisons import PairMaker
 
@@ -198,7 +197,7 @@ def test_a_city_needs_a_table_with_places(tmp_path):
 def test_shipped_drives_with_losses(name):
     folder = shipped_maps()["downtown"]
     experiment = load_experiment(folder / f"{name}.yaml")
-    (condition,) = conditions(experiment)
+    (condition,) = experiment.conditions
     (seed,) = experiment.seeds
 
     def none(*_):

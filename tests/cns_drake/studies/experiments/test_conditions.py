@@ -6,12 +6,11 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.studies.experiments.conditions import conditions
 
 
 def factors(experiment):
     """The values of all factors, condition by condition."""
-    return [dict(one.factors) for one in conditions(experiment)]
+    return [dict(one.factors) for one in experiment.conditions]
 
 
 def test_the_grid_is_the_product_of_all_factors(read):
@@ -22,7 +21,7 @@ def test_the_grid_is_the_product_of_all_factors(read):
         protocol: {radius: [5, 7.5]}
         """
     )
-    found = conditions(experiment)
+    found = experiment.conditions
     columns = ["database.years", "query.transient.snow", "protocol.radius"]
     assert all(list(one.factors) == columns for one in found)
     # The last factor varies fastest.
@@ -48,7 +47,7 @@ def test_the_baseline_comes_first(read):
         baseline: {query: {lidar: os1-64}}
         """
     )
-    found = conditions(experiment)
+    found = experiment.conditions
     assert [tuple(one.factors.values()) for one in found] == [
         (0, "os1-64"),
         (0, "vlp-16"),
@@ -87,7 +86,7 @@ def test_factors_and_cases_of_different_fields_of_a_section(read):
           both: [e, g]
         """
     )
-    assert len(conditions(experiment)) == 2 * 2 * 2 * (1 + 1 + 1 + 1)
+    assert len(experiment.conditions) == 2 * 2 * 2 * (1 + 1 + 1 + 1)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +122,7 @@ def test_values_of_factors(read, value, found):
 )
 def test_lists_that_are_one_value(read, field):
     experiment = read(f"both: {{{field}}}\n")
-    (only,) = conditions(experiment)
+    (only,) = experiment.conditions
     assert only.factors == {}
     assert only.changes == {"both": yaml.safe_load(f"{{{field}}}")}
 
@@ -140,7 +139,7 @@ cases:
 
 
 def test_cases_have_levels(read):
-    found = conditions(read(CASES))
+    found = read(CASES).conditions
     assert [tuple(one.factors.values()) for one in found] == [
         ("none", 0),
         ("snow", 1),
@@ -195,7 +194,7 @@ def test_some_levels(read, levels, found):
 
 def test_cases_beside_factors(read):
     experiment = read(f"{CASES}\nboth: {{seed: [3, 4]}}\nlevels: [1]\n")
-    found = conditions(experiment)
+    found = experiment.conditions
     assert len(found) == 2 * 5
     assert list(found[0].factors) == ["cause", "level", "both.seed"]
     assert [one.is_baseline for one in found] == [True] + [False] * 9
@@ -204,7 +203,7 @@ def test_cases_beside_factors(read):
 def test_an_experiment_may_be_wide(read):
     """Fields are set in linear time; copies of all of them took minutes."""
     wide = ", ".join(f"f{k}: {k}" for k in range(20_000))
-    (only,) = conditions(read(f"query: {{a: {{{wide}}}}}\n"))
+    (only,) = read(f"query: {{a: {{{wide}}}}}\n").conditions
     assert only.changes == {"query": {"a": {f"f{k}": k for k in range(20_000)}}}
 
 
@@ -229,4 +228,4 @@ def test_grids_have_an_end(read):
             read(text)
     # One at a time they are few.
     few = read(grid(1000, 1000, 1000, more="design: one-at-a-time"))
-    assert len(conditions(few)) == 1 + 3 * 999
+    assert len(few.conditions) == 1 + 3 * 999

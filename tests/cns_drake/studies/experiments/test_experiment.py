@@ -1,6 +1,5 @@
 """Fields of experiments."""
 
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import named_programs
 
 
@@ -16,7 +15,7 @@ def test_lists_of_whole_numbers_can_be_spread(read):
     assert experiment.frozen_redraws == [1, 5]
     assert [type(one) for one in experiment.frozen_redraws] == [int, int]
     values = [
-        one.factors["database.distractors"] for one in conditions(experiment)
+        one.factors["database.distractors"] for one in experiment.conditions
     ]
     assert [(type(one), one) for one in values] == [
         (int, 0),

@@ -5,7 +5,6 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import (
     load_experiment,
@@ -21,7 +20,7 @@ def test_a_file_of_few_words_is_enough(read):
     assert experiment.name == "mine"
     assert experiment.seeds == (1,)
     assert list(experiment.tasks) == ["place"]
-    (only,) = conditions(experiment)
+    (only,) = experiment.conditions
     assert (only.factors, only.changes, only.causes) == ({}, {}, ())
     assert only.is_baseline
 
@@ -96,7 +95,7 @@ def test_shipped_experiments_are_read_and_written(name):
         experiment = load_experiment(name, quick=quick)
         again = Experiment.model_validate(yaml.safe_load(experiment.text))
         assert again == experiment
-        assert sum(one.is_baseline for one in conditions(experiment)) == 1
+        assert sum(one.is_baseline for one in experiment.conditions) == 1
         assert experiment.about.endswith("?")
 
 

@@ -68,7 +68,7 @@ def test_a_city_ages_once_for_all_of_its_years(town, tmp_path, steps):
         (5, {"felled": 0.5}, 1),
     ):
         # It is where it was, as long as nothing is made.
-        here = made.want_age(drive, years, rates, seed)
+        here = made.aged(drive, years, rates, seed)
         assert here == (drive.map, drive.stage)
     made.make(Cluster())
     (run,) = steps
@@ -102,7 +102,7 @@ def test_a_city_is_drawn_anew_for_each_version(town, tmp_path, steps):
     drive = load_scenario(town / "sequence_02.yaml")
     made = MadeMaps(tmp_path)
     for version in (7, 0, 7):
-        here = made.want_redrawn(drive, version)
+        here = made.redrawn(drive, version)
         assert here == (drive.map, drive.stage)
     made.make(Cluster())
     folders = [tmp_path / "town_c7", tmp_path / "town_c0"]
@@ -134,7 +134,7 @@ def test_a_city_is_drawn_anew_for_each_version(town, tmp_path, steps):
 def test_years_that_cannot_be(town, tmp_path, years, rates, fault):
     drive = load_scenario(town / "sequence_02.yaml")
     with pytest.raises(InputError, match=f"^{fault}"):
-        MadeMaps(tmp_path).want_age(drive, years, rates, 1)
+        MadeMaps(tmp_path).aged(drive, years, rates, 1)
 
 
 @pytest.mark.parametrize("version", [-1, 2**31, 1.5, True, "one", None])
@@ -143,7 +143,7 @@ def test_versions_that_cannot_be(town, tmp_path, version):
     with pytest.raises(
         InputError, match=r"^redraw: .* is no whole number from 0"
     ):
-        MadeMaps(tmp_path).want_redrawn(drive, version)
+        MadeMaps(tmp_path).redrawn(drive, version)
 
 
 @pytest.mark.slow

@@ -19,7 +19,6 @@ from cns_drake.simulation.scenario_traffic import (
 )
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.drives.named_stages import MissingError
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import load_experiment
 from cns_drake.studies.pairs.comparisons import PairMaker
@@ -82,7 +81,7 @@ class Conditions:
             self.notes.append,
         )
         self.found = []
-        for condition in conditions(experiment):
+        for condition in experiment.conditions:
             for seed in experiment.seeds:
                 try:
                     compared = pair.build(condition, seed)

@@ -1,7 +1,6 @@
 """The frozen levels: their drives are those that were frozen."""
 
 import csv
-import itertools
 
 from helpers.small_map import scenario_values, write_small_map
 import pytest
@@ -12,28 +11,23 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.scenarios.scenario_files import make_scenario
 from cns_drake.scenarios.shipped import worlds_folder
 from cns_drake.studies.experiments.experiment_files import load_experiment
+from cns_drake.studies.maps.experiment_maps import ExperimentRun, pairs_by_map
 from cns_drake.studies.pairs.comparisons import ComparedDrives
 from cns_drake.studies.pairs.frozen_drives import (
     check_frozen,
     drives_fingerprint,
     frozen_drives,
 )
-from cns_drake.studies.study import Study
+from cns_drake.studies.pairs.simulated_pairs import SimulatedPairs
+from cns_drake.studies.study import plan_study
 from evaluation.recognition.protocol import RECORDED_PROTOCOL
 
 TABLE = "levels.csv"
 
 
-def planned(output, *overrides):
-    study = Study(
-        load_experiment("levels", ["methods=[solid]", *overrides]),
-        output,
-        "levels",
-        Cluster(),
-    )
-    drives = list(study._maps.pairs(()))
-    study._plan(drives)
-    return study, drives
+def run_of(output, *overrides):
+    wanted = load_experiment("levels", ["methods=[solid]", *overrides])
+    return ExperimentRun(wanted, output, "levels", Cluster())
 
 
 @pytest.mark.slow
@@ -47,11 +41,17 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
     assert {level for _, level in frozen} == {0, 1, 2, 3, 4}
     assert frozen_drives(TABLE) == frozen
     found = {}
-    study, maps = planned(tmp_path)
+    run = run_of(tmp_path)
+    plan_study(run)
+    maps = list(pairs_by_map(run, ()))
     worlds = {}
-    for one, compared in itertools.chain(*map(study._simulated.pairs, maps)):
-        key = one.map_name, one.factors["level"]
-        found.setdefault(key, []).append(drives_fingerprint(compared, worlds))
+    for some, pairs in zip(
+        maps, SimulatedPairs(run).changed(maps), strict=True
+    ):
+        for one in pairs:
+            key = some.map_name, one.condition.factors["level"]
+            drawn = drives_fingerprint(one.compared, worlds)
+            found.setdefault(key, []).append(drawn)
     assert frozen == {
         key: fingerprint({"drives": prints}) for key, prints in found.items()
     }
@@ -70,11 +70,11 @@ def test_the_levels_are_as_they_were_frozen(tmp_path):
 def test_other_drives_are_not_the_frozen_ones(tmp_path, change):
     if change.startswith("levels"):
         # Fewer levels are still those that were frozen.
-        planned(tmp_path, change, "maps=[suburbia]")
+        plan_study(run_of(tmp_path, change, "maps=[suburbia]"))
         return
     with pytest.raises(InputError, match=rf"{TABLE}: level \d of suburbia: "):
-        planned(tmp_path, change, "maps=[suburbia]")
-    planned(tmp_path, change, "maps=[suburbia]", "frozen=null")
+        plan_study(run_of(tmp_path, change, "maps=[suburbia]"))
+    plan_study(run_of(tmp_path, change, "maps=[suburbia]", "frozen=null"))
 
 
 def test_a_rebuilt_city_is_not_the_frozen_one(tmp_path):

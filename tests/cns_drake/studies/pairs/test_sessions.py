@@ -8,11 +8,11 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.studies import study as study_module
-from cns_drake.studies.experiments.conditions import conditions
 from cns_drake.studies.experiments.experiment import Experiment
 from cns_drake.studies.experiments.experiment_files import load_experiment
+from cns_drake.studies.maps.experiment_maps import ExperimentRun
 from cns_drake.studies.pairs.comparisons import PairMaker
-from cns_drake.studies.study import Study, run_study
+from cns_drake.studies.study import plan_study, run_study
 from evaluation.methods.solid import SolidMethod
 from evaluation.results.table import Results
 from evaluation.study import engine
@@ -57,7 +57,7 @@ def compared(town, age=aged, redraw=redrawn, **fields):
         lambda text: None,
     )
     wanted = experiment(**fields)
-    return [pair.build(one, 1) for one in conditions(wanted)]
+    return [pair.build(one, 1) for one in wanted.conditions]
 
 
 @pytest.mark.parametrize(
@@ -138,14 +138,14 @@ def test_sessions_keep_and_their_fields_are_factors(town):
             "keep": ["all", 1],
         }
     )
-    assert [one.factors for one in conditions(wanted)] == [
+    assert [one.factors for one in wanted.conditions] == [
         {"database.sessions.1.years": years, "database.keep": keep}
         for years in (5, 10)
         for keep in ("all", 1)
     ]
     sets = [[{"years": 5}], [{"years": 5}, {"years": 0}]]
     wanted = experiment(database={"sessions": sets})
-    assert [one.factors for one in conditions(wanted)] == [
+    assert [one.factors for one in wanted.conditions] == [
         {"database.sessions": text}
         for text in ("[{years: 5}]", "[{years: 5},{years: 0}]")
     ]
@@ -189,8 +189,7 @@ def test_costs_grow_with_what_is_measured(town, tmp_path):
             tasks=["place", "localise"],
             **SIMULATED,
         )
-        study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-        jobs = study._plan(study._maps.pairs(())).jobs
+        jobs = plan_study(run_of(wanted, tmp_path)).jobs
         found: dict[str, float] = {}
         for name, job in jobs.items():
             kind = name.partition(" ")[0]
@@ -215,8 +214,7 @@ def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
     )
 
     def cost():
-        study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-        jobs = study._plan(study._maps.pairs(())).jobs
+        jobs = plan_study(run_of(wanted, tmp_path)).jobs
         return sum(job.cost for job in jobs.values())
 
     usual = cost()
@@ -224,6 +222,10 @@ def test_a_slow_method_costs_more(town, tmp_path, monkeypatch):
     monkeypatch.setattr(SolidMethod, "describe_time", slower)
     scans = 200.0 / 2.0 + 200.0 / 5.0
     assert cost() - usual == pytest.approx(3.0 * scans)
+
+
+def run_of(wanted, output):
+    return ExperimentRun(wanted, output, "mine.yaml", Cluster())
 
 
 FLEET = {"cars": 2, "years": 3, "length": 100.0}
@@ -383,7 +385,7 @@ def test_tasks_on_two_drives_refuse_more(town, task):
         tasks=[task], database={"sessions": [{"years": 2}, {"years": 1}]}
     )
     with pytest.raises(InputError, match=f"tasks: {task}: it compares two"):
-        Study(wanted, town, "mine.yaml", Cluster())
+        plan_study(run_of(wanted, town))
 
 
 @pytest.fixture
@@ -471,9 +473,9 @@ def test_a_file_with_sessions_is_read(tmp_path):
         "database:\n  sessions: [{years: 10}, {years: 5}]\n  keep: [all, 1]\n"
         "quick:\n  database: {sessions: [{years: 10}], keep: [all]}\n"
     )
-    assert len(conditions(load_experiment(path))) == 2
+    assert len(load_experiment(path).conditions) == 2
     quick = load_experiment(path, quick=True)
-    (one,) = conditions(quick)
+    (one,) = quick.conditions
     assert one.changes["database"]["sessions"] == {"1": {"years": 10}}
     assert load_experiment(path, ["database.keep=latest"])
 
@@ -488,39 +490,12 @@ def test_jobs_in_a_maintained_map_wait_for_it(town, tmp_path):
         tasks=["place", "localise"],
         **SIMULATED,
     )
-    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    jobs = study._plan(study._maps.pairs(())).jobs
+    jobs = plan_study(run_of(wanted, tmp_path)).jobs
     (upkeep,) = [name for name in jobs if name.startswith("upkeep ")]
     waiting = [one.name for one in jobs.values() if upkeep in one.needs]
     kinds = sorted(name.partition(" ")[0] for name in waiting)
     # The places of both drives are described in the updated map.
     assert kinds == ["describe", "describe", "localise"]
-
-
-@pytest.mark.parametrize(
-    "database",
-    [
-        {"sessions": [{}, {"years": 2}]},
-        {
-            "sessions": [{"viewpoint": "near"}, {"viewpoint": "lane"}],
-            "redraw": 1,
-        },
-    ],
-)
-def test_no_map_is_updated_by_drives_through_a_city_to_come(
-    town, tmp_path, database
-):
-    """Before the city is made, a drive stands for one through another city."""
-    wanted = experiment(
-        maps=[str(town)],
-        database={**database, "maintain": "distance"},
-        tasks=["place"],
-        **SIMULATED,
-    )
-    study = Study(wanted, tmp_path, "mine.yaml", Cluster())
-    for some in study._maps.pairs(()):
-        study._simulated.request_maps(some)
-    assert not study._simulated.upkeep
 
 
 @pytest.mark.slow

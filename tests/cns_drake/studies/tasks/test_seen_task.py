@@ -12,7 +12,8 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_files import load_scenario
 from cns_drake.simulation.simulated_drive import SimulationSource
 from cns_drake.studies.experiments.experiment import Experiment
-from cns_drake.studies.study import Study
+from cns_drake.studies.maps.experiment_maps import ExperimentRun
+from cns_drake.studies.study import plan_study
 from cns_drake.studies.tasks.seen_task import (
     SeenTask,
     Sighting,
@@ -121,6 +122,6 @@ def test_a_city_that_does_not_age_has_no_such_numbers(tmp_path):
     wanted = Experiment.model_validate(
         {"name": "mine", "maps": [str(town)], "tasks": ["seen"]}
     )
-    study = Study(wanted, tmp_path / "out", "mine.yaml", Cluster())
+    run = ExperimentRun(wanted, tmp_path / "out", "mine.yaml", Cluster())
     with pytest.raises(InputError, match="no condition that can be measured"):
-        study._plan(study._maps.pairs(()))
+        plan_study(run)
