@@ -252,7 +252,12 @@ EDGES: dict[str, Callable[[Path], dict[str, str]]] = {
     "age": age,
     "import-openstreetmap": imported(inputs.write_corner_osm, "corner.osm"),
     "import-cityjson": imported(
-        inputs.write_blocks_cityjson, "blocks.json", "--years", 1930, 1980
+        inputs.write_blocks_cityjson,
+        "blocks.json",
+        "--plain",
+        "--years",
+        1930,
+        1980,
     ),
     "import-opendrive": imported(inputs.write_roads_opendrive, "bend.xodr"),
     "recordings": recordings,
