@@ -7,7 +7,7 @@ from cns_drake.base.own_packages import check_evaluation, leave_out_folder
 
 leave_out_folder(sys.path)  # Before anything else is imported.
 
-from cns_drake.base.start import start  # noqa: E402
+from cns_drake.base.launch import start  # noqa: E402
 
 
 def main() -> None:

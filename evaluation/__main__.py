@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from cns_drake.base.start import start
+from cns_drake.base.launch import start
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from cns_drake.ageing import kinds
 from cns_drake.base.csv_files import read_records, read_rows
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular, is_there
-from cns_drake.base.number_text import number_within, whole_number
+from cns_drake.base.number_format import number_within, whole_number
 from cns_drake.base.xml_elements import read_elements
 from cns_drake.city.geometry import (
     BoxShape,

@@ -9,7 +9,7 @@ import re
 from cns_drake.base.complete_files import write_text
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_text
-from cns_drake.base.number_text import other_separator
+from cns_drake.base.number_format import other_separator
 from cns_drake.base.repetitions import repeated
 
 # Control characters: no table needs them, and a terminal would obey them.

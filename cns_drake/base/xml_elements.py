@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.number_text import to_number
+from cns_drake.base.number_format import to_number
 
 # Limits that no road network or trace reaches, against hostile files: size of
 # the file [bytes], number and nesting of elements, length of a value.

@@ -10,7 +10,7 @@ import typer
 from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError, did_you_mean, errors_at_option
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.number_text import whole_number
+from cns_drake.base.number_format import whole_number
 from cns_drake.base.terminal import show
 from cns_drake.command_line.suggestions import suggest_reproduction
 

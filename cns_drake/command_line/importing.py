@@ -13,7 +13,7 @@ from cns_drake.base import shared_options
 from cns_drake.base.errors import InputError, errors_at_option
 from cns_drake.base.files import natural_key
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.number_text import whole_number
+from cns_drake.base.number_format import whole_number
 from cns_drake.base.terminal import note, show
 from cns_drake.imports.options import DriveOn, ImportOptions, Undated
 from cns_drake.imports.report import REPORT_NAME, ImportReport
@@ -114,11 +114,11 @@ def import_city(
         dressed=not plain,
     )
     with uninterrupted():
-        from cns_drake.imports import import_map
+        from cns_drake.imports.import_map import import_city as write_city
         from cns_drake.scenarios.drive_table import write_table
 
     with errors_at_option("--output", "output"):
-        report = import_map.import_city(
+        report = write_city(
             path,
             output,
             options,

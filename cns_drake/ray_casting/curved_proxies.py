@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene.surfaces import (
     CapsuleSurface,

@@ -26,7 +26,7 @@ import weakref
 import numpy as np
 from pydrake.math import RotationMatrix
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 from cns_drake.base.elementary import product, rotated
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 from cns_drake.ray_casting import moving_groups
 from cns_drake.ray_casting.embree_scene import EmbreeScene
 from cns_drake.ray_casting.known_poses import NOTHING_KNOWN, KnownPoses

@@ -7,7 +7,7 @@ import numpy as np
 
 from cns_drake.base.csv_files import read_rows
 from cns_drake.base.errors import InputError
-from cns_drake.base.number_text import to_number
+from cns_drake.base.number_format import to_number
 from cns_drake.base.repetitions import repeated
 
 # A greater coordinate is a mistake, not a place [m].

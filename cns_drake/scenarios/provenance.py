@@ -10,8 +10,8 @@ from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__, installed_versions
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
+from cns_drake.scene.file_references import referenced_files
 from cns_drake.scene.file_watch import FileWatch
-from cns_drake.scene.referenced_files import referenced_files
 from cns_drake.sensors.imu.config import KALIBR_FILE
 
 # Packages that can influence a message's bytes.

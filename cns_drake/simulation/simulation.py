@@ -19,8 +19,8 @@ from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.base.progress import doing
 from cns_drake.base.version import __version__
 from cns_drake.pictures.meshcat_recorder import MeshcatRecorder
-from cns_drake.pictures.other_stage import other_stage
 from cns_drake.pictures.page_panel import ShownStages
+from cns_drake.pictures.stage_comparison import other_stage
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.recorded_topics import make_calibration

@@ -118,11 +118,12 @@ def localise(
     from cns_drake.base.errors import InputError
     from cns_drake.base.files import make_folder
     from cns_drake.base.jobs.cluster import choose_cluster
-    from evaluation.localisation import results, tracking
     from evaluation.localisation.estimators import make_estimator
     from evaluation.localisation.initial_poses import Starts
     from evaluation.localisation.localisation_map import FEWEST_POINTS
+    from evaluation.localisation.results import localisation_summary
     from evaluation.localisation.settings import default_settings
+    from evaluation.localisation.tracking import tracking_summary
     from evaluation.study import one_pair
     from evaluation.study.chosen_methods import method_settings
     from evaluation.study.tasks.localise import LocaliseTask
@@ -182,8 +183,8 @@ def localise(
     }
     if track:
         values |= {"odometry_drift": odometry_drift}
-        values |= tracking.summary(rows)
-    values |= results.summary(rows)
+        values |= tracking_summary(rows)
+    values |= localisation_summary(rows)
     if output is not None:
         _write_results(engine, rows, output, track=track)
     terminal.show(values, _rows(values), json=json)
@@ -223,13 +224,13 @@ def _write_results(
     engine: Engine, rows: np.ndarray, output: Path, *, track: bool
 ) -> None:
     """Writes the tables and, of a tracked drive, the picture."""
-    from evaluation.localisation import results
+    from evaluation.localisation.results import write_rows
 
     if track:
         from evaluation.report.curve_figures import draw_track
 
         draw_track(rows, output / "track")
-    results.write_rows(rows, output / "localisation.csv")
+    write_rows(rows, output / "localisation.csv")
     terminal.note(f"wrote {output / 'localisation.csv'}")
     options.write_tables(engine)
 

@@ -66,7 +66,10 @@ def tcr(
         compare_paths(first, second, align, json=json)
         return
     from cns_drake.base.files import make_folder
-    from evaluation.change import drive_change as change
+    from evaluation.change.drive_change import (
+        same_stage_partner,
+        spread_over_grids,
+    )
     from evaluation.change.drive_maps import maps_in_one_world
     from evaluation.results.keys import LAST, OWN, STAGE
     from evaluation.study import one_pair
@@ -76,8 +79,7 @@ def tcr(
     maps, alignments = maps_in_one_world(named, align, lidar, columns)
     before, after, *controls = maps
     compared = [(before, after)] + [
-        (third, change.same_stage_partner(before, after, third))
-        for third in controls
+        (third, same_stage_partner(before, after, third)) for third in controls
     ]
     pairs = [
         one_pair.pair_of_drive_maps(
@@ -99,7 +101,7 @@ def tcr(
         report = report.beside(other)
     report = replace(
         report,
-        spread=change.spread_over_grids(before, after, report.change),
+        spread=spread_over_grids(before, after, report.change),
         alignment=alignments[0] if alignments else None,
     )
     for drive_map in maps:

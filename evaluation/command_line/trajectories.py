@@ -49,7 +49,7 @@ def measure_estimate(
         time_offset: time to add to the times of the estimate [s].
         json: whether to print JSON.
     """
-    from evaluation.alignment.trajectory_errors import trajectory_errors
+    from evaluation.alignment.estimated_trajectories import trajectory_errors
     from evaluation.drives.text_tables import parse_seconds
     from evaluation.drives.trajectories import read_quaternions
 

@@ -34,7 +34,7 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import is_there, listed, read_bytes, read_text
 from cns_drake.base.json_text import parse_json
-from cns_drake.base.number_text import parse_rows
+from cns_drake.base.number_format import parse_rows
 from cns_drake.drives.drive import index_instances
 from cns_drake.drives.drive_scenario import SCENARIO, read_scenario
 from evaluation.drives.scan_files import BinDrive, first_existing, read_packed

@@ -89,7 +89,7 @@ class NcltDrive(FileDrive):
             files=kept,
             stamps_ns=stamps_ns[spanned],
             X_WS=_X_WN @ X_NB @ _X_BS,
-            read=lambda path, stamp_ns: read_scan(path),
+            read=lambda path, stamp_ns: read_nclt_scan(path),
             tables=[trajectory.path],
             notes=(*chosen, *unknown, *notes),
             unit="hdl-32e-upside-down",
@@ -101,7 +101,7 @@ def holds_nclt(path: Path) -> bool:
     return (path / _SCANS).is_dir() or (path / _HITS).is_file()
 
 
-def read_scan(path: Path) -> np.ndarray:
+def read_nclt_scan(path: Path) -> np.ndarray:
     """Returns the points (N,) of a `velodyne_sync` file, in the LiDAR's frame.
 
     Raises:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError, value_errors
 from cns_drake.base.files import decode_text, read_bytes
-from cns_drake.base.number_text import is_number, other_separator, parse_rows
+from cns_drake.base.number_format import is_number, other_separator, parse_rows
 from cns_drake.base.units import NS_PER_S
 from evaluation.drives.table_headers import find_columns, split_header
 

@@ -24,7 +24,7 @@ from evaluation.localisation.settings import (
     Settings,
 )
 from evaluation.maps.voxel_maps import VoxelAccumulator
-from evaluation.recognition.kept_places import KEEP_ALL, kept_places
+from evaluation.recognition.place_selection import KEEP_ALL, kept_places
 
 # Distance between the scans of a drive that enter the map [m].
 _MAP_SPACING = 1.0
@@ -151,7 +151,7 @@ def map_frames(drive: Drive, keep: str | int = KEEP_ALL) -> np.ndarray:
     Args:
         drive: the drive.
         keep: which frames are used if the drive is a `JoinedDrive`, see
-            `evaluation.recognition.kept_places.kept_places`.
+            `evaluation.recognition.place_selection.kept_places`.
     """
     if not isinstance(drive, JoinedDrive):
         return sample_frames(drive.X_WS[:, :3, 3], _MAP_SPACING)

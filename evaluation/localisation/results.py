@@ -10,12 +10,12 @@ from cns_drake.base.csv_files import write_csv
 from cns_drake.base.json_text import json_values
 from evaluation.clouds.notes import OnNote
 from evaluation.localisation.localisation_map import FEWEST_POINTS
-from evaluation.recognition.auroc import auroc
 from evaluation.recognition.pose_errors import (
     SUCCESS_ROTATION_DEG,
     SUCCESS_TRANSLATION,
 )
 from evaluation.recognition.result_number import Number
+from evaluation.recognition.roc import auroc
 
 # Results with errors of at most these are right [m, deg].
 RIGHT_TRANSLATION = 0.3
@@ -112,7 +112,7 @@ def note_sparse(name: str, rows: np.ndarray, on_note: OnNote) -> None:
         )
 
 
-def summary(rows: np.ndarray) -> dict[str, float | int | None]:
+def localisation_summary(rows: np.ndarray) -> dict[str, float | int | None]:
     """Returns a summary of localised scans, for JSON.
 
     Success rates count all queries; quantiles count only queries with a pose.
@@ -154,7 +154,7 @@ def summary(rows: np.ndarray) -> dict[str, float | int | None]:
 
 
 def _error_quantiles(posed: np.ndarray) -> dict[str, float | None]:
-    """Returns the quantiles of errors in `summary`.
+    """Returns the quantiles of errors in `localisation_summary`.
 
     Args:
         posed: (K,) results with a pose, records of `QUERY`.
@@ -214,20 +214,20 @@ def _confidence(rows: np.ndarray) -> dict[str, float | None]:
     }
 
 
-def numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
+def localisation_numbers(rows: np.ndarray, method: str) -> Iterator[Number]:
     """Yields a method's results for `results.csv`, a `Number` for each metric.
 
     Args:
         rows: (K,) results, records of `QUERY`.
         method: name of the method.
     """
-    found = summary(rows)
+    found = localisation_summary(rows)
     for name in _SHOWN:
         if (value := found[name]) is not None:
             yield Number(method, False, name, float(value), n=len(rows))
 
 
-def columns(rows: np.ndarray) -> dict[str, np.ndarray]:
+def localisation_columns(rows: np.ndarray) -> dict[str, np.ndarray]:
     """Returns the columns of `queries.csv`: a mapping from name to values (K,).
 
     Args:

@@ -11,7 +11,7 @@ from cns_drake.base.progress import track
 from cns_drake.drives.drive import Drive
 from evaluation.drives.sampling import sample_frames, travelled
 from evaluation.localisation.initial_poses import InitialPose, Starts
-from evaluation.localisation.localise import Localiser, Query, path_axes
+from evaluation.localisation.localiser import Localiser, Query, path_axes
 from evaluation.localisation.results import COLUMNS, QUERY, RIGHT_TRANSLATION
 from evaluation.recognition.result_number import Number
 
@@ -183,20 +183,20 @@ def losses(tracked: np.ndarray) -> list[tuple[float, bool]]:
     return found
 
 
-def numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
+def tracking_numbers(tracked: np.ndarray, method: str) -> Iterator[Number]:
     """Yields the results for `results.csv` that only a tracked drive has.
 
     Args:
         tracked: records of `TRACKED`.
         method: name of the method.
     """
-    found = summary(tracked)
+    found = tracking_summary(tracked)
     for name in ("within_03m", "lost_per_km"):
         if (value := found[name]) is not None:
             yield Number(method, False, name, float(value), n=len(tracked))
 
 
-def summary(tracked: np.ndarray) -> dict[str, float | int | None]:
+def tracking_summary(tracked: np.ndarray) -> dict[str, float | int | None]:
     """Returns a summary of a tracked drive, for JSON.
 
     Shares of the drive are shares of its length.

@@ -9,7 +9,7 @@ import numpy as np
 
 from cns_drake.base.csv_files import read_records, write_csv
 from cns_drake.base.files import is_there
-from cns_drake.base.number_text import whole_number
+from cns_drake.base.number_format import whole_number
 from evaluation.map_update.labels import MOVING_CLASSES, SIDES, Label
 from evaluation.map_update.sessions import Session, SessionPair
 

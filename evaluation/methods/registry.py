@@ -12,8 +12,16 @@ from evaluation.methods.method import Method
 from evaluation.methods.own_files import named_faults
 
 _METHODS: dict[str, type[Method]] = {}
-# Methods that run only on request: name -> module. Some need another package or
-# weights.
+# Methods that run by default.
+_SHIPPED = (
+    "btc",
+    "layered-overlap",
+    "learned",
+    "ring++",
+    "scan-context++",
+    "solid",
+)
+# Methods that run only on request. Some need another package or weights.
 _OPTIONAL = {
     "bevplace": "evaluation.methods.bevplace",
     "map-closures": "evaluation.methods.map_closures",
@@ -44,8 +52,9 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
     def enter(method: _MethodClass) -> _MethodClass:
         other = _METHODS.get(name, method)
+        ours = method.__module__.startswith(f"{__package__}.")
         # The same class may be registered again, when its file runs again.
-        if _OPTIONAL.get(name, method.__module__) != method.__module__ or (
+        if ((name in _SHIPPED or name in _OPTIONAL) and not ours) or (
             other.__module__,
             other.__qualname__,
         ) != (method.__module__, method.__qualname__):
@@ -68,7 +77,7 @@ def known_methods() -> tuple[str, ...]:
 
         print(known_methods())
     """
-    return tuple(sorted({*_METHODS, *_OPTIONAL}))
+    return tuple(sorted({*_METHODS, *_SHIPPED, *_OPTIONAL}))
 
 
 def optional_methods() -> tuple[str, ...]:
@@ -78,13 +87,7 @@ def optional_methods() -> tuple[str, ...]:
 
 def shipped_methods() -> tuple[str, ...]:
     """Returns the names of the methods that run by default."""
-    package = __name__.rpartition(".")[0]
-    return tuple(
-        name
-        for name in sorted(_METHODS)
-        if _METHODS[name].__module__.startswith(f"{package}.")
-        and name not in _OPTIONAL
-    )
+    return _SHIPPED
 
 
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
@@ -99,6 +102,7 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 
         method = make_method("solid", {"sensor_height": 1.8})
     """
+    _register_shipped()
     if name in _OPTIONAL:
         importlib.import_module(_OPTIONAL[name])
     if name not in _METHODS:
@@ -125,3 +129,16 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
             fault = error.errors()[0]
             field = ".".join(str(part) for part in fault["loc"])
             raise InputError(f"{name}: {field}: {fault['msg']}") from error
+
+
+def _register_shipped() -> None:
+    """Imports the methods that run by default; each registers itself."""
+    # Statements, because the fingerprints of results follow them.
+    from evaluation.methods import (  # noqa: F401
+        btc,
+        layered_overlap,
+        learned,
+        ringpp,
+        scan_context,
+        solid,
+    )

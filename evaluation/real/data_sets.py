@@ -20,7 +20,10 @@ from cns_drake.base.jobs.file_digests import file_digests
 from cns_drake.drives.lidar_fields import lidar_field
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.clouds.notes import OnNote
-from evaluation.drives import Drive, helipr, nclt, open_drive
+from evaluation.drives.opening import open_drive
+from cns_drake.drives.drive import Drive
+from evaluation.drives.helipr import read_helipr_scan
+from evaluation.drives.nclt import read_nclt_scan
 from evaluation.drives.scan_files import BinDrive, FileDrive
 from evaluation.drives.trajectories import read_poses, read_quaternions
 from evaluation.real.image_sequences import FOLDER as IMAGES
@@ -129,7 +132,7 @@ DATA_SETS = (
         "ODbL",
         "56c0aead58880ca33625aa75af52579f2c3bf6e5f2a2f8e698a6113f802351c8",
         "",
-        nclt.read_scan,
+        read_nclt_scan,
     ),
     DataSet(
         "helipr_two_lidars",
@@ -141,7 +144,7 @@ DATA_SETS = (
         "CC BY-NC-SA 4.0",
         "7fac1a8479ca7d07b10f30b7cb242fe1e473cbfed6ab5e0b2ffedfcdec0991d4",
         "",
-        partial(helipr.read_scan, "Avia"),
+        partial(read_helipr_scan, "Avia"),
     ),
     DataSet(
         "helipr_two_lidars",
@@ -153,7 +156,7 @@ DATA_SETS = (
         "CC BY-NC-SA 4.0",
         "416e0a252c6827dec4d2e9331a28db0cc8efae8ca710dd022f71616bf82f1730",
         "",
-        partial(helipr.read_scan, "Aeva"),
+        partial(read_helipr_scan, "Aeva"),
     ),
 )
 

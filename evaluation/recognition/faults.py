@@ -1,6 +1,6 @@
 """Reasons for wrong top-ranked places that follow from distances alone.
 
-`evaluation.recognition.fault_kinds` finds further reasons, from scans.
+`evaluation.recognition.fault_names` finds further reasons, from scans.
 """
 
 from __future__ import annotations

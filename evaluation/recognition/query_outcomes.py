@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from evaluation.recognition.auroc import auroc
+from evaluation.recognition.roc import auroc
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import functools
 
 from evaluation.change.drive_change import ChangeResult
 from evaluation.recognition.costs import Cost
-from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.fault_names import PairEvidence
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.illustrations import Illustration
 from evaluation.report.page_data import PageDrive

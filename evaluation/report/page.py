@@ -17,7 +17,7 @@ from markupsafe import Markup
 from cns_drake.base.complete_files import write_text
 from cns_drake.base.files import natural_key
 from evaluation.change.drive_change import symmetric_changes
-from evaluation.recognition.fault_kinds import FAULT_KINDS, fault_words
+from evaluation.recognition.fault_names import FAULT_KINDS, fault_words
 from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report import ranking

@@ -11,7 +11,7 @@ import numpy as np
 
 from evaluation.drives.sampling import sample_frames
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
-from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
+from evaluation.recognition.fault_names import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.report.camera_images import CameraImages

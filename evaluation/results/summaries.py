@@ -24,7 +24,7 @@ from evaluation.recognition.bootstrap import (
     paired_samples,
     percentile_interval,
 )
-from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.place_metrics import kept_share
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.keys import CAUSE, LEVEL, NO_CAUSE, Key
 from evaluation.results.table import COSTS, Answers, QueryRows, Results, Row

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evaluation.recognition.descriptors import DriveDescriptors, joined_scans
-from evaluation.recognition.kept_places import KEEP_ALL, kept_places
+from evaluation.recognition.place_selection import KEEP_ALL, kept_places
 from evaluation.recognition.stored_places import MOST_BYTES, StoredDrives
 from evaluation.study.storage.parts import Part
 

@@ -16,9 +16,9 @@ from evaluation.methods.method import Method
 from evaluation.recognition.costs import query_ms
 from evaluation.recognition.describing import Role
 from evaluation.recognition.descriptors import DriveDescriptors
-from evaluation.recognition.kept_places import KEEP_ALL
 from evaluation.recognition.overlap_truth import overlaps_with_best_match
 from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
+from evaluation.recognition.place_selection import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import (
     compare_with_gates,

@@ -82,7 +82,7 @@ class JoinedSource:
     Attributes:
         sources: the sources of the drives, from older to newer.
         keep: which frames are kept in a map of the database, see
-            `evaluation.recognition.kept_places.kept_places`.
+            `evaluation.recognition.place_selection.kept_places`.
     """
 
     sources: tuple[DriveSource, ...]

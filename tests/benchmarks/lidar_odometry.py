@@ -43,7 +43,7 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
-from evaluation.alignment.trajectory_errors import segment_errors
+from evaluation.alignment.estimated_trajectories import segment_errors
 from evaluation.drives.sampling import travelled
 
 _TURNS = 10

@@ -28,7 +28,7 @@ import tempfile
 from _pytest.monkeypatch import MonkeyPatch
 
 import cns_drake
-from cns_drake.base.compiled import start_compiler
+from cns_drake.base.compilation import start_compiler
 from cns_drake.base.jobs import processes
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.processes import ALLOCATION

@@ -8,8 +8,8 @@ import numpy as np
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
-from evaluation.recognition.fault_kinds import PairEvidence
-from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.fault_names import PairEvidence
+from evaluation.recognition.place_metrics import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL

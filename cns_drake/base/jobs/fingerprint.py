@@ -90,9 +90,8 @@ class _Imports(NamedTuple):
     Attributes:
         names: for each import that runs, the module, and the name that is
             imported from it ("" for the module itself).
-        offered: maps each name that is imported under TYPE_CHECKING to its
-            module. In a package, these modules define the names that the
-            package imports on first use.
+        offered: maps each name that a package imports on its first use to its
+            module, as the stub of the package says.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -129,8 +128,11 @@ def _imported_modules(module: _Module) -> Iterator[_Module]:
         inner = package._replace(name=f"{home}.{name}")
         if name and _source(inner) is not None:
             yield inner
-        elif name in (offered := _imports_of(package).offered):
-            yield package._replace(name=offered[name])
+            continue
+        # A package may offer what another package offers.
+        while name in (offered := _imports_of(package).offered):
+            package = package._replace(name=offered[name])
+            yield package
 
 
 @functools.cache
@@ -141,8 +143,16 @@ def _imports_of(module: _Module) -> _Imports:
     package = module.name
     if path.name != "__init__.py":
         package = package.rpartition(".")[0]
+    stub = path.with_name("__init__.pyi")
+    offered: dict[str, str] = {}
     with user_errors(path):
-        return _find_imports(path.read_bytes(), package)
+        names = _find_imports(path.read_bytes(), package)
+        if path.name == "__init__.py" and stub.is_file():
+            text = stub.read_bytes()
+            offered = {
+                name: home for home, name in _find_imports(text, package)
+            }
+    return _Imports(names, offered)
 
 
 def _modules_of(package: str) -> Iterator[_Module]:
@@ -192,29 +202,29 @@ def _source_files(
 
 
 @functools.cache
-def _find_imports(text: bytes, package: str) -> _Imports:
-    """Returns the imports in the source of a module of a package."""
+def _find_imports(text: bytes, package: str) -> tuple[tuple[str, str], ...]:
+    """Returns the imports that run in the source of a module of a package.
+
+    Each is a module, and the name that is imported from it ("" for the module
+    itself).
+    """
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
-        return _Imports((), {})  # Running the file reports it.
+        return ()  # Running the file reports it.
     names: list[tuple[str, str]] = []
-    offered: dict[str, str] = {}
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
         test = getattr(getattr(node, "test", None), "id", None)
         if isinstance(node, ast.If) and test == "TYPE_CHECKING":
-            for line in node.body:
-                for home, name in _names_of(line, package):
-                    offered[name] = home
             waiting += node.orelse
         elif isinstance(node, ast.Import | ast.ImportFrom):
             names += _names_of(node, package)
         else:  # Imports are statements: no expression holds one.
             for block in ("body", "orelse", "finalbody", "handlers", "cases"):
                 waiting += getattr(node, block, [])
-    return _Imports(tuple(names), offered)
+    return tuple(names)
 
 
 def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:

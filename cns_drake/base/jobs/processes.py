@@ -297,7 +297,7 @@ def _preload_modules(modules: Iterable[str]) -> None:
             importlib.import_module(name)
     with contextlib.suppress(Exception):
         code_digest(*modules)
-    if compiling := sys.modules.get("cns_drake.base.compiled"):
+    if compiling := sys.modules.get("cns_drake.base.compilation"):
         compiling.start_compiler()
     # Garbage collection would write to memory that the processes share.
     gc.freeze()

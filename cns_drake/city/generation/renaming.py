@@ -13,7 +13,7 @@ import yaml
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.base.number_text import to_number
+from cns_drake.base.number_format import to_number
 from cns_drake.base.yaml_files import MarkedYamlLoader, read_yaml
 from cns_drake.city.geometry.structures import Structure
 

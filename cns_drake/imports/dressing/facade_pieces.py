@@ -18,11 +18,12 @@ from cns_drake.city.facades import (
     Relief,
     balconies,
     bays,
-    boards,
-    canopies,
     lifted,
     single_wall,
 )
+from cns_drake.city.facades.boards import board as make_board
+from cns_drake.city.facades.canopies import AwningShape
+from cns_drake.city.facades.canopies import awnings as make_awnings
 from cns_drake.city.geometry import Mesh, triangulate
 from cns_drake.city.geometry.polygons import GRID
 from cns_drake.imports.dressing.facade_plan import (
@@ -165,7 +166,7 @@ def add_facade(
             reach = _GUTTER_REACH if is_gutter else _CORNICE_REACH
             low = panel.height - style.cornice
             limits = (-reach, panel.length + reach, low, panel.height, reach)
-            _add_in_wall(out, "trim", panel, boards.board(*limits))
+            _add_in_wall(out, "trim", panel, make_board(*limits))
             counts["gutters" if is_gutter else "cornices"] = 1
     return counts
 
@@ -315,7 +316,7 @@ def _add_plinth(
     start = -reach
     for x0, x1 in [*sorted(gaps), (end, end)]:
         if x0 - start > _SHORTEST_PLINTH:
-            board = boards.board(start, x0, 0.0, top, reach)
+            board = make_board(start, x0, 0.0, top, reach)
             _add_in_wall(out, "trim", panel, board)
         start = max(start, x1)
     return 1
@@ -358,13 +359,11 @@ def _add_signs(
     if height > _LEAST_SIGN:
         start, end = min(o.x0 for o in shops), max(o.x1 for o in shops)
         limits = (start + JAMB_WIDTH, end - JAMB_WIDTH, z, z + height)
-        _add_in_wall(out, "sign", panel, boards.board(*limits, _SIGN_REACH))
+        _add_in_wall(out, "sign", panel, make_board(*limits, _SIGN_REACH))
     low, high = z - _AWNING_HEIGHT, z + float(panel.origin[2])
-    shape = canopies.AwningShape(
-        JAMB_WIDTH, _AWNING_REACH, high - _AWNING_HEIGHT, high
-    )
+    shape = AwningShape(JAMB_WIDTH, _AWNING_REACH, high - _AWNING_HEIGHT, high)
     cells = [(o.x0, o.x1) for o in shops]
-    awnings = canopies.awnings(panel.frame, cells, rng, _AWNINGS_SHARE, shape)
+    awnings = make_awnings(panel.frame, cells, rng, _AWNINGS_SHARE, shape)
     if plan.is_in_the_way(low, _AWNING_REACH):
         awnings = []
     out.add_to("sign", *awnings)

@@ -14,8 +14,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder, System
 
-from cns_drake.scene import perception_geometry
 from cns_drake.scene.geometry_list import geometry_port
+from cns_drake.scene.perception_geometry import (
+    anchored_frames as find_anchored_frames,
+)
 from cns_drake.sensors.carriers import body_and_pose, connect_motion
 from cns_drake.sensors.lidar.beams import BeamPattern
 from cns_drake.sensors.lidar.config import (
@@ -169,7 +171,7 @@ def add_lidar(
         if unseen is None:
             unseen = _welded_to(body)
         if anchored_frames is None:
-            anchored_frames = perception_geometry.anchored_frames(plant)
+            anchored_frames = find_anchored_frames(plant)
         if motion_distortion:
             moving_bodies = _body_frames(plant)
     else:

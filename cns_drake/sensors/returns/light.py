@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 from cns_drake.ray_casting.ray_casting_scene import SceneHits
 from cns_drake.sensors.returns.materials import BEADS, RETRO, Materials
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 from cns_drake.ray_casting.ray_casting_scene import SurfaceFrames
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials

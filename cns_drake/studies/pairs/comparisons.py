@@ -37,7 +37,7 @@ from cns_drake.studies.experiments.nested_fields import (
 )
 from cns_drake.studies.experiments.protocol_fields import protocol_from_fields
 from evaluation.map_update.upkeep import NOT_MAINTAINED
-from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
+from evaluation.recognition.place_selection import KEEP_ALL, checked_keep
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import CAUSE, OWN
 from evaluation.study.tasks.pair import USUAL_LENGTH
@@ -59,7 +59,7 @@ class ComparedDrives:
             sector.
         beside: further drives of the database, from older to newer.
         keep: which places of the database are kept, see
-            `evaluation.recognition.kept_places.kept_places`.
+            `evaluation.recognition.place_selection.kept_places`.
         maintain: what updates the maps of older drives by newer drives, see
             `evaluation.map_update.upkeep`.
         ages: the years by which the city has aged at the time of each of

@@ -6,7 +6,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.studies.experiments.conditions import Condition
 from cns_drake.studies.experiments.nested_fields import SESSIONS, SIDES
 from cns_drake.studies.experiments.protocol_fields import condition_protocol
-from evaluation.recognition.kept_places import KEEP_ALL, checked_keep
+from evaluation.recognition.place_selection import KEEP_ALL, checked_keep
 from evaluation.results.keys import CAUSE, LAST, OWN, STAGE
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.recordings.recorded_pairs import (

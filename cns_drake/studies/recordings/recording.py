@@ -14,7 +14,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.yaml_files import read_yaml
-from cns_drake.pictures.other_stage import other_stage
+from cns_drake.pictures.stage_comparison import other_stage
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.provenance import (
     digest_file,

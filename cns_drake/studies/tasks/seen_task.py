@@ -13,7 +13,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.files import is_there
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.jobs.step import Reporter
-from cns_drake.base.number_text import whole_number
+from cns_drake.base.number_format import whole_number
 from cns_drake.base.progress import track
 from cns_drake.simulation.simulated_drive import (
     SimulatedDrive,

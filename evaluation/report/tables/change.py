@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from evaluation.change.drive_change import ChangeResult
-from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.place_metrics import kept_share
 from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.report.tables.columns import Evidence
 from evaluation.results.table_forms import CAPTIONS, Table

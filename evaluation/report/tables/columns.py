@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.fault_names import PairEvidence
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.results.table_forms import (
     Columns,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from evaluation.recognition.fault_kinds import (
+from evaluation.recognition.fault_names import (
     ELSEWHERE_KINDS,
     FAULT_KINDS,
     fault_kinds,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
+from evaluation.recognition.fault_names import PairEvidence, fault_kinds
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.protocol import PROTOCOL_COLUMNS
 from evaluation.report.tables.columns import KEYS, Evidence, of_result

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.place_metrics import kept_share
 from evaluation.results.charts.chart import (
     FONT,
     ROW,

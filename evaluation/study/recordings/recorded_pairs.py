@@ -8,7 +8,7 @@ from cns_drake.base.files import natural_key
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.repetitions import repeated
 from cns_drake.drives.same_world import check_same_world
-from evaluation.recognition.kept_places import KEEP_ALL
+from evaluation.recognition.place_selection import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import OWN
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
@@ -30,7 +30,7 @@ class RecordedCondition(NamedTuple):
         protocol: protocol of place recognition.
         database: the recordings of the database, if there are several.
         keep: which places of these recordings are kept, see
-            `evaluation.recognition.kept_places.kept_places`.
+            `evaluation.recognition.place_selection.kept_places`.
     """
 
     factors: Mapping[str, Any]

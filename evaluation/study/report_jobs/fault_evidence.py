@@ -20,7 +20,7 @@ from evaluation.drives.scan_clouds import within_range
 from evaluation.maps.voxel_maps import downsample
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.recognition.fault_kinds import PairEvidence
+from evaluation.recognition.fault_names import PairEvidence
 from evaluation.recognition.faults import NEARLY
 from evaluation.recognition.overlap_truth import sample_points
 from evaluation.recognition.place_outcome import PlaceOutcome

@@ -15,7 +15,6 @@ from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
 from cns_drake.drives.drive import Drive
-from evaluation.localisation import localise, results, tracking
 from evaluation.localisation.estimators import make_estimator
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import (
@@ -23,15 +22,33 @@ from evaluation.localisation.localisation_map import (
     make_map,
     map_of,
 )
+from evaluation.localisation.localiser import (
+    NEAR,
+    Localiser,
+    Query,
+    localise,
+    mapped_frames,
+    path_axes,
+    query_frames,
+    read_queries,
+)
+from evaluation.localisation.results import (
+    QUERY,
+    is_right,
+    localisation_columns,
+    localisation_numbers,
+    note_sparse,
+)
 from evaluation.localisation.settings import (
     KISS_MATCHER,
     METHODS,
     Settings,
     default_settings,
 )
+from evaluation.localisation.tracking import track_drive, tracking_numbers
 from evaluation.maps.voxel_maps import map_drive
-from evaluation.recognition.kept_places import KEEP_ALL
-from evaluation.recognition.place_numbers import kept_share
+from evaluation.recognition.place_metrics import kept_share
+from evaluation.recognition.place_selection import KEEP_ALL
 from evaluation.recognition.result_number import Number
 from evaluation.study.sources import (
     DriveSource,
@@ -165,19 +182,19 @@ class LocaliseTask(Task):
     def numbers(self, found: Any, before: Any | None) -> Iterator[Number]:
         then = dict(self._named_results(before)) if before is not None else {}
         for method, rows in self._named_results(found):
-            yield from results.numbers(rows, method)
+            yield from localisation_numbers(rows, method)
             if self.settings["odometry_drift"] is not None:
-                yield from tracking.numbers(rows, method)
+                yield from tracking_numbers(rows, method)
             if method in then:
                 share = kept_share(
-                    float(results.is_right(rows).mean()),
-                    float(results.is_right(then[method]).mean()),
+                    float(is_right(rows).mean()),
+                    float(is_right(then[method]).mean()),
                 )
                 yield Number(method, False, "kept", float(share), n=len(rows))
 
     def answers(self, found: Any) -> Iterator[Answered]:
         for method, rows in self._named_results(found):
-            yield method, False, results.columns(rows)
+            yield method, False, localisation_columns(rows)
 
 
 def _check(name: str, value: Any, where: str) -> None:
@@ -224,14 +241,14 @@ def measure_localisation(
         spacing: distance between two queries [m].
         values: settings of the methods that differ from their defaults.
         odometry_drift: drift of the odometry with which the drive is tracked,
-            see `evaluation.localisation.tracking`; None to localise single
+            see `evaluation.localisation.track_drive`; None to localise single
             scans, `spacing` apart.
         processes: number of processes that localise single scans.
 
     Returns:
         An array for each pair of a method and an entry of `starts`. The arrays
         of the first method come first, in the order of `starts`. Each array
-        contains one record of `evaluation.localisation.results.QUERY` per
+        contains one record of `evaluation.localisation.QUERY` per
         query, or one record of `TRACKED` per tracked scan. If no query is near
         the map, the list is empty.
     """
@@ -249,17 +266,15 @@ def measure_localisation(
 
     localisers = _localisers(methods, values, make)
     try:
-        is_mapped = localise.mapped_frames(
-            mapped, localisers[0].surroundings, asked
-        )
+        is_mapped = mapped_frames(mapped, localisers[0].surroundings, asked)
     except InputError as error:
         reporter.note(f"{error}{NOT_LOCALISED}")
         return []
     if odometry_drift is None:
-        frames = localise.query_frames(asked, is_mapped, spacing)
+        frames = query_frames(asked, is_mapped, spacing)
         if min(processes, len(frames)) == 1:
-            queries = localise.read_queries(asked, frames)
-            found = localise.localise(
+            queries = read_queries(asked, frames)
+            found = localise(
                 localisers, queries, starts, asked.name, len(frames)
             )
         else:
@@ -269,11 +284,11 @@ def measure_localisation(
     else:
         found = [
             # A drive may be simulated while it is read: each track opens it.
-            tracking.track_drive(one, query(), is_mapped, draw, odometry_drift)
+            track_drive(one, query(), is_mapped, draw, odometry_drift)
             for one in localisers
             for draw in starts
         ]
-    results.note_sparse(asked.name, found[0], reporter.note)
+    note_sparse(asked.name, found[0], reporter.note)
     return found
 
 
@@ -281,7 +296,7 @@ def _localisers(
     methods: Sequence[str | Path],
     values: tuple[tuple[str, Any], ...],
     make: Callable[[Settings], LocalisationMap],
-) -> list[localise.Localiser]:
+) -> list[Localiser]:
     """Returns a localiser for each method.
 
     Args:
@@ -297,7 +312,7 @@ def _localisers(
         key = settings.voxel, settings.neighbours
         if key not in maps:
             maps[key] = make(settings)
-        found.append(localise.Localiser(maps[key], estimator, settings))
+        found.append(Localiser(maps[key], estimator, settings))
     return found
 
 
@@ -308,7 +323,7 @@ def _localised_in_jobs(
     how: tuple[Any, ...],
     processes: int,
 ) -> list[np.ndarray]:
-    """Localises scans as `localise.localise` does, in several processes.
+    """Localises scans as `localise` does, in several processes.
 
     The drive can be of a kind that no other process can open, so its scans and
     the points of the maps are passed on in files.
@@ -329,9 +344,7 @@ def _localised_in_jobs(
         jobs = []
         for k in range(number):
             queries = Part(folder / f"queries {k}.data")
-            queries.write(
-                {}, [*localise.read_queries(drive, frames[k::number])]
-            )
+            queries.write({}, [*read_queries(drive, frames[k::number])])
             parts.append(Part(folder / f"results {k}.data"))
             arguments = drive.name, queries, points, *how
             step = MakePart(parts[-1], localise_queries, arguments)
@@ -341,7 +354,7 @@ def _localised_in_jobs(
         done = [one.read() for one in parts]
     found = []
     for some in zip(*done, strict=True):
-        rows = np.empty(len(frames), results.QUERY)
+        rows = np.empty(len(frames), QUERY)
         for k, one in enumerate(some):
             rows[k::number] = one
         found.append(rows)
@@ -357,12 +370,12 @@ def localise_queries(
     values: tuple[tuple[str, Any], ...],
     starts: tuple[Starts, ...],
 ) -> list[np.ndarray]:
-    """Localises scans in maps that are in files; see `localise.localise`.
+    """Localises scans in maps that are in files; see `localise`.
 
     Args:
         reporter: unused.
         name: name of the scans' drive.
-        queries: file with the scans, a list of `localise.Query`.
+        queries: file with the scans, a list of `Query`.
         maps: file with a list of maps, each as its name and points (M, 3) in W.
         methods, values, starts: see `measure_localisation`.
     """
@@ -374,7 +387,7 @@ def localise_queries(
         return map_of(points, map_name, settings.neighbours)
 
     localisers = _localisers(methods, values, make)
-    return localise.localise(localisers, asked, starts, name, len(asked))
+    return localise(localisers, asked, starts, name, len(asked))
 
 
 def localise_among_others(
@@ -398,7 +411,7 @@ def localise_among_others(
     """
     drive = source()
     X_WS = drive.X_WS
-    R_WT = localise.path_axes(X_WS[:, :3, 3], X_WS)
+    R_WT = path_axes(X_WS[:, :3, 3], X_WS)
     made = [
         (make_estimator(one, settings), settings)
         for one in map(str, methods)
@@ -409,7 +422,7 @@ def localise_among_others(
     for k in track(frames, f"localising {drive.name}", len(frames), "scans"):
         apart = np.linalg.norm(X_WS[:, :3, 3] - X_WS[k, :3, 3], axis=1)
         apart[k] = math.inf
-        if apart.min() > localise.NEAR:
+        if apart.min() > NEAR:
             continue
         around = np.flatnonzero(apart < _AROUND).tolist()
         mapped = map_drive(drive, Settings.voxel, frames=around)
@@ -417,10 +430,10 @@ def localise_among_others(
             mapped.centroids_W, drive.name, Settings.neighbours
         )
         stamp_ns, scan = int(drive.stamps_ns[k]), drive.scan(k)
-        asked = localise.Query(k, stamp_ns, scan, X_WS[k], R_WT[k])
+        asked = Query(k, stamp_ns, scan, X_WS[k], R_WT[k])
         ends = iter(found)
         for estimator, settings in made:
-            one = localise.Localiser(surroundings, estimator, settings)
+            one = Localiser(surroundings, estimator, settings)
             for some in starts:
                 initial = InitialPose.moved(X_WS[k], *some.draw(k))
                 row, _ = one.query(asked, initial)
@@ -429,10 +442,10 @@ def localise_among_others(
     if number < len(drive):
         reporter.note(
             f"{drive.name}: {number} of {len(drive)} scans localised; the"
-            f" others have no other scan within {localise.NEAR:g} m"
+            f" others have no other scan within {NEAR:g} m"
         )
     if number == 0:
         return []
-    rows = [np.array(some, results.QUERY) for some in found]
-    results.note_sparse(drive.name, rows[0], reporter.note)
+    rows = [np.array(some, QUERY) for some in found]
+    note_sparse(drive.name, rows[0], reporter.note)
     return rows

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from evaluation.recognition.describing import Role
-from evaluation.recognition.kept_places import KEEP_ALL
+from evaluation.recognition.place_selection import KEEP_ALL
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.keys import FROZEN_REDRAW
 from evaluation.study.sources import DriveSource
@@ -93,7 +93,7 @@ class Pair:
         beside: further drives in the same world, whose places are added to the
             database, from older to newer.
         keep: which places of these drives and of the database drive are kept,
-            see `evaluation.recognition.kept_places.kept_places`.
+            see `evaluation.recognition.place_selection.kept_places`.
         ages: number of years by which the city has aged at each drive of the
             database, and at the query drive; empty if the city does not age.
         leaves_out_itself: whether database and query are the same drive; each

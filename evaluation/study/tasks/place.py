@@ -8,7 +8,7 @@ from cns_drake.base.jobs.running import Job
 from cns_drake.base.jobs.step import Reporter, Steps
 from cns_drake.base.progress import track
 from evaluation.recognition.costs import NUM_TRIALS, QueryCost, measure_search
-from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.place_metrics import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome
 from evaluation.recognition.result_number import Number
 from evaluation.study.place_measurements import (

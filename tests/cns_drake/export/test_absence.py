@@ -12,7 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.export.exporting import export_drive
 from cns_drake.export.kitti_layout import encode_labels
 from cns_drake.scenarios.shipped import shipped_maps
-from evaluation import drives
+from evaluation import open_drive
 
 # Instance -> name, class, its id, and its id if stage 01 lacks it. The ids are
 # those of semantic-kitti.yaml: moving-car, -person, -bus, -truck, and
@@ -137,7 +137,7 @@ def test_the_table_of_structures_names_them(drive, tmp_path):
 
 def test_our_reader_takes_them(drive, tmp_path):
     marked = export_drive(drive, "kitti", tmp_path / "out", absent_in="01")
-    read = drives.open(marked)
+    read = open_drive(marked)
     labels, instances = read_labels(marked, 1)
     np.testing.assert_array_equal(read.scan(1)["label"], labels)
     np.testing.assert_array_equal(read.scan(1)["instance"], instances)

@@ -20,7 +20,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.base.progress import Listener, heard_by
 from cns_drake.export.exporting import export_drive
-from evaluation import drives
+from evaluation import open_drive
 from evaluation.study.recordings.map_drives import drives_by_map
 from evaluation.study.recordings.recording_search import find_recordings
 
@@ -60,8 +60,8 @@ XYZI = ("x", "y", "z", "intensity")
 
 
 def test_kitti_reads_back(drive, kitti):
-    recorded = drives.open(drive)
-    read = drives.open(kitti / "sequences/07")
+    recorded = open_drive(drive)
+    read = open_drive(kitti / "sequences/07")
     assert_same_drive(read, recorded, (*XYZI, "label", "instance"))
     since_start = recorded.stamps_ns - recorded.stamps_ns[0]
     np.testing.assert_array_equal(read.stamps_ns, since_start)
@@ -71,7 +71,7 @@ def test_kitti_reads_back(drive, kitti):
 def test_kitti_has_its_poses_where_semantic_kitti_has_them(drive, kitti):
     """Beside calib.txt: X_S0S = inv(Tr) X_C0C Tr, as its tools read them."""
     folder = kitti / "sequences/07"
-    expected = drives.open(drive).X_WS
+    expected = open_drive(drive).X_WS
     expected = np.linalg.inv(expected[0]) @ expected
     X_CS = np.eye(4)
     for line in (folder / "calib.txt").read_text().splitlines():
@@ -91,7 +91,7 @@ def test_tum_by_plain_means(drive, tmp_path):
     """The vehicle drives as recorded, and the LiDAR stands fixed on it."""
     folder = export_drive(drive, "tum", tmp_path / "tum")
     assert folder == tmp_path / "tum/town_07"
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     vehicle = np.loadtxt(folder / "base_link.tum")
     lidar = np.loadtxt(folder / "lidar.tum")
     assert vehicle.shape == lidar.shape == (NUM_SCANS, 8)
@@ -126,7 +126,7 @@ def test_tum_by_plain_means(drive, tmp_path):
 def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
     from kiss_icp.datasets.kitti import KITTIOdometryDataset
 
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     dataset = KITTIOdometryDataset(kitti, "07")
     # The program corrects an error of KITTI's own sensor, which bends our
     # scans.
@@ -149,7 +149,7 @@ def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
 
 
 def test_labels_as_semantic_kitti_has_them(drive, kitti):
-    for i, scan in enumerate(drives.open(drive)):
+    for i, scan in enumerate(open_drive(drive)):
         stored = np.fromfile(
             kitti / f"sequences/07/labels/{i:06d}.label", dtype=np.uint32
         )
@@ -175,15 +175,15 @@ def test_camera_axes_are_right_down_forward(kitti):
 
 
 def test_cns_reads_back(drive, cns):
-    recorded = drives.open(drive)
-    read = drives.open(cns / "Town/07")
+    recorded = open_drive(drive)
+    read = open_drive(cns / "Town/07")
     assert_same_drive(read, recorded, XYZI)
     np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
 
 
 def test_cns_by_plain_means(drive, cns):
     """gt.csv has the vehicle's poses, transformation_lidar.yaml the LiDAR's."""
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     rows = np.loadtxt(cns / "Town/07/gt.csv", delimiter=",")
     mount = yaml.safe_load((cns / "transformation_lidar.yaml").read_text())
     np.testing.assert_allclose(mount["translation"], P_BS, atol=1e-12)
@@ -203,7 +203,7 @@ def test_cns_by_plain_means(drive, cns):
 def test_pcd_by_open3d(drive, cns):
     import open3d
 
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     for stamp_ns, scan in zip(recorded.stamps_ns, recorded, strict=True):
         if len(scan) == 0:
             continue
@@ -218,9 +218,9 @@ def test_pcd_by_open3d(drive, cns):
 
 
 def test_mulran_reads_back(drive, tmp_path):
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     folder = export_drive(drive, "mulran", tmp_path / "mulran")
-    read = drives.open(folder)
+    read = open_drive(folder)
     assert read.world_frame == "mulran/utm-52n"
     np.testing.assert_allclose(read.X_WS, recorded.X_WS, rtol=0, atol=1e-8)
     np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
@@ -233,7 +233,7 @@ def test_mulran_reads_back(drive, tmp_path):
 
 def test_mulran_by_plain_means(drive, tmp_path):
     """By the mount of calib_base2ouster.txt, turned by almost half a turn."""
-    recorded = drives.open(drive)
+    recorded = open_drive(drive)
     folder = export_drive(drive, "mulran", tmp_path / "mulran")
     rows = np.loadtxt(folder / "global_pose.csv", delimiter=",", dtype=object)
     assert rows[:, 0].astype(int).tolist() == recorded.stamps_ns.tolist()
@@ -256,8 +256,8 @@ def test_mulran_by_plain_means(drive, tmp_path):
 
 def test_imu_of_a_simulated_drive(short_recording, tmp_path):
     drive = export_drive(short_recording, "cns", tmp_path / "cns")
-    recorded = drives.open(short_recording)
-    read = drives.open(drive)
+    recorded = open_drive(short_recording)
+    read = open_drive(drive)
     np.testing.assert_array_equal(read.imu, recorded.imu)
     assert len(read.imu) == 40
     np.testing.assert_allclose(read.X_WS, recorded.X_WS, atol=1e-9)
@@ -484,7 +484,7 @@ def test_two_lidars_share_a_kitti_folder(tmp_path):
         with pytest.raises(InputError, match="is there already"):
             export_drive(recording, "kitti", output, lidar=lidar)
     names = [
-        drives.open(drive).name for drive in sorted(drive.parent.iterdir())
+        open_drive(drive).name for drive in sorted(drive.parent.iterdir())
     ]
     assert names == ["town_07", "town_07_rear"]
 
@@ -507,7 +507,7 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
     recording = write_drive(tmp_path / "town_07")
     path = recording / "town_07_0.mcap"
     messages, attachments = read_messages(path.read_bytes())
-    whole = drives.open(path).X_WS
+    whole = open_drive(path).X_WS
     for one in messages:
         if one.topic == "/odometry":
             for name in "xyzw":
@@ -516,7 +516,7 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
     path.write_bytes(write_messages(messages, attachments))
     folder = export_drive(path, format_name, tmp_path / "out")
     if format_name == "cns":
-        exported = drives.open(folder)
+        exported = open_drive(folder)
         np.testing.assert_allclose(exported.X_WS, whole, atol=1e-12)
     else:
         rows = np.loadtxt(folder / "base_link.tum")
@@ -551,7 +551,7 @@ class TestReadingKittiExports:
         for name in ("first_pose.txt", "scenario.yaml", "structures.json"):
             (folder / name).unlink()
         shutil.rmtree(folder / "labels")
-        drive = drives.open(folder)
+        drive = open_drive(folder)
         assert drive.name == "07"
         assert drive.world_frame == f"kitti{folder.resolve()}"
         assert drive.scenario is None
@@ -563,7 +563,7 @@ class TestReadingKittiExports:
         path = folder / "labels/000001.label"
         path.write_bytes(path.read_bytes()[:-4])
         with pytest.raises(ReadingError, match=r"60 points, but 59 in .*label"):
-            drives.open(folder).scan(1)
+            open_drive(folder).scan(1)
 
     @pytest.mark.parametrize(
         "text", ["[1]", "a: [", "name: ../../x", "name: 'a b'", "\0"]
@@ -571,16 +571,16 @@ class TestReadingKittiExports:
     def test_scenario(self, folder, text):
         (folder / "scenario.yaml").write_text(text)
         with pytest.raises(ReadingError, match=r"scenario\.yaml: [^\n]*$"):
-            drives.open(folder)
+            open_drive(folder)
 
     @pytest.mark.parametrize("text", ["{}x", "7", json.dumps([{"name": "a"}])])
     def test_structures(self, folder, text):
         (folder / "structures.json").write_text(text)
         with pytest.raises(ReadingError, match=r"structures\.json: [^\n]*$"):
-            _ = drives.open(folder).instances
+            _ = open_drive(folder).instances
 
     @pytest.mark.parametrize("text", ["1 2 3", "", "1 " * 12])
     def test_first_pose(self, folder, text):
         (folder / "first_pose.txt").write_text(text)
         with pytest.raises(ReadingError, match=r"first_pose\.txt: "):
-            drives.open(folder)
+            open_drive(folder)

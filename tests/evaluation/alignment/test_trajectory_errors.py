@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
-from evaluation.alignment.trajectory_errors import (
+from evaluation.alignment.estimated_trajectories import (
     aligned_offsets,
     segment_errors,
     trajectory_errors,

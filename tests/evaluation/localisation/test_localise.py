@@ -25,7 +25,7 @@ from evaluation.localisation.estimators import Estimate, make_estimator
 from evaluation.localisation.fit import fit_at
 from evaluation.localisation.initial_poses import InitialPose, Starts
 from evaluation.localisation.localisation_map import make_map, map_of
-from evaluation.localisation.localise import (
+from evaluation.localisation.localiser import (
     Localiser,
     Query,
     localise,
@@ -37,12 +37,12 @@ from evaluation.localisation.results import (
     COLUMNS,
     QUERY,
     is_right,
+    localisation_summary,
     note_sparse,
-    summary,
 )
 from evaluation.localisation.robust_icp import _gauss_newton_step
 from evaluation.localisation.settings import METHODS, Settings, default_settings
-from evaluation.recognition.auroc import auroc
+from evaluation.recognition.roc import auroc
 
 SHIPPED = [name for name in METHODS if name != "kiss-matcher"]
 # Each point of a scan is in a voxel of its own.
@@ -463,7 +463,7 @@ def with_scores(scores, wrong):
     rows = np.zeros(len(scores), QUERY)
     rows["own_score"], rows["fit"] = scores, scores
     rows["translation_error"] = np.where(wrong, 5.0, 0.0)
-    return summary(rows)
+    return localisation_summary(rows)
 
 
 def test_whether_an_estimator_knows():
@@ -501,7 +501,7 @@ def test_an_end_without_a_pose_is_a_failure():
         EXACT,
     )
     row = one_query(found, a_pose(0, 0, 1.7), street(), *np.zeros((2, 3)))
-    values = summary(np.array([row]))
+    values = localisation_summary(np.array([row]))
     assert values["without_pose"] == 1
     assert values["success_2m_5deg"] == 0.0
     assert values["translation_median"] is None
@@ -518,7 +518,7 @@ def test_a_scan_of_few_points_is_a_failure(number, is_sparse):
             one_query(found, X_WS, street(), *still),
         ]
     )
-    values = summary(rows)
+    values = localisation_summary(rows)
     notes = []
     note_sparse("town", rows, notes.append)
     assert values["success_03m_1deg"] == (0.5 if is_sparse else 1.0)

@@ -11,17 +11,17 @@ from scipy.spatial.transform import Rotation
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz
 from evaluation.drives.sampling import travelled
-from evaluation.localisation import results
 from evaluation.localisation.estimators import Estimate
 from evaluation.localisation.initial_poses import Starts
 from evaluation.localisation.localisation_map import map_of
-from evaluation.localisation.localise import Localiser
+from evaluation.localisation.localiser import Localiser
+from evaluation.localisation.results import localisation_summary
 from evaluation.localisation.settings import Settings
 from evaluation.localisation.tracking import (
     drifting_steps,
     losses,
-    summary,
     track_drive,
+    tracking_summary,
 )
 
 MOUNT = Rotation.from_euler("ZYX", [130.0, 20.0, -8.0], degrees=True)
@@ -66,7 +66,7 @@ def test_an_exact_odometry_keeps_the_first_error():
     rows = follow(Line(40), stay)
     assert rows["translation_error"] == pytest.approx(0.5)
     assert rows["rotation_error_deg"] == pytest.approx(0.0, abs=1e-6)
-    values = summary(rows)
+    values = tracking_summary(rows)
     assert values["way"] == pytest.approx(78.0, abs=0.2)
     assert values["within_03m"] == 0.0
     assert values["lost_per_km"] == 0.0
@@ -119,8 +119,8 @@ def test_losses_and_returns():
     # The odometry's error is none of a result.
     assert rows["track_error"][50] == pytest.approx(0.0, abs=1e-9)
     assert np.flatnonzero(np.isnan(rows["translation_error"])).tolist() == [50]
-    assert results.summary(rows)["without_pose"] == 1
-    (one, two), values = losses(rows), summary(rows)
+    assert localisation_summary(rows)["without_pose"] == 1
+    (one, two), values = losses(rows), tracking_summary(rows)
     assert one == (pytest.approx(10.0, abs=0.02), True)
     assert two == (pytest.approx(18.0, abs=0.02), False)
     assert values["lost"] == 2
@@ -148,7 +148,7 @@ def test_each_stretch_has_a_start_of_its_own():
     assert rows["translation_error"] == pytest.approx(0.5)
     first = [rows[f"start_{axis}"][[0, 20]] for axis in "xyz"]
     assert not np.allclose(*np.transpose(first))
-    assert summary(rows)["way"] == pytest.approx(86.0, abs=0.2)
+    assert tracking_summary(rows)["way"] == pytest.approx(86.0, abs=0.2)
 
 
 def test_drift_moves_the_start_and_not_the_truth():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.recognition.kept_places import checked_keep, kept_places
+from evaluation.recognition.place_selection import checked_keep, kept_places
 
 CELL = 5.0
 

@@ -7,7 +7,7 @@ from scipy.stats import binom
 from evaluation.methods import make_method
 from evaluation.recognition.bootstrap import UNKNOWN
 from evaluation.recognition.faults import FAULTS, faults
-from evaluation.recognition.place_numbers import place_numbers, pose_numbers
+from evaluation.recognition.place_metrics import place_numbers, pose_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import RetrievalProtocol

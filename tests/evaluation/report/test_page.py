@@ -10,7 +10,7 @@ from helpers.small_page import make_content, make_result, make_results
 import numpy as np
 import pytest
 
-from evaluation.recognition.fault_kinds import FAULT_KINDS
+from evaluation.recognition.fault_names import FAULT_KINDS
 from evaluation.report.illustrations import Illustration
 from evaluation.report.page import write_page, write_report
 from evaluation.report.page_data import browser_data

@@ -38,12 +38,15 @@ def late():
     except ImportError:
         import evaluation.fallback
 """,
-    "evaluation/inner/__init__.py": """
-from typing import TYPE_CHECKING
-import evaluation.initial
-if TYPE_CHECKING:
-    from evaluation.hidden import offered, unasked
-    from evaluation.unasked import other
+    "evaluation/inner/__init__.py": "import evaluation.initial\n",
+    # A name that another package offers, too.
+    "evaluation/inner/__init__.pyi": """
+from evaluation.door import offered
+from evaluation.unasked import other
+""",
+    "evaluation/door/__init__.py": "",
+    "evaluation/door/__init__.pyi": """
+from evaluation.hidden import offered, unasked
 """,
     "evaluation/page.css": "",
     "evaluation/page.js": "",
@@ -99,6 +102,8 @@ def test_every_kind_of_import_counts(packages):
         if differs(path, "evaluation.top")
     }
     expected = {*SOURCES, *COUNTED} - {
+        "evaluation/inner/__init__.pyi",
+        "evaluation/door/__init__.pyi",
         "evaluation/unrelated.py",
         "evaluation/page.js",
     }
@@ -142,7 +147,7 @@ def test_every_import_of_a_source_is_found(start, end):
         if isinstance(node, (ast.Import, ast.ImportFrom))
         for name in node.names
     ]
-    assert sorted(found.names) == sorted(expected)
+    assert sorted(found) == sorted(expected)
 
 
 def test_packages_of_others_beside_ours_do_not_count(packages):

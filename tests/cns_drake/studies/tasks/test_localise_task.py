@@ -8,8 +8,8 @@ from evaluation.drives import open_drive
 from evaluation.localisation.estimators import make_estimator
 from evaluation.localisation.initial_poses import Starts
 from evaluation.localisation.localisation_map import make_map
-from evaluation.localisation.localise import Localiser, localise
-from evaluation.localisation.results import COLUMNS, summary
+from evaluation.localisation.localiser import Localiser, localise
+from evaluation.localisation.results import COLUMNS, localisation_summary
 from evaluation.localisation.settings import default_settings
 from evaluation.study.sources import RecordingSource
 from evaluation.study.tasks.localise import LocaliseTask, measure_localisation
@@ -48,7 +48,7 @@ def test_numbers_of_a_pair(found):
     assert list(dict.fromkeys(n.method for n in numbers)) == names
     for name, rows in zip(names, found, strict=True):
         mine = {n.metric: n.value for n in numbers if n.method == name}
-        alone = summary(rows)
+        alone = localisation_summary(rows)
         assert mine == {
             metric: alone[metric]
             for metric in mine

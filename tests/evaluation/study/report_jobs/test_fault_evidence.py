@@ -9,7 +9,7 @@ import pytest
 
 from evaluation.drives import open_drive
 from evaluation.methods import make_method
-from evaluation.recognition.fault_kinds import (
+from evaluation.recognition.fault_names import (
     FAULT_KINDS,
     PairEvidence,
     fault_kinds,

@@ -4,9 +4,9 @@ import signal
 
 import pytest
 
-from cns_drake.base import start as start_module
+from cns_drake.base import launch as start_module
 from cns_drake.base.errors import InputError
-from cns_drake.base.start import start
+from cns_drake.base.launch import start
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

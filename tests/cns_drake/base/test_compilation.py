@@ -10,7 +10,7 @@ import sys
 from helpers import documents
 import pytest
 
-from cns_drake.base import compiled
+from cns_drake.base import compilation
 
 _SCRIPT = """
 import numba
@@ -63,7 +63,7 @@ _TWICE = """
 import fcntl
 import os
 
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 
 @compiled
 def twice(number):
@@ -114,7 +114,7 @@ def test_nothing_is_compiled_twice(tmp_path):
 
 
 _THRICE = """
-from cns_drake.base.compiled import compiled
+from cns_drake.base.compilation import compiled
 
 @compiled
 def thrice(number):
@@ -161,5 +161,7 @@ def test_an_interrupt_waits_until_a_function_is_compiled(tmp_path):
         done.append(types)
 
     with pytest.raises(KeyboardInterrupt):
-        compiled._compiling_once(compile_for, "one", tmp_path / "one.lock")(())
+        compilation._compiling_once(compile_for, "one", tmp_path / "one.lock")(
+            ()
+        )
     assert done == [()]
