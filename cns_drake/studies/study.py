@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -43,11 +42,11 @@ from evaluation.study.chosen_methods import (
     choose_methods,
 )
 from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.extraction_jobs import ExtractionJobs
+from evaluation.study.recorded_city import ShownCity, add_city
+from evaluation.study.recorded_study import recorded_sections
 from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.pair import NamedDrive, Pair
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
@@ -76,8 +75,6 @@ _FORMER = (
     "map_update.csv",
     "localisation.csv",
 )
-# Files of `cns-eval report`, and the folder of `cns-drake reproduce`.
-_OF_REPORTS = ("report.html", "report")
 
 
 def run_study(
@@ -150,7 +147,13 @@ class Study:
         for chart in self.experiment.charts:
             with errors_at(self.source):
                 check_chart(chart)
-        self._protocol = condition_protocol(self._conditions[0], self.source)
+        # Each protocol once, in the order of the conditions.
+        self._protocols = list(
+            dict.fromkeys(
+                condition_protocol(one, self.source) for one in self._conditions
+            )
+        )
+        self._shown: list[ShownCity] = []
         self._made = MadeMaps(self.output / "cities")
         self._maps = ExperimentMaps(
             self.experiment,
@@ -183,12 +186,6 @@ class Study:
                     f"{self.output / name}: results of an older version; give"
                     " another folder"
                 )
-        for name in _OF_REPORTS:
-            if (self.output / name).exists():
-                raise InputError(
-                    f"{self.output / name}: results of another command; give"
-                    " another folder"
-                )
         self._note_lower_levels()
         found = list(self._maps.pairs(maps))
         doing("looking at all conditions")
@@ -200,6 +197,11 @@ class Study:
         self._made.make(self.cluster)
         engine = self._plan(found)
         results, queries = engine.run(self.cluster)
+        further = []
+        if self._shown:
+            further = recorded_sections(
+                self._shown, results, queries, self.output, {}
+            )
         return write_page(
             results,
             queries,
@@ -208,7 +210,8 @@ class Study:
             about=self.experiment.about,
             charts=self.experiment.charts,
             experiment_text=self.experiment.text,
-            notes=[self._protocol.to_text()],
+            notes=[one.to_text() for one in self._protocols],
+            sections=further,
             on_note=self.on_note,
         )
 
@@ -306,11 +309,11 @@ class Study:
                         drawn.append(drives_fingerprint(compared, worlds))
             if not found:
                 self.on_note(f"{some.map_name}: no two drives to compare")
-            jobs: Callable[..., Jobs] = Jobs
-            if some.city is not None:
-                with_map = ChangeTask.name in self._tasks
-                jobs = partial(ExtractionJobs, with_map=with_map)
-            engine.add(found, self._distractors(some, found), jobs)
+            distractors = self._distractors(some, found)
+            if some.city is None:
+                engine.add(found, distractors)
+            elif shown := add_city(engine, some.city, found, distractors):
+                self._shown.append(shown)
         if not engine.jobs:
             raise InputError(
                 f"{self.source}: no condition that can be measured"
@@ -346,7 +349,7 @@ class Study:
             for one in distracting_drives(
                 database,
                 most,
-                self._protocol.place_spacing,
+                self._protocols[0].place_spacing,
                 self.output / "cities",
                 self.cluster,
                 self.on_note,

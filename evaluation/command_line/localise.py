@@ -226,7 +226,7 @@ def _write_results(
     from evaluation.localisation import results
 
     if track:
-        from evaluation.report.curve_figures import draw_track
+        from evaluation.results.track_figure import draw_track
 
         draw_track(rows, output / "track")
     results.write_rows(rows, output / "localisation.csv")

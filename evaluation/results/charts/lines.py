@@ -30,7 +30,7 @@ _WIDE_RANGE = 50.0
 def draw_lines(chart: Chart) -> tuple[str, Figure]:
     """Returns the chart's message, and the chart."""
     over = chart.keys["over"]
-    figure, panels = chart.panels(280.0)
+    figure, panels = chart.panels(280.0, chart.panel_rows)
     last: dict[str, list[float]] = {}
     at = sorted({_checked_number(row, over) for row in chart.rows})
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):

@@ -60,7 +60,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     longest = max(len(line) for name in below for line in name.split("\n"))
     # Names of methods and the caption stand below.
     around = max(_LEAST_AROUND, _CAPTIONS + _LETTER * longest)
-    figure, panels = chart.panels(around + len(values) * ROW)
+    figure, panels = chart.panels(around + len(values) * ROW, chart.panel_rows)
     weakest: list[tuple[float, str, str]] = []
     most_strips = 1
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):

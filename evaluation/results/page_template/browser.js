@@ -19,7 +19,7 @@ function showStatus() {
       ` – top-ranked place ${metres(state.query, best[0])} away, score ` +
       method.scores[state.query][0].toFixed(4));
   }
-  const why = method.why?.[state.query];
+  const why = method.why[state.query];
   if (kind === "wrong" && why)
     byId("status").append(
       ` – ${byId("why").querySelector(`[value="${why}"]`).textContent}`);
@@ -205,7 +205,7 @@ function firstPlaced() {
 function showPair() {
   const methods = pairNow().methods.map((method, index) => {
     const option = element(
-      "option", `${method.title} (AUC ${method.metrics.all.auc.toFixed(3)})`);
+      "option", `${method.title} (AUC ${method.auc.toFixed(3)})`);
     option.value = index;
     return option;
   });
@@ -248,8 +248,7 @@ function onKey(event) {
 
 function start() {
   data.pairs.forEach((pair, index) => {
-    const change = pair.change === null ? "" : ` (TCR_sym ${pair.change})`;
-    const option = element("option", pair.label + change);
+    const option = element("option", pair.label);
     option.value = index;
     byId("pair").append(option);
   });
@@ -289,14 +288,14 @@ function start() {
     waiting = setTimeout(show, 100);
   });
   if (!readAddress()) {
-    const areas = pairNow().methods.map((one) => one.metrics.all.auc);
+    const areas = pairNow().methods.map((one) => one.auc);
     state.method = areas.indexOf(Math.max(...areas));
     state.query = firstPlaced();
     showPair();
   }
 }
 
-if (data) {
+{
   if (typeof DecompressionStream === "undefined") {
     byId("status").textContent =
       "The query browser needs a web browser of 2023 or later.";

@@ -47,7 +47,7 @@ function distance(pair, query, place) {
 /** Whether the choice of queries to show holds for one. */
 function fits(query) {
   const method = methodNow();
-  if (state.why && method.why?.[query] !== state.why) return false;
+  if (state.why && method.why[query] !== state.why) return false;
   return state.filter === "all" ||
     outcome(pairNow(), method, query) === state.filter;
 }
