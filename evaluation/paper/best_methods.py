@@ -6,7 +6,7 @@ import itertools
 
 from evaluation.paper.paper_values import Measured, StagePair, paper
 from evaluation.recognition.metrics import Mode
-from evaluation.results.table_forms import in_table_order, title
+from evaluation.results.method_names import in_table_order, title
 
 RING = title("ring++")
 

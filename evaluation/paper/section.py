@@ -15,9 +15,9 @@ from evaluation.recognition.metrics import MODES
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.results.keys import OWN, STAGE, Key
+from evaluation.results.method_names import in_table_order
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.table import QueryRows, Results
-from evaluation.results.table_forms import in_table_order
 
 
 def paper_section(

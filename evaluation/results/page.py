@@ -27,6 +27,8 @@ from evaluation.results.keys import (
     PROTOCOL_BASE,
     SETTINGS,
 )
+from evaluation.results.method_names import in_table_order
+from evaluation.results.method_names import title as title_of
 from evaluation.results.page_frame import (
     PageSection,
     framed_page,
@@ -36,8 +38,6 @@ from evaluation.results.page_frame import (
 from evaluation.results.ranges import check_all
 from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import COSTS, QueryRows, Results
-from evaluation.results.table_forms import in_table_order
-from evaluation.results.table_forms import title as title_of
 
 _TASKS = {
     "place": "Place recognition",

@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 import jinja2
 from markupsafe import Markup
 
-from evaluation.results.table_forms import title
+from evaluation.results.method_names import title
 
 _FOLDER = "page_template"
-_STYLES = ("frame.css", "sections.css")
 # The scripts of a section with data. A script uses only the scripts before it.
 _BROWSER = ("browser_state.js", "browser_pictures.js", "browser.js")
 
@@ -88,7 +87,7 @@ def framed_page(
         sections=sections,
         made_by=list(made_by),
         notes=list(notes),
-        style=Markup("\n").join(map(_asset, _STYLES)),
+        style=_asset("frame.css"),
         script=Markup("\n").join(map(_asset, scripts)),
         # JSON cannot end the script element around it.
         data=None if data is None else Markup(text.replace("<", "\\u003c")),

@@ -132,7 +132,7 @@ def measure_method(
     distractors: tuple[Part, ...],
     num_distractors: int,
     choice: MethodChoice,
-    overlaps: Part | None,
+    overlaps: Part,
     protocol: RetrievalProtocol,
     radii: tuple[float, ...],
     beside: tuple[Part, ...] = (),
@@ -149,8 +149,7 @@ def measure_method(
             method's descriptors of its places.
         num_distractors: see `measure_places`.
         choice: the method.
-        overlaps: file with the result of `shown_overlaps`; None to leave
-            overlaps unknown.
+        overlaps: file with the result of `shown_overlaps`.
         protocol, radii: see `measure_places`.
         beside: files with the method's descriptors of the places of further
             drives in the same world.
@@ -161,7 +160,7 @@ def measure_method(
     method = choice.make()
     placed, (placed_query, asked) = database.read()[0], query.read()
     check_same_world(placed, placed_query, across_maps=True)
-    shown = {} if overlaps is None else overlaps.read()
+    shown = overlaps.read()
     return _method_outcomes(
         choice,
         method,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
@@ -18,15 +19,15 @@ from evaluation.drives.drive_views import MovedDrive
 from evaluation.drives.scan_clouds import cloud_at
 from evaluation.paper.section import paper_section
 from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 from evaluation.results.keys import LAST, OWN, PROTOCOL_BASE, STAGE
+from evaluation.results.method_names import in_table_order
 from evaluation.results.page import write_page
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.sections.browser import browser_section
 from evaluation.results.sections.change_pictures import change_section
 from evaluation.results.sections.routes import PageDrive, routes_section
 from evaluation.results.table import QueryRows, Results
-from evaluation.results.table_forms import in_table_order
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.engine import Engine, made_tasks
 from evaluation.study.recorded_city import ShownCity, add_city
@@ -138,10 +139,9 @@ def study_recordings(
         title=STAGES_FILE.stem,
         about=experiment["about"],
         charts=experiment["charts"],
-        experiment_text=STAGES_FILE.read_text("utf-8"),
+        experiment_text=_experiment_text(experiment, methods, protocols),
         notes=[
             *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
-            *(one.key for one in methods if one.settings),
             *alone,
         ],
         sections=[
@@ -212,6 +212,31 @@ def _conditions(
         for stage in (LAST, OWN)
         for name, protocol in protocols.items()
     ]
+
+
+def _experiment_text(
+    experiment: Mapping[str, Any],
+    methods: Iterable[MethodChoice],
+    protocols: Mapping[str, RetrievalProtocol],
+) -> str:
+    """Returns the experiment as YAML, with its methods and protocols.
+
+    All protocols have the same options.
+    """
+    options = {
+        option: value
+        for name, protocol in protocols.items()
+        for option, value in protocol.to_json().items()
+        if value != PROTOCOLS[name].to_json()[option]
+    }
+    names: Any = [*protocols] if len(protocols) > 1 else next(iter(protocols))
+    values = {
+        **experiment,
+        "protocol": {"base": names, **options} if options else names,
+        "methods": [one.key for one in methods],
+    }
+    del values["quick"]
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=79)
 
 
 def _note_missed_routes(

@@ -7,8 +7,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.repetitions import repeated
 from evaluation.recognition.precision_recall import pr_curve
 from evaluation.results.charts.chart import FONT, Chart
+from evaluation.results.method_names import title
 from evaluation.results.table import Row
-from evaluation.results.table_forms import title
 
 
 def draw_curves(chart: Chart) -> tuple[str, Figure]:

@@ -20,9 +20,9 @@ from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import SETTINGS
+from evaluation.results.method_names import in_table_order
 from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
-from evaluation.results.table_forms import in_table_order
 
 _Measured = TypeVar("_Measured", Row, Answers)
 # Width for a name in a legend [px].

@@ -14,10 +14,10 @@ import numpy as np
 from evaluation.results.charts.chart import FONT, ROW, Chart
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
+from evaluation.results.method_names import title
 from evaluation.results.ranges import checked
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
-from evaluation.results.table_forms import title
 
 # Least height of all that stands around the cells of a panel [px].
 _LEAST_AROUND = 220.0

@@ -295,18 +295,10 @@ function start() {
   }
 }
 
-{
-  if (typeof DecompressionStream === "undefined") {
-    byId("status").textContent =
-      "The query browser needs a web browser of 2023 or later.";
-  } else {
-    // Then all pictures have their sizes, and a linked query its place.
-    window.addEventListener("load", start);
-  }
+if (typeof DecompressionStream === "undefined") {
+  byId("status").textContent =
+    "The query browser needs a web browser of 2023 or later.";
+} else {
+  // Then all pictures have their sizes, and a linked query its place.
+  window.addEventListener("load", start);
 }
-
-document.addEventListener("keydown", (event) => {
-  if (event.key !== "Escape") return;
-  for (const box of document.querySelectorAll(".enlarge :checked"))
-    box.checked = false;
-});

@@ -9,9 +9,9 @@ import numpy as np
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.faults import FAULTS
 from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.results.method_names import in_table_order, title
 from evaluation.results.page_frame import PageSection, page_section
 from evaluation.results.sections.routes import PageDrive
-from evaluation.results.table_forms import in_table_order, title
 
 # Points in all scans of a page. At some 3 bytes each they leave room for the
 # figures within 25 MB.

@@ -97,7 +97,6 @@ class PoseTask(Task):
                 pair.keep,
             ),
         )
-        overlaps = (shown,) if jobs.shows_overlaps else ()
         steps = [
             MakePart(
                 jobs.files.part("place", pair.key, choice.key),
@@ -108,7 +107,7 @@ class PoseTask(Task):
                     tuple(parts[k - 1] for parts in others),
                     pair.distractors,
                     choice,
-                    shown.part if overlaps else None,
+                    shown.part,
                     protocol,
                     radii,
                     tuple(parts[k] for parts in beside),
@@ -119,7 +118,7 @@ class PoseTask(Task):
             for k, choice in enumerate(jobs.methods, start=1)
         ]
         name = f"place {pair.key}"
-        whole = Steps((*overlaps, *steps)[0].part.path, (*overlaps, *steps))
+        whole = Steps(shown.part.path, (shown, *steps))
         cost = _search_cost(pair, jobs, num_queries)
         cost += _OVERLAP_COST * num_queries
         jobs.jobs[name] = Job(name, whole, tuple(needs), cost)

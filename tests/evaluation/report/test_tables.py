@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from evaluation.report.page import write_report
-from evaluation.results.ranges import range_of
-from evaluation.results.table_forms import (
+from evaluation.results.method_names import (
     Cell,
     Table,
     keyed,
     p_value_text,
     ranked,
 )
+from evaluation.results.ranges import range_of
 
 PLAIN = Table(
     ("name", "value", "count"),

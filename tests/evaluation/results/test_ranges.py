@@ -8,9 +8,9 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.results.figure_files import save_figure
+from evaluation.results.method_names import Cell, Table
 from evaluation.results.ranges import check_all, checked, range_of
 from evaluation.results.table import Results, Row
-from evaluation.results.table_forms import Cell, Table
 
 
 @pytest.mark.parametrize(

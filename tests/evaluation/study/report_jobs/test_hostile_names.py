@@ -8,7 +8,7 @@ from helpers.small_towns import drive
 import pytest
 
 from cns_drake.base.file_names import file_name
-from evaluation.results.table_forms import Table
+from evaluation.results.method_names import Table
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.recordings.map_drives import MapDrives, RecordingInfo
 from evaluation.study.report_jobs.figures import change_stems
