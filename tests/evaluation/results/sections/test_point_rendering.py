@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.report.point_rendering import (
+from evaluation.results.sections.point_rendering import (
     OrthographicView,
     colour_by_height,
     render,

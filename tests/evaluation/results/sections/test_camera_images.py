@@ -9,9 +9,11 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from evaluation.report.camera_images import CameraImages, nearest_images
-from evaluation.report.page import write_page
-from evaluation.report.page_data import browser_data
+from evaluation.results.sections.browser import browser_data
+from evaluation.results.sections.camera_images import (
+    CameraImages,
+    nearest_images,
+)
 
 NAMES = "metropolis_01", "metropolis_04"
 SAID = "has room for one of {} camera images"
@@ -33,9 +35,9 @@ def picture(width, height, level=0, form="JPEG"):
     return stream.getvalue()
 
 
-def with_images(folder, counts):
-    """Returns a report whose drives have images a second apart."""
-    content = make_content(folder)
+def with_images(counts):
+    """Returns a page whose drives have images a second apart."""
+    content = make_content()
     for name, count in zip(NAMES, counts, strict=True):
         drive = content.drives[name]
         stamps_ns = np.arange(len(drive.frames)) * 500_000_000
@@ -47,7 +49,7 @@ def with_images(folder, counts):
 
 
 def shown(content):
-    data = browser_data(content.recognitions, content.drives, {}, {}, {})
+    data = browser_data(content.outcomes, content.drives, {})
     return [data["drives"][name]["images"] for name in NAMES]
 
 
@@ -84,8 +86,8 @@ def test_no_camera():
     assert nearest_images(Camera([], []), np.array([1]), pytest.fail) is None
 
 
-def test_each_scan_shows_the_nearest_image(tmp_path):
-    first, second = shown(with_images(tmp_path, (2, 0)))
+def test_each_scan_shows_the_nearest_image():
+    first, second = shown(with_images((2, 0)))
     assert second is None
     files = [base64.b64decode(one) for one in first["files"]]
     assert files == [b"\0" * 100, b"\1" * 100]
@@ -94,15 +96,14 @@ def test_each_scan_shows_the_nearest_image(tmp_path):
 
 
 def test_many_images_are_thinned_and_the_page_says_so(tmp_path, monkeypatch):
-    content = with_images(tmp_path, (5, 3))
-    limit = "evaluation.report.page_data._IMAGES_OF_A_PAGE"
+    content = with_images((5, 3))
+    limit = "evaluation.results.sections.browser._IMAGES_OF_A_PAGE"
     for most, left, step in ((801, (5, 3), 1), (799, (3, 2), 2), (1, None, 0)):
         monkeypatch.setattr(limit, most)
         images = shown(content)
         if left is not None:
             assert tuple(len(one["files"]) for one in images) == left
-        write_page(tmp_path / "page.html", content)
-        text = (tmp_path / "page.html").read_text()
+        text = content.write(tmp_path).read_text()
         assert (SAID.format(step) in text) == (step > 1)
     # One image is left of each drive, however few there is room for.
     assert [len(one["files"]) for one in images] == [1, 1]
