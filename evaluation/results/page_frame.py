@@ -76,7 +76,7 @@ def framed_page(
         made_by: what made the page, for the end of the page.
         notes: sentences on how the page was made, for the end of the page.
     """
-    (data,) = [one.data for one in sections if one.data is not None] or [None]
+    data = next((one.data for one in sections if one.data is not None), None)
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     scripts = ["tables.js", *(_BROWSER if data is not None else ())]
     return rendered(

@@ -233,9 +233,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
     "module",
     [
         EXTRACTION,
-        pytest.param(
-            "evaluation.study.report_jobs.figures", marks=pytest.mark.night
-        ),
+        pytest.param("evaluation.study.recorded_city", marks=pytest.mark.night),
         pytest.param(
             "cns_drake.simulation.simulated_drive", marks=pytest.mark.night
         ),

@@ -3,12 +3,13 @@
 from pathlib import Path
 import pickle
 
+from helpers import studies
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.paper import reference_for
+from evaluation.recognition.protocol import PROTOCOLS
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.recordings.map_drives import RecordingInfo, drives_by_map
-from evaluation.study.report_jobs.stages_report import StagesReport
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):
@@ -26,15 +27,14 @@ FAMILY = [
 ]
 
 
-def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
-    jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
+def test_every_recording_is_read_once_when_it_is_made(tmp_path):
+    jobs = {job.name: job for job in studies.planned(FAMILY, tmp_path)}
     features = {n: j for n, j in jobs.items() if n.startswith("features of ")}
     assert {name: job.needs for name, job in features.items()} == {
         "features of metropolis_01": ("metropolis_01",),
         "features of metropolis_02": ("metropolis_02",),
         "features of metropolis_04": ("metropolis_04",),
         "features of metropolis_01_stage_04": (),
-        "features of metropolis_walk": (),
     }
     roles = {name: sorted(job.step.roles) for name, job in features.items()}
     assert roles == {
@@ -42,29 +42,41 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
         "features of metropolis_02": ["places"],
         "features of metropolis_04": ["queries"],
         "features of metropolis_01_stage_04": ["places"],
-        "features of metropolis_walk": ["places"],
     }
     assert not any(tmp_path.iterdir())
 
 
+def test_two_protocols_read_a_drive_once(tmp_path):
+    """Places of methods that merge scans differ; so do all queries."""
+    both = {name: PROTOCOLS[name] for name in ("fair", "paper")}
+    jobs = studies.planned(FAMILY, tmp_path, protocols=both)
+    names = [job.name for job in jobs]
+    assert sum("features of" in name for name in names) == 4
+    assert not [name for name in names if name.startswith("describe")]
+    further = {
+        job.name: {
+            (choice.name, role)
+            for choice, roles, protocol in job.step.further
+            for role in roles
+            if protocol == PROTOCOLS["paper"]
+        }
+        for job in jobs
+        if job.name.startswith("features of")
+    }
+    methods = {one.name for one in choose_methods()}
+    queries = {(name, "queries") for name in methods}
+    assert further["features of metropolis_04"] == queries
+    assert further["features of metropolis_01"] == {("btc", "places")}
+
+
 def test_pairs_wait_for_their_features(tmp_path):
-    jobs = {job.name: job for job in StagesReport(FAMILY, tmp_path).jobs()}
+    jobs = {job.name: job for job in studies.planned(FAMILY, tmp_path)}
     both = ("features of metropolis_01", "features of metropolis_04")
-    for task in ("place", "change"):
-        assert (
-            job_of(jobs, task, "metropolis_01", "metropolis_04").needs == both
-        )
+    assert job_of(jobs, "place", "metropolis_01", "metropolis_04").needs == both
+    change = "change metropolis_01,metropolis_04"
+    assert jobs[change].needs == both
     # What is drawn is what the task has measured.
-    assert jobs["draw metropolis 01 > 04"].needs == (
-        job_of(jobs, "change", "metropolis_01", "metropolis_04").name,
-        job_of(jobs, "change", "metropolis_01_stage_04", "metropolis_04").name,
-        *both,
-    )
-    assert jobs["draw metropolis 02 > 04"].needs == (
-        job_of(jobs, "change", "metropolis_02", "metropolis_04").name,
-        "features of metropolis_02",
-        "features of metropolis_04",
-    )
+    assert jobs["draw metropolis 01 > 04"].needs == (change, *both)
     assert jobs["draw metropolis"].needs == (
         "features of metropolis_01",
         "features of metropolis_02",
@@ -75,22 +87,9 @@ def test_pairs_wait_for_their_features(tmp_path):
         "features of metropolis_01_stage_04",
         "features of metropolis_04",
     )
-    own = job_of(jobs, "place", "metropolis_01", "metropolis_04")
-    explained = jobs["explain metropolis_01 > metropolis_04"]
-    assert explained.needs == (own.name,)
-    # Five features, one city, two changes; two pairs and a control, each with
-    # its change; the two drives of stage 02; two pairs are explained.
-    assert len(jobs) == 5 + 1 + 2 + 2 * 3 + 1 + 2
-    (together,) = (
-        one
-        for one in jobs.values()
-        if "features of metropolis_walk" in one.needs
-    )
-    assert together.needs == (
-        "features of metropolis_02",
-        "features of metropolis_04",
-        "features of metropolis_walk",
-    )
+    # Four features, one city, two changes; two pairs and a control, each with
+    # its change.
+    assert len(jobs) == 4 + 1 + 2 + 2 * 3
 
 
 def job_of(jobs, task, database, query):
@@ -124,12 +123,7 @@ def test_a_control_serves_both_ways(tmp_path):
         info("riverside_02", "02", "b", "riverside"),
         info("riverside_01_stage_02", "02", "a", "riverside"),
     ]
-    jobs = {
-        job.name: job
-        for job in StagesReport(
-            drives, tmp_path, reference=reference_for({"riverside"})
-        ).jobs()
-    }
+    jobs = {job.name: job for job in studies.planned(drives, tmp_path)}
     roles = sorted(jobs["features of riverside_01_stage_02"].step.roles)
     assert roles == ["places", "queries"]
     for names in (
@@ -142,9 +136,8 @@ def test_a_control_serves_both_ways(tmp_path):
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     river = [info(f"riverside_{s}", s, s, "riverside") for s in ("01", "02")]
-    jobs = StagesReport(
-        FAMILY + river, Path("out"), reference=reference_for({"riverside"})
-    ).jobs()
+    both = {name: PROTOCOLS[name] for name in ("fair", "paper")}
+    jobs = studies.planned(FAMILY + river, Path("out"), protocols=both)
     names = [job.name for job in jobs]
     assert len(set(names)) == len(names)
     outputs = [job.step.output for job in jobs]
@@ -153,12 +146,13 @@ def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
         assert tmp_path / "out" / "parts" in job.step.output.parents
         assert job.cost > 0
         assert pickle.loads(pickle.dumps(job.step)) == job.step
-    # The paper has this map in both directions.
-    published = [name for name in names if name.endswith(" published solid")]
-    assert [name.split()[1:3] for name in published if "river" in name] == [
+    # Two drives are compared both ways, by both protocols.
+    compared = [name.split()[1:3] for name in names if "place river" in name]
+    there, back = (
         ["riverside_01", "riverside_02"],
         ["riverside_02", "riverside_01"],
-    ]
+    )
+    assert compared == [there, there, back, back]
 
 
 def test_names_of_files_stay_apart(tmp_path):
@@ -167,7 +161,7 @@ def test_names_of_files_stay_apart(tmp_path):
         info("a,b", "2", city="x"),
         info("a%2Cb", "3", city="x"),
     ]
-    outputs = [job.step.output for job in StagesReport(odd, tmp_path).jobs()]
+    outputs = [job.step.output for job in studies.planned(odd, tmp_path)]
     assert len({str(path).lower() for path in outputs}) == len(outputs)
     depths = {len(path.relative_to(tmp_path).parts) for path in outputs}
     assert depths == {3}
@@ -176,4 +170,4 @@ def test_names_of_files_stay_apart(tmp_path):
 def test_one_name_for_two_recordings(tmp_path):
     twice = [info("town_01", "01", city="a"), info("town_01", "01", city="b")]
     with pytest.raises(InputError, match=r"town_01 is there twice"):
-        StagesReport(twice, tmp_path).jobs()
+        studies.planned(twice, tmp_path)
