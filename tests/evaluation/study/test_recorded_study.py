@@ -25,7 +25,7 @@ from evaluation.recognition import costs, search
 from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
 from evaluation.results.table import QueryRows, Results
 from evaluation.study import chosen_methods
-from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.recordings.map_drives import drives_by_map
 from evaluation.study.recordings.recording_search import find_recordings
 from evaluation.study.storage.study_files import StudyFiles
@@ -320,7 +320,6 @@ def test_each_protocol_has_a_baseline_of_its_own(report):
             )
             if last[0].value > 0.0:
                 assert kept[0].value == own[0].value / last[0].value
-    assert results.where({"both.stage": "last"}, metric="kept").rows == ()
 
 
 def test_a_protocol_beside_another_changes_no_number(
@@ -518,7 +517,7 @@ def test_costs(recordings, tmp_path, monkeypatch):
     for module in (costs, search):
         monkeypatch.setattr(module, "process_time_ns", lambda: next(ticks))
     names = shipped_methods()
-    chosen = [choose_methods([name])[0] for name in names]
+    chosen = [MethodChoice(name) for name in names]
     found = find_recordings(recordings)
     *others, last = studies.planned(
         found, tmp_path / "out", chosen, with_costs=True
@@ -545,7 +544,7 @@ def test_scans_without_points_are_refused(tmp_path):
             nothing,
             [yaw_pose(x, 0, 0, 0) for x in (0, 1)],
         )
-    with pytest.raises(InputError, match=r"town_0\d: no scan holds a point"):
+    with pytest.raises(InputError, match=r"town_0\d: no (scan|finite)"):
         studies.report(tmp_path, tmp_path / "out")
 
 
