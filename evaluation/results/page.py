@@ -157,9 +157,11 @@ def _drawn_charts(
             save_figure(
                 alone.figure, folder / f"chart_{number}", ("pdf", "png")
             )
+            # The message is known; only curves are drawn from answers.
+            needed = answers if chart["kind"] == "curves" else None
             svgs = {
                 name: _svg(
-                    draw_chart(chart, rows, width, queries=answers),
+                    draw_chart(chart, rows, width, queries=needed),
                     f"{name}{number}",
                 )
                 for name, width in (("wide", WIDE), ("narrow", NARROW))
