@@ -43,7 +43,7 @@ from evaluation.methods.layered_overlap import (
     LayeredOverlap,
     LayeredOverlapConfig,
 )
-from evaluation.report import point_rendering
+from evaluation.results.sections import point_rendering
 from evaluation.results.styles import (
     GONE,
     INK,

@@ -50,14 +50,6 @@ Costs = Annotated[
         "needs. The measured costs differ from run to run.",
     ),
 ]
-Tables = Annotated[
-    bool,
-    typer.Option(
-        "--tables",
-        help="Also write the results as wide tables (.csv, .md and .tex): "
-        "survival, tcr, place_recognition, poses and others.",
-    ),
-]
 
 Json = Annotated[
     bool, typer.Option("--json", help="Print the results as one JSON object.")

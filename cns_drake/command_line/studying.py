@@ -13,10 +13,10 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, resumable
 from cns_drake.command_line import options
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_protocol
+from evaluation.recognition.protocol_options import with_protocols
 
 
-@with_protocol
+@with_protocols("fair", "paper")
 def reproduce(
     maps: options.Maps = None,
     *,
@@ -30,20 +30,21 @@ def reproduce(
     method: shared_options.Methods = None,
     parameter: shared_options.MethodSettings = None,
     costs: shared_options.Costs = True,
-    tables: shared_options.Tables = False,
-    protocol: RetrievalProtocol,
+    protocols: dict[str, RetrievalProtocol],
 ) -> None:
-    """Simulate the drives of maps, and write a report.
+    """Simulate the drives of maps, and measure what they changed.
 
-    Records all drives of the maps, measures place recognition and structural
-    change between these drives, and writes a report.
+    Records all drives of the maps, and measures place recognition and
+    structural change between these drives, as the experiment stages does. By
+    default the results are by two protocols: by fair, and by paper to compare
+    them with the paper.
 
     Args:
         pages: Whether to write a web page of each drive as well. By default
             yes, except with --no-recordings.
         recordings: Whether to record the drives. With --no-recordings, the
             drives are simulated but not recorded. This saves time and disk
-            space, and does not change the report.
+            space, and does not change the results.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -63,13 +64,12 @@ def reproduce(
             maps,
             output,
             cluster,
+            protocols,
             with_pages=pages is not False,
             with_recordings=recordings,
-            protocol=protocol,
             methods=method or (),
             settings=parameter or (),
             with_costs=costs,
-            with_tables=tables,
             on_note=note,
         )
     typer.echo(report)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +38,7 @@ from cns_drake.studies.pairs.simulated_pairs import (
 from cns_drake.studies.tasks.map_task import DrivenMapTask
 from cns_drake.studies.tasks.seen_task import SeenTask
 from evaluation.methods import optional_methods
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.results.charts.kinds import check_chart
 from evaluation.results.keys import LEVEL
 from evaluation.results.page import write_page
@@ -49,11 +49,11 @@ from evaluation.study.chosen_methods import (
     choose_methods,
 )
 from evaluation.study.engine import Engine, made_tasks
-from evaluation.study.extraction_jobs import ExtractionJobs
+from evaluation.study.recorded_city import ShownCity, add_city
+from evaluation.study.recorded_study import recorded_sections
 from evaluation.study.recordings.map_drives import MapDrives
 from evaluation.study.recordings.recorded_pairs import recorded_pairs
 from evaluation.study.tasks.change import ChangeTask
-from evaluation.study.tasks.jobs import Jobs
 from evaluation.study.tasks.localise import LocaliseTask
 from evaluation.study.tasks.pair import Pair
 from evaluation.study.tasks.place import CostTask, PlaceTask, PoseTask
@@ -71,8 +71,6 @@ TASKS: Mapping[str, type[Task]] = {
         SeenTask,
     )
 }
-# Files of `cns-eval report`, and the folder of `cns-drake reproduce`.
-_OF_REPORTS = ("report.html", "report")
 
 
 def run_study(
@@ -116,8 +114,7 @@ def run_study(
     for chart in experiment.charts:
         with errors_at(run.source):
             check_chart(chart)
-    protocol = condition_protocol(experiment.conditions[0], run.source)
-    engine = plan_study(run, maps)
+    engine, cities = plan_study(run, maps)
     results, queries = engine.run(cluster)
     return write_page(
         results,
@@ -127,17 +124,26 @@ def run_study(
         about=experiment.about,
         charts=experiment.charts,
         experiment_text=experiment.text,
-        notes=[protocol.to_text()],
+        notes=[one.to_text() for one in _protocols(run)],
+        sections=recorded_sections(cities, results, queries, run.output, {})
+        if cities
+        else [],
         on_note=on_note,
     )
 
 
-def plan_study(run: ExperimentRun, maps: Sequence[str] = ()) -> Engine:
-    """Returns the engine that measures all pairs of drives in all conditions.
+def plan_study(
+    run: ExperimentRun, maps: Sequence[str] = ()
+) -> tuple[Engine, list[ShownCity]]:
+    """Plans how all pairs of drives in all conditions are measured.
 
     Args:
         run: the experiment.
         maps: names or folders of maps that replace the experiment's maps.
+
+    Returns:
+        The engine that measures the pairs, and what the page shows of recorded
+        cities.
 
     Raises:
         InputError: a field of the experiment, a map or the folder cannot be
@@ -152,7 +158,8 @@ def plan_study(run: ExperimentRun, maps: Sequence[str] = ()) -> Engine:
     if experiment.frozen is not None:
         with errors_at(f"{run.source}: frozen"):
             frozen_drives(experiment.frozen)
-    _check_folder(run.output)
+    for name in (RESULTS, QUERIES, "index.html"):
+        is_there(run.output / name)  # Nothing else may have its name.
     _note_lower_levels(run)
     found = list(pairs_by_map(run, maps))
     doing("looking at all conditions")
@@ -161,26 +168,27 @@ def plan_study(run: ExperimentRun, maps: Sequence[str] = ()) -> Engine:
     engine = Engine(
         experiment.name, tasks, dict(methods), run.output, run.on_note
     )
+    cities: list[ShownCity] = []
     for some, simulations in zip(found, changed, strict=True):
         if some.city is None:
             pairs = [simulated.named(some, one) for one in simulations]
-            jobs: Callable[..., Jobs] = Jobs
         else:
             pairs = list(_recorded_pairs(run, some.city))
-            with_map = ChangeTask.name in tasks
-            jobs = partial(ExtractionJobs, with_map=with_map)
         if not pairs:
             run.on_note(f"{some.map_name}: no two drives to compare")
         others = [
             simulated.named_drive(one) for one in _distractors(run, some, pairs)
         ]
-        engine.add(pairs, others, jobs)
+        if some.city is None:
+            engine.add(pairs, others)
+        elif shown := add_city(engine, some.city, pairs, others):
+            cities.append(shown)
     if not engine.jobs:
         raise InputError(f"{run.source}: no condition that can be measured")
     engine.jobs = {**simulated.upkeep, **engine.jobs}
     if experiment.frozen is not None:
         _check_drives_are_frozen(experiment.frozen, found, changed)
-    return engine
+    return engine, cities
 
 
 def study_drives(
@@ -212,6 +220,16 @@ def study_drives(
     return list(drives.values())
 
 
+def _protocols(run: ExperimentRun) -> list[RetrievalProtocol]:
+    """Returns each protocol once, in the order of the conditions."""
+    return list(
+        dict.fromkeys(
+            condition_protocol(one, run.source)
+            for one in run.experiment.conditions
+        )
+    )
+
+
 def _wanted_tasks(run: ExperimentRun) -> Mapping[str, Mapping[str, Any]]:
     """Returns the experiment's tasks with their settings.
 
@@ -238,18 +256,6 @@ def _wanted_tasks(run: ExperimentRun) -> Mapping[str, Mapping[str, Any]]:
         )
         return {**wanted, CostTask.name: {}}
     return wanted
-
-
-def _check_folder(output: Path) -> None:
-    """Checks that a folder has no results of other commands."""
-    for name in _OF_REPORTS:
-        if (output / name).exists():
-            raise InputError(
-                f"{output / name}: results of another command; give another"
-                " folder"
-            )
-    for name in (RESULTS, QUERIES, "index.html"):
-        is_there(output / name)  # Nothing else may have its name.
 
 
 def _note_lower_levels(run: ExperimentRun) -> None:
@@ -287,11 +293,10 @@ def _distractors(
     database, _ = some.pairs[0]
     if run.experiment.drives == "same-route":
         database = with_lidars_beside(database, *VIEWPOINTS["near"])
-    protocol = condition_protocol(run.experiment.conditions[0], run.source)
     return distracting_drives(
         database,
         most,
-        protocol.place_spacing,
+        _protocols(run)[0].place_spacing,
         run.output / "cities",
         run.cluster,
         run.on_note,

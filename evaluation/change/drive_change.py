@@ -7,7 +7,7 @@ the parts of the city that both routes saw.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -234,35 +234,4 @@ def _numbers_of_change(change: TemporalChange) -> dict:
     }
     if change.undefined_because:
         values["reason"] = change.undefined_because
-    return values
-
-
-@dataclass(frozen=True)
-class ChangeResult:
-    """The change between two stages of a map.
-
-    Attributes:
-        map_name: name of the map.
-        stages: names of the earlier and the later stage.
-        report: the change.
-    """
-
-    map_name: str
-    stages: tuple[str, str]
-    report: ChangeReport
-
-
-def symmetric_changes(
-    changes: Iterable[ChangeResult],
-) -> dict[tuple[str, str, str], float]:
-    """Returns the symmetric temporal change ratio of pairs of stages.
-
-    The keys of the result are (map, stage, other stage); each pair of stages is
-    contained in both orders.
-    """
-    values = {}
-    for result in changes:
-        value = result.report.change.symmetric
-        for first, second in (result.stages, result.stages[::-1]):
-            values[result.map_name, first, second] = value
     return values

@@ -96,9 +96,9 @@ def compare(
 
 
 def _p_text(p_value: float) -> str:
-    from evaluation.results.table_forms import p_value_text
-
-    return number_text(p_value) if isnan(p_value) else p_value_text(p_value)
+    if isnan(p_value):
+        return number_text(p_value)
+    return "< 0.0001" if p_value < 0.5e-4 else f"{p_value:.4f}"
 
 
 def _spaced_interval(interval: Interval) -> str:

@@ -227,7 +227,7 @@ def _write_results(
     from evaluation.localisation.results import write_rows
 
     if track:
-        from evaluation.report.curve_figures import draw_track
+        from evaluation.results.track_figure import draw_track
 
         draw_track(rows, output / "track")
     write_rows(rows, output / "localisation.csv")

@@ -9,10 +9,10 @@ import typer
 
 from cns_drake.base import shared_options, terminal
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.protocol_options import with_protocol
+from evaluation.recognition.protocol_options import with_protocols
 
 
-@with_protocol
+@with_protocols("fair")
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option()],
@@ -23,45 +23,47 @@ def report(
     jobs: shared_options.Jobs = None,
     scheduler: shared_options.Scheduler = None,
     costs: shared_options.Costs = True,
-    tables: shared_options.Tables = False,
     *,
-    protocol: RetrievalProtocol,
+    protocols: dict[str, RetrievalProtocol],
 ) -> None:
-    """Evaluate all recordings in a folder and write a report.
+    """Evaluate all recordings in a folder.
 
     The command measures place recognition and structural change between the
-    drives of each map. It writes report.html, figures, and the tables
-    results.csv and queries.csv, which have the same columns as the tables of
-    cns-drake study. To resume after an interruption, run the same command
-    again.
+    drives of each map, as the experiment stages of cns-drake study. It writes
+    the page index.html, the tables results.csv and queries.csv, and pictures.
+    To resume after an interruption, run the same command again.
 
     Args:
         recordings: Folder that contains the recordings.
-        output: Folder for the report; created if it does not exist.
+        output: Folder for the results; created if it does not exist.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.command_line.suggestions import (
         name_tables,
         suggest_comparison,
     )
-    from evaluation.paper import reference_for
-    from evaluation.study.report_jobs import stages_report
+    from evaluation.study.chosen_methods import choose_methods
+    from evaluation.study.recorded_study import study_recordings
+    from evaluation.study.recordings.recording_search import find_recordings
 
     cluster = choose_cluster(jobs, scheduler)
-    path = stages_report.report_on_recordings(
-        recordings,
+    chosen = choose_methods(method or (), parameter or ())
+    found = find_recordings(recordings, terminal.note, lidar, columns)
+    for choice in chosen:
+        made = choice.make()
+        for note in {made.assumption(one.lidar_field) for one in found}:
+            if note is not None:
+                terminal.note(note)
+    page = study_recordings(
+        found,
         output,
         cluster,
-        method or (),
-        protocol,
-        on_note=terminal.note,
-        settings=parameter or (),
+        chosen,
+        protocols,
+        source=str(recordings),
         with_costs=costs,
-        reference_for=reference_for,
-        lidar=lidar,
-        columns=columns,
-        with_tables=tables,
+        on_note=terminal.note,
     )
-    print(path)
-    name_tables(path.parent)
-    suggest_comparison(path.parent)
+    print(page)
+    name_tables(page.parent)
+    suggest_comparison(page.parent)

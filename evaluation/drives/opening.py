@@ -91,4 +91,3 @@ def find_readers(path: Path) -> list[Any]:
         (cns_folder.holds_cns, cns_folder.CnsFolderDrive),
     )
     return [reader for holds, reader in readers if holds(path)]
-

@@ -1,11 +1,6 @@
-"""The paper "The City that Never Settles", as reference for the cities.
+"""The paper "The City that Never Settles", beside which results are shown.
 
 `paper_values` contains the paper's numbers. `findings` and `aims` compare the
-shipped cities with them, `best_methods` says which methods are best. Commands
-pass their maps to `reference_for`; no other part of the evaluation needs this
-package.
+shipped cities with them, `best_methods` says which methods are best, and
+`section` makes the section of a study's page.
 """
-
-from evaluation.paper.paper_reference import reference_for
-
-__all__ = ["reference_for"]

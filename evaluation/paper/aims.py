@@ -5,21 +5,19 @@ were not fitted, but had been seen before later versions of the cities were
 frozen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.paper.best_methods import (
     RING,
     best_methods,
     best_with_all_queries,
     listed_counts,
 )
-from evaluation.paper.paper_values import paper
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.reference import Finding
-from evaluation.results.table_forms import title
+from evaluation.paper.findings import Finding
+from evaluation.paper.paper_values import Measured, StagePair, paper
+from evaluation.results.method_names import title
 
 # Verdicts on a target.
 MET = "is met"
@@ -39,7 +37,7 @@ _MEAN_DIFFERENCE = 0.15
 
 
 def aims(
-    results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
+    results: Sequence[Measured], changes: Mapping[StagePair, float]
 ) -> list[Finding]:
     """Returns, for each target of the shipped cities, whether it is met.
 
@@ -50,16 +48,16 @@ def aims(
     As the paper seems to do, RING++ is scored on the queries with a match, and
     all other methods on all queries.
     """
-    differences = _auc_differences(results)
-    if differences.keys() != {key[:4] for key in paper().recognitions}:
+    known = [one for one in results if paper().is_comparable(one)]
+    differences = _auc_differences(known)
+    if differences.keys() != paper().recognitions.keys():
         return []
     pairs = list(dict.fromkeys(key[:3] for key in differences))
     tcr = [
         abs(value - paper().changes[pair])
-        for pair, value in symmetric_changes(changes).items()
+        for pair, value in changes.items()
         if pair in paper().changes
     ]
-    known = [r for r in results if paper().covers(r)]
     best = best_methods(known)
     found = [
         _aim_by_pairs(
@@ -105,7 +103,7 @@ def aims(
 
 
 def _auc_differences(
-    results: Sequence[PlaceOutcome],
+    results: Sequence[Measured],
 ) -> dict[tuple[str, str, str, str], float]:
     """Returns our AUC minus the AUC in the paper.
 
@@ -113,11 +111,10 @@ def _auc_differences(
     """
     found = {}
     for result in results:
-        mode = paper().mode(result.method)
-        theirs = paper().values(result, mode)
+        theirs = paper().printed(result)
         if theirs is not None:
             key = (*result.pair, result.method)
-            found[key] = result.by_mode[mode].auc - theirs.auc
+            found[key] = paper().counted(result).auc - theirs.auc
     return found
 
 

@@ -4,17 +4,15 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 import itertools
 
-from evaluation.paper.paper_values import paper
+from evaluation.paper.paper_values import Measured, StagePair, paper
 from evaluation.recognition.metrics import Mode
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.tables.recognition import recognition_table
-from evaluation.results.table_forms import Cell, title
+from evaluation.results.method_names import in_table_order, title
 
 RING = title("ring++")
 
 
 def best_with_all_queries(
-    results: Sequence[PlaceOutcome],
+    results: Sequence[Measured],
     words: str = "If all queries count for every method",
 ) -> str:
     """Returns a sentence on which methods are best if all queries count.
@@ -30,26 +28,27 @@ def best_with_all_queries(
 
 
 def best_methods(
-    results: Sequence[PlaceOutcome], mode: Mode | None = None
+    results: Sequence[Measured], mode: Mode | None = None
 ) -> list[list[str]]:
     """Returns the methods with the greatest AUC on each pair.
 
     Table II of the paper prints these methods in bold. A pair has several best
-    methods if their AUCs are equal as printed. By default, each method is
-    scored in the mode that the paper used for it.
+    methods if their AUCs are equal as printed, with four decimals. A method
+    that is alone on a pair is not the best. By default, each method is scored
+    in the mode that the paper used for it.
     """
-    table = recognition_table(results, (), mode, paper())
-    methods = [name for name, _ in table.groups[1:]]
-    step = table.groups[1][1]  # AUC is the first of a method's columns.
+    of_pair: dict[StagePair, dict[str, float]] = {}
+    for one in results:
+        numbers = paper().counted(one) if mode is None else one.by_mode[mode]
+        shown = of_pair.setdefault(one.pair, {})
+        shown[one.method] = round(numbers.auc, 4)
     return [
         [
-            method
-            for method, cell in zip(
-                methods, row[-step * len(methods) :: step], strict=True
-            )
-            if isinstance(cell, Cell) and cell.rank == 1
+            title(name)
+            for name in in_table_order(shown)
+            if len(shown) > 1 and shown[name] == max(shown.values())
         ]
-        for row in table.rows
+        for shown in of_pair.values()
     ]
 
 

@@ -1,23 +1,20 @@
-"""The paper's findings, and whether the results of a report confirm them."""
+"""The paper's findings, and whether the results of a study confirm them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.change.drive_change import ChangeResult, symmetric_changes
 from evaluation.paper.best_methods import (
     RING,
     best_methods,
     best_with_all_queries,
     listed_counts,
 )
-from evaluation.paper.paper_values import KAIST, paper
-from evaluation.recognition.place_outcome import PlaceOutcome
-from evaluation.report.reference import Finding
+from evaluation.paper.paper_values import KAIST, Measured, StagePair, paper
 from evaluation.results.headlines import listed
+from evaluation.results.method_names import in_table_order, title
 from evaluation.results.summaries import LEAST_POINTS
-from evaluation.results.table_forms import in_table_order, title
 
 _SIGNIFICANCE = 0.05
 # Verdicts on a finding.
@@ -27,6 +24,23 @@ FAILS = "does not hold"
 UNDECIDED = "cannot be judged"
 FITTED = "was fitted"
 _BOTH = "Tables I and II"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim of the paper, and whether the numbers of a study confirm it.
+
+    Attributes:
+        claim: the claim in words.
+        verdict: whether the claim is confirmed, in a word or two.
+        evidence: the numbers behind the verdict, in words.
+        table: table or figure of the paper that makes the claim; may be empty.
+    """
+
+    claim: str
+    verdict: str
+    evidence: str
+    table: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,27 +69,35 @@ class Trend:
 
 
 def findings(
-    results: Sequence[PlaceOutcome], changes: Sequence[ChangeResult]
+    results: Sequence[Measured], changes: Mapping[StagePair, float]
 ) -> list[Finding]:
     """Returns a verdict on each of the paper's findings that can be tested.
 
     A finding can be tested if `results` and `changes` contain the data on this
     finding. Only results on the paper's maps, with the paper's methods and
-    protocol, count. If a method has several results on a pair, the first result
-    counts, as in the report's tables.
+    protocol, count. For the other tables of a page, the first result of a
+    method on a pair counts.
+
+    Args:
+        results: results of place recognition by all protocols.
+        changes: (map, stage, other stage) -> TCR_sym; each pair of stages is
+            contained in both orders.
     """
     shown = {
         (*r.pair, r.method): r
         for r in reversed(results)
-        if r.pair[0] in paper().city_names and r.method in paper().protocols
+        if r.pair[0] in paper().city_names and r.method in paper().modes
     }
-    results = [r for r in results if paper().covers(r)]
-    changes = [c for c in changes if c.map_name in paper().city_names]
-    tcr = symmetric_changes(changes)
+    results = [r for r in results if paper().is_comparable(r)]
+    tcr = {
+        pair: value
+        for pair, value in changes.items()
+        if pair[0] in paper().city_names
+    }
     methods = in_table_order(result.method for result in results)
     found = []
-    if changes:
-        found.append(_larger_than_real(changes))
+    if tcr:
+        found.append(_larger_than_real(tcr))
     if "ring++" in methods and len(methods) > 1:
         found.append(_ring_is_best(results, [*shown.values()][::-1]))
     known = [r for r in results if not np.isnan(tcr.get(r.pair, np.nan))]
@@ -127,8 +149,8 @@ def paper_trend(method: str) -> Trend:
 
 
 def _trends(
-    results: Sequence[PlaceOutcome],
-    tcr: Mapping[tuple[str, str, str], float],
+    results: Sequence[Measured],
+    tcr: Mapping[StagePair, float],
     methods: Sequence[str],
 ) -> dict[str, Trend]:
     """Returns the trend of each method (mode all) that has enough pairs."""
@@ -144,11 +166,12 @@ def _trends(
     return trends
 
 
-def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
+def _larger_than_real(changes: Mapping[StagePair, float]) -> Finding:
     real = paper().changes[KAIST]
     ours = _first_to_last(
-        (change.map_name, change.stages[0], change.report.change.symmetric)
-        for change in changes
+        (name, first, value)
+        for (name, first, last), value in changes.items()
+        if first < last
     )
     theirs = _first_to_last(
         (name, first, value)
@@ -192,7 +215,7 @@ def _first_to_last(
 
 
 def _ring_is_best(
-    results: Sequence[PlaceOutcome], shown: Sequence[PlaceOutcome]
+    results: Sequence[Measured], shown: Sequence[Measured]
 ) -> Finding:
     best = best_methods(results)
     evidence = (
@@ -200,7 +223,7 @@ def _ring_is_best(
         f" method with the greatest AUC on {len(best)} pairs is"
         f" {listed_counts(best)}. {best_with_all_queries(results)}"
     )
-    asked = shown[0].protocol_name
+    asked = shown[0].protocol
     if asked != "paper":
         words = f"With the protocol {asked}, as in the other tables"
         evidence += f" {best_with_all_queries(shown, words)}"
@@ -223,20 +246,15 @@ def _falls(trends: Mapping[str, Trend], too_few: str) -> Finding:
     falls = [trend.falls for name, trend in trends.items() if name != "btc"]
     if not falls:
         return Finding(claim, UNDECIDED, too_few)
-    known = {method for *_, method, _ in paper().recognitions}
     parts = []
     for method, ours in trends.items():
-        text = (
+        theirs = paper_trend(method)
+        parts.append(
             f"{title(method)} {ours.rho:+.2f} (p = {ours.p_value:.2f},"
-            f" {ours.slope:+.3f} AUC for 0.1)"
+            f" {ours.slope:+.3f} AUC for 0.1), in the paper's table"
+            f" {theirs.rho:+.2f} (p = {theirs.p_value:.2f},"
+            f" {theirs.slope:+.3f})"
         )
-        if method in known:
-            theirs = paper_trend(method)
-            text += (
-                f", in the paper's table {theirs.rho:+.2f}"
-                f" (p = {theirs.p_value:.2f}, {theirs.slope:+.3f})"
-            )
-        parts.append(text)
     evidence = (
         "Rank correlation of AUC (mode all) with TCR_sym over"
         f" {next(iter(trends.values())).num_pairs} pairs: {'; '.join(parts)}."

@@ -10,5 +10,5 @@
 - Metrics: `query_outcomes`, `precision_recall`, `metrics`, `auroc`,
   `bootstrap`, `significance`, `costs`.
 - Results: `place_outcome`, `place_numbers`, `result_number`, and why places are
-  wrong: `faults`, `fault_kinds`, `visible_change`.
+  wrong: `faults`, `visible_change`.
 """

@@ -1,7 +1,4 @@
-"""Reasons for wrong top-ranked places that follow from distances alone.
-
-`evaluation.recognition.fault_names` finds further reasons, from scans.
-"""
+"""Reasons for wrong top-ranked places, which follow from distances."""
 
 from __future__ import annotations
 

@@ -85,8 +85,6 @@ class PlaceOutcome:
             match.
         nearest: (Q,) distance of each query to the nearest place that is
             allowed as an answer [m]; infinite if there is none.
-        pair: names of the map and of the stages of database and query, if the
-            outcome is for a report.
     """
 
     method: str
@@ -101,7 +99,6 @@ class PlaceOutcome:
     best_scores: np.ndarray
     matches: np.ndarray
     nearest: np.ndarray
-    pair: tuple[str, str, str] = ("", "", "")
 
     @classmethod
     def of(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -380,30 +380,3 @@ PROTOCOLS = {
 }
 PROTOCOL_NAMES = (*PROTOCOLS, "own")
 _QUERY_FIELDS = (*_QUERY_CHANGES, "seed")
-
-
-def check_one_protocol(protocols: Iterable[RetrievalProtocol]) -> None:
-    """Checks that all protocols are equal, apart from each method's choices.
-
-    Raises:
-        InputError: the protocols differ.
-    """
-    first = None
-    for protocol in protocols:
-        # Each method sets its scans per place.
-        shared = replace(protocol, scans_per_place=None, place="middle")
-        first = first or shared
-        if shared.digest() != first.digest():
-            raise InputError(
-                f"protocol: {first.to_text()} and {shared.to_text()} in one"
-                " table"
-            )
-
-
-# Columns of a table of results: options of the protocol. Tables contain no
-# matches by overlap; a column `protocol` covers the other options.
-PROTOCOL_COLUMNS = tuple(
-    field.name
-    for field in fields(RetrievalProtocol)
-    if field.name not in ("overlap", "place", *_QUERY_CHANGES, "seed")
-)

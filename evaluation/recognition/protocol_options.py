@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 import functools
 import inspect
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
+import click
 import typer
 
 from evaluation.recognition.protocol import (
@@ -17,21 +18,29 @@ from evaluation.recognition.protocol import (
 # Parameter name -> its type, annotated with the option, and its default.
 _Options = Mapping[str, tuple[Any, Any]]
 
+_Name = Literal["fair", "paper", "recorded"]
+_WHAT = (
+    "Protocol, which says how the scans of the query drive become queries. "
+    "fair rotates each scan by a random yaw and tilt, so that no method "
+    "profits from equal headings. paper follows the CNS paper. recorded leaves "
+    "the scans unchanged."
+)
 _NAMED: _Options = {
     "named_protocol": (
-        Annotated[
-            Literal["fair", "paper", "recorded"],
-            typer.Option(
-                "--protocol",
-                help="Protocol, which says how the scans of the query drive "
-                "become queries. fair rotates each scan by a random yaw and "
-                "tilt, so that no method profits from equal headings. paper "
-                "follows the CNS paper. recorded leaves the scans unchanged.",
-            ),
-        ],
+        Annotated[_Name, typer.Option("--protocol", help=_WHAT)],
         "fair",
     )
 }
+_SeveralNames = Annotated[
+    list[str],
+    typer.Option(
+        "--protocol",
+        # Typer knows no list of literals.
+        click_type=click.Choice(get_args(_Name)),
+        help=f"{_WHAT} May be repeated to measure by several protocols. The "
+        "page compares results by the protocol paper with the paper's tables.",
+    ),
+]
 _FIELDS: _Options = {
     name: (Annotated[kind, typer.Option(help=text, metavar=metavar)], default)
     for name, kind, default, text, metavar in (
@@ -164,3 +173,27 @@ def _named(named_protocol: str, **fields: Any) -> RetrievalProtocol:
 with_protocol = _with_options(
     "protocol", {**_NAMED, **_FIELDS, **_GATE}, _named
 )
+
+
+def with_protocols(
+    *default: str,
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator like `with_protocol`, for a study.
+
+    The command gets a mapping from name to protocol in place of its keyword
+    `protocols`; the first protocol is the main one. Geometric verification is
+    no option, because a study measures with and without it.
+
+    Args:
+        default: names of the default protocols.
+    """
+
+    def all_named(
+        named_protocols: list[str], **fields: Any
+    ) -> dict[str, RetrievalProtocol]:
+        return {
+            name: replace(PROTOCOLS[name], **fields) for name in named_protocols
+        }
+
+    names: _Options = {"named_protocols": (_SeveralNames, list(default))}
+    return _with_options("protocols", {**names, **_FIELDS}, all_named)

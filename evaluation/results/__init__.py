@@ -6,7 +6,7 @@
   `compared_answers` compares methods by their answers, `headlines` says in
   words which methods differ and survive, and `ranges` contains the possible
   values of each metric.
-- `charts`, `page` and `table_forms` show tables as charts, pages and text.
+- `charts` and `page` show tables as charts and pages.
 - `table_comparison` compares tables with one another, and with the shipped
   tables in `baselines`.
 """

@@ -16,9 +16,7 @@ import numpy as np
 from cns_drake.base.complete_files import completing
 from evaluation.results.ranges import check_all
 
-# The formats of figures, first those for print. Figures of lines stay lines in
-# PDF, and on the page in SVG.
-LINES = ("pdf", "png", "svg")
+# The formats of pictures, the one for the page last.
 PIXELS = ("png", "webp")
 # Resolution of pictures for print [dots per inch].
 _DPI = 200
@@ -28,9 +26,7 @@ _PAGE_DPI = 130
 _WEBP_QUALITY = 82
 
 
-def save_figure(
-    figure: Figure, stem: Path, kinds: Sequence[str] = LINES
-) -> None:
+def save_figure(figure: Figure, stem: Path, kinds: Sequence[str]) -> None:
     """Writes a figure as one file for each of several formats.
 
     Equal figures give equal bytes. SVG and WebP files are for web pages, and do

@@ -1,4 +1,4 @@
-"""Sentences on what a chart or a report shows, and on what it does not show.
+"""Sentences on what a chart shows, and on what it does not show.
 
 Two methods differ significantly if the difference of their AUC has a corrected
 p-value below 0.05, see `evaluation.recognition.significance`.
@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import math
 
 from evaluation.results.compared_answers import compared_answers
-from evaluation.results.ranking import LEAST_UNITS, Ranked, rank_methods
+from evaluation.results.method_names import title
+from evaluation.results.ranking import Ranked
 from evaluation.results.table import Answers, QueryRows, Row
-from evaluation.results.table_forms import title
 
 # Methods differ significantly if the p-value is below this value.
 SIGNIFICANT = 0.05
@@ -74,66 +74,16 @@ def by_significance(
     return apart, rest
 
 
-def survival_sentences(rows: Sequence[Row]) -> str:
-    """Returns the AUC that methods retain, and which methods survive.
+def survivors(ranked: Iterable[Ranked]) -> list[str]:
+    """Returns the labels of the methods that survive.
 
     A method survives if it retains at least 90 % of its AUC strict, by the
-    lower limit of the 95 % t interval of `rank_methods`. The interval's units
-    are cities. Fewer than four cities do not show whether a method survives.
-
-    Args:
-        rows: rows of the metric `kept_strict`, of changed conditions.
-
-    Returns:
-        One or two sentences; empty if no condition has results of all methods.
-    """
-    ranked, _ = rank_methods(rows)
-    if not ranked:
-        return ""
-    number = len({row.map for row in rows})
-    over = "mean over pairs"
-    decided = number >= LEAST_UNITS
-    if decided:
-        over += f", with a 95 % t interval over {number} cities"
-    shares = ", ".join(_share(mean, with_interval=decided) for mean in ranked)
-    text = (
-        "Retained AUC strict, relative to the AUC strict without change"
-        f" ({over}): {shares}."
-    )
-    least = f"{100.0 * SURVIVES:.0f} %"
-    if not decided:
-        return (
-            f"{text} Fewer than {LEAST_UNITS} cities do not show whether a"
-            f" method survives, that is, retains {least}."
-        )
-    found = survivors(ranked)
-    which = listed(map(title, found)) if found else "none"
-    return (
-        f"{text} Methods that survive, because the lower limit is at least"
-        f" {least}: {which}."
-    )
-
-
-def survivors(ranked: Iterable[Ranked]) -> list[str]:
-    """Returns the labels of the methods that survive, see `survival_sentences`.
+    lower limit of the 95 % interval.
 
     Args:
         ranked: the methods, with their means of `kept_strict`.
     """
     return [mean.method for mean in ranked if mean.interval.low >= SURVIVES]
-
-
-def _share(mean: Ranked, *, with_interval: bool) -> str:
-    """Returns a method with its mean share of AUC, as text."""
-    text = f"{title(mean.method)} {_percent(mean.value)}"
-    if not with_interval:
-        return text
-    low, high = _percent(mean.interval.low), _percent(mean.interval.high)
-    return f"{text} ({low} to {high})"
-
-
-def _percent(value: float) -> str:
-    return f"{100.0 * value:.0f} %"
 
 
 def lead_by_auc(rows: Sequence[Row], queries: QueryRows | None) -> str:

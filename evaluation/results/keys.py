@@ -34,6 +34,8 @@ STAGE = "both.stage"
 OWN = "own"
 # Its value if both drives are in the stage of the query.
 LAST = "last"
+# Factor: name of the protocol, if an experiment has several.
+PROTOCOL_BASE = "protocol.base"
 # The factor of the frozen redraws of the shipped maps.
 FROZEN_REDRAW = "both.redraw.frozen"
 # The factors of an experiment with cases: the name of the case, and its level.

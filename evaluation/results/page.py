@@ -20,13 +20,24 @@ from evaluation.results.charts.kinds import DrawnChart, draw_chart
 from evaluation.results.charts.markers import marker_corners
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_files import save_figure
-from evaluation.results.keys import CAUSE, KEYS, LEVEL, SETTINGS
-from evaluation.results.page_frame import PageSection, environment, framed_page
+from evaluation.results.keys import (
+    CAUSE,
+    KEYS,
+    LEVEL,
+    PROTOCOL_BASE,
+    SETTINGS,
+)
+from evaluation.results.method_names import in_table_order
+from evaluation.results.method_names import title as title_of
+from evaluation.results.page_frame import (
+    PageSection,
+    framed_page,
+    page_section,
+    value_text,
+)
 from evaluation.results.ranges import check_all
 from evaluation.results.summaries import Summary, means, summarised
 from evaluation.results.table import COSTS, QueryRows, Results
-from evaluation.results.table_forms import in_table_order
-from evaluation.results.table_forms import title as title_of
 
 _TASKS = {
     "place": "Place recognition",
@@ -37,7 +48,6 @@ _TASKS = {
     "cost": "Costs",
 }
 _SUMMARIES = "summaries.csv"
-_TEMPLATES = "page_template"
 # Task -> the metrics of its summary, the headline first.
 _HEADLINES = {
     "place": ("auc", "auc_strict", "r1", "kept", "kept_strict"),
@@ -63,6 +73,7 @@ def write_page(
     charts: Sequence[Mapping[str, Any]] = (),
     experiment_text: str = "",
     notes: Iterable[str] = (),
+    sections: Iterable[PageSection] = (),
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Writes an experiment's page, `index.html`, which needs no other file.
@@ -81,9 +92,12 @@ def write_page(
         about: the question, in words.
         charts: descriptions of the charts, see `evaluation.results.charts`. The
             message of the first chart is the headline. A chart without data in
-            the table is left out, with a note.
+            the table is left out, with a note. If the experiment has several
+            protocols, a chart shows the first, unless it names the factor
+            `protocol.base`.
         experiment_text: the experiment as YAML.
         notes: further sentences for the page, such as on settings.
+        sections: further sections, such as those of recordings.
         on_note: is called with a note on each chart that is left out.
 
     Returns:
@@ -96,7 +110,7 @@ def write_page(
     shown, missing = _drawn_charts(results, queries, folder, charts)
     for note in missing:
         on_note(note)
-    numbers = summarised(results, queries, charts)
+    numbers = summarised(*_charted(results, queries, {}), charts)
     if numbers:
         for number in numbers:
             check_all(number.what, (number.value, number.low, number.high))
@@ -107,7 +121,11 @@ def write_page(
         title,
         str(shown[0]["message"]) if shown else title,
         Markup("<p><strong>{}</strong>{}</p>").format(title, about),
-        _sections(results, queries, shown, numbers, experiment_text),
+        [
+            *_first_sections(results, shown),
+            *sections,
+            *_last_sections(results, queries, numbers, experiment_text),
+        ],
         made_by=[f"cns-drake {__version__}", f"protocol: {protocols}"],
         notes=[*notes, *missing],
     )
@@ -133,13 +151,19 @@ def _drawn_charts(
     """
     drawn, missing = [], []
     for number, chart in enumerate(charts, start=1):
+        rows, answers = _charted(results, queries, chart)
         try:
-            alone = draw_chart(chart, results, alone=True, queries=queries)
+            alone = draw_chart(chart, rows, alone=True, queries=answers)
             save_figure(
                 alone.figure, folder / f"chart_{number}", ("pdf", "png")
             )
+            # The message is known; only curves are drawn from answers.
+            needed = answers if chart["kind"] == "curves" else None
             svgs = {
-                name: _svg(draw_chart(chart, results, width), f"{name}{number}")
+                name: _svg(
+                    draw_chart(chart, rows, width, queries=needed),
+                    f"{name}{number}",
+                )
                 for name, width in (("wide", WIDE), ("narrow", NARROW))
             }
         except InputError as error:
@@ -150,63 +174,72 @@ def _drawn_charts(
     return drawn, missing
 
 
-def _sections(
-    results: Results,
-    queries: QueryRows | None,
-    charts: Sequence[Mapping[str, Any]],
-    numbers: Sequence[Summary],
-    experiment_text: str,
-) -> list[PageSection]:
-    """Returns the sections of the page, without those that would be empty.
+def _charted(
+    results: Results, queries: QueryRows | None, chart: Mapping[str, Any]
+) -> tuple[Results, QueryRows | None]:
+    """Returns the rows and answers from which a chart is drawn.
 
-    Args:
-        results: the table of results.
-        queries: the table of queries; None if there is none.
-        charts: the charts as `_drawn_charts` returns them.
-        numbers: the numbers behind the charts.
-        experiment_text: the experiment as YAML.
+    Numbers by two protocols have no common mean.
     """
-    templates = environment(
-        __package__,
-        _TEMPLATES,
-        {"shown": _value_text, "corners": marker_corners},
-    )
+    protocols = results.distinct(PROTOCOL_BASE)
+    if len(protocols) < 2 or PROTOCOL_BASE in {*chart, *_names(chart)}:
+        return results, queries
+    first = protocols[0]
+    if queries is not None:
+        answers = queries.answers
+        queries = QueryRows.of(a for a in answers if a[PROTOCOL_BASE] == first)
+    return results.where({PROTOCOL_BASE: first}), queries
 
-    def section(
-        name: str, word: str, *, is_open: bool = False, **values: object
-    ) -> PageSection:
-        body = templates.get_template(f"{name}.html").render(values)
-        return PageSection(name, word, Markup(body), is_open)
 
+def _names(chart: Mapping[str, Any]) -> set[str]:
+    return {value for value in chart.values() if isinstance(value, str)}
+
+
+def _first_sections(
+    results: Results, charts: Sequence[Mapping[str, Any]]
+) -> list[PageSection]:
+    """Returns the charts, and the main results of each task."""
     sections = []
     if charts:
         sections.append(
-            section(
+            page_section(
                 "charts",
                 "Charts",
                 is_open=True,
                 charts=charts,
                 wide=WIDE,
                 dashes=_DASHES,
+                corners=marker_corners,
             )
         )
     summary = [_summary(results, task) for task in results.distinct("task")]
-    sections.append(section("means", "Results", is_open=True, summary=summary))
+    return [
+        *sections,
+        page_section("means", "Results", is_open=True, summary=summary),
+    ]
+
+
+def _last_sections(
+    results: Results,
+    queries: QueryRows | None,
+    numbers: Sequence[Summary],
+    experiment_text: str,
+) -> list[PageSection]:
+    """Returns the numbers behind the charts, all results, and the files."""
+    sections = []
     if numbers:
-        sections.append(section("summaries", "Summaries", numbers=numbers))
-    sections.append(
-        section("conditions", "Conditions", table=_wide_table(results))
-    )
+        sections.append(page_section("summaries", "Summaries", numbers=numbers))
     answers = queries.answers if queries else ()
-    sections.append(
-        section(
+    return [
+        *sections,
+        page_section("conditions", "Conditions", table=_wide_table(results)),
+        page_section(
             "made_by",
             "Files",
             experiment_text=experiment_text,
             queries=sum(len(answer.columns["correct"]) for answer in answers),
-        )
-    )
-    return sections
+        ),
+    ]
 
 
 def _svg(drawn: DrawnChart, prefix: str) -> Markup:
@@ -315,9 +348,9 @@ def _wide_table(results: Results) -> dict[str, Any]:
         for column in zip(*cells, strict=True)
     ]
     columns = [
-        [f"{v:.0f}" if _is_finite(v) else _value_text(v) for v in column]
+        [f"{v:.0f}" if _is_finite(v) else value_text(v) for v in column]
         if _are_counts(column)
-        else [_value_text(v) for v in column]
+        else [value_text(v) for v in column]
         for column in zip(*cells, strict=True)
     ]
     return {
@@ -337,18 +370,3 @@ def _are_counts(values: Iterable[object]) -> bool:
 
 def _is_finite(value: object) -> bool:
     return isinstance(value, float) and math.isfinite(value)
-
-
-def _value_text(value: object) -> str:
-    """Returns a value as text for a reader."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return ""
-    if value == math.inf:
-        return "more"
-    if isinstance(value, bool):
-        return str(int(value))
-    if isinstance(value, float) and 0.0 < abs(value) < 0.01:
-        return f"{value:.2g}"
-    if isinstance(value, float):
-        return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.0f}"
-    return str(value)

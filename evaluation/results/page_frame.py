@@ -1,18 +1,23 @@
-"""The frame of all pages: one style, sections that unfold, sortable tables.
+"""The frame of a study's page: one style, sections that unfold, sorted tables.
 
 A page needs neither a network nor other files.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+import functools
 from importlib import resources
 import json
+import math
 from typing import Any, NamedTuple
 
 import jinja2
 from markupsafe import Markup
 
-# Package and folder of the templates of all pages.
-_FRAME = ("evaluation.results", "page_template")
+from evaluation.results.method_names import title
+
+_FOLDER = "page_template"
+# The scripts of a section with data. A script uses only the scripts before it.
+_BROWSER = ("browser_state.js", "browser_pictures.js", "browser.js")
 
 
 class PageSection(NamedTuple):
@@ -24,83 +29,105 @@ class PageSection(NamedTuple):
         body: contents of the section as HTML.
         is_open: whether the section is shown from the start. Otherwise, the
             section unfolds when a reader clicks its name.
+        data: values for the scripts of the query browser; None for any other
+            section.
     """
 
     name: str
     word: str
     body: Markup
     is_open: bool = False
+    data: Mapping[str, Any] | None = None
+
+
+def page_section(
+    name: str,
+    word: str,
+    *,
+    is_open: bool = False,
+    data: Mapping[str, Any] | None = None,
+    **values: object,
+) -> PageSection:
+    """Returns a section whose template `<name>.html` is filled with values.
+
+    Values can be functions, which the template then calls.
+    """
+    return PageSection(
+        name, word, rendered(f"{name}.html", **values), is_open, data
+    )
 
 
 def framed_page(
-    title: str,
+    name: str,
     heading: str,
     intro: Markup,
-    sections: Iterable[PageSection],
+    sections: Sequence[PageSection],
     *,
     made_by: Iterable[str] = (),
     notes: Iterable[str] = (),
-    style: str = "",
-    scripts: Iterable[str] = (),
-    data: Mapping[str, Any] | None = None,
 ) -> str:
     """Returns a page as HTML.
 
     Args:
-        title: title of the window.
+        name: title of the window.
         heading: heading of the page.
         intro: paragraphs below the heading, as HTML.
-        sections: sections of the page, in order.
+        sections: sections of the page, in order. At most one has data.
         made_by: what made the page, for the end of the page.
         notes: sentences on how the page was made, for the end of the page.
-        style: further style sheet.
-        scripts: further scripts. A script uses only the scripts before it.
-        data: values for these scripts, as JSON in an element with the id
-            `data`.
     """
-    scripts = list(scripts)
+    data = next((one.data for one in sections if one.data is not None), None)
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    return (
-        environment(*_FRAME)
-        .get_template("frame.html")
-        .render(
-            title=title,
-            heading=heading,
-            intro=intro,
-            sections=list(sections),
-            made_by=list(made_by),
-            notes=list(notes),
-            style=Markup("\n").join([read_asset(*_FRAME, "frame.css"), style]),
-            script=Markup("\n").join(
-                [read_asset(*_FRAME, "tables.js"), *scripts]
-            ),
-            # JSON cannot end the script element around it.
-            data=Markup(text.replace("<", "\\u003c")) if scripts else None,
-        )
+    scripts = ["tables.js", *(_BROWSER if data is not None else ())]
+    return rendered(
+        "frame.html",
+        name=name,
+        heading=heading,
+        intro=intro,
+        sections=sections,
+        made_by=list(made_by),
+        notes=list(notes),
+        style=_asset("frame.css"),
+        script=Markup("\n").join(map(_asset, scripts)),
+        # JSON cannot end the script element around it.
+        data=None if data is None else Markup(text.replace("<", "\\u003c")),
     )
 
 
-def environment(
-    package: str,
-    folder: str,
-    filters: Mapping[str, Callable[..., Any]] | None = None,
-) -> jinja2.Environment:
-    """Returns the environment of the templates in a folder of a package.
+def rendered(name: str, /, **values: object) -> Markup:
+    """Returns a template filled with values; HTML and SVG escape their text."""
+    return Markup(_environment().get_template(name).render(values))
 
-    HTML and SVG escape their text.
-    """
+
+def value_text(value: object) -> str:
+    """Returns a value as text for a reader; templates call it `shown`."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if value == math.inf:
+        return "more"
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, float) and 0.0 < abs(value) < 0.01:
+        return f"{value:.2g}"
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.0f}"
+    return str(value)
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
     found = jinja2.Environment(
-        loader=jinja2.PackageLoader(package, folder),
+        loader=jinja2.PackageLoader(__package__, _FOLDER),
         autoescape=jinja2.select_autoescape(["html", "svg"]),
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    found.filters |= dict(filters or {})
+    found.globals |= {"shown": value_text, "title": title}
     return found
 
 
-def read_asset(package: str, folder: str, name: str) -> Markup:
-    """Returns the unchanged text of a style sheet or script in a package."""
-    path = resources.files(package) / folder / name
+def _asset(name: str) -> Markup:
+    """Returns the unchanged text of a style sheet or script."""
+    path = resources.files(__package__) / _FOLDER / name
     return Markup(path.read_text("utf-8"))

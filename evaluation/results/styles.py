@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from evaluation.results.table_forms import title
+from evaluation.results.method_names import title
 
 
 class MethodStyle(NamedTuple):

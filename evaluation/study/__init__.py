@@ -1,9 +1,9 @@
-"""Measures studies by jobs that write files, and reports on recordings.
+"""Measures studies by jobs that write files.
 
 A study measures pairs of drives by several tasks and methods: `engine.Engine`
 measures the pairs by the tasks in `tasks`, and writes `results.csv` and
-`queries.csv`. `report_jobs` adds the jobs of a report's page; the recordings,
-which `recordings` describes, need not exist yet. `cns_drake.base.jobs` runs
+`queries.csv`. `recorded_study` is the experiment `stages` on recordings, which
+need not exist yet; `recordings` finds them. `cns_drake.base.jobs` runs
 jobs, on one machine or many. No finished job runs again, because each file in
 `storage` names the inputs from which it was made. This module imports nothing,
 because the process of each job would have to wait for the imports.

@@ -14,7 +14,7 @@ from typing import Any
 from cns_drake.base.errors import InputError, did_you_mean
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.forecast import forecast
+from cns_drake.base.jobs.forecast import Space, forecast
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.progress import doing
 from evaluation.results.keys import made_by
@@ -109,8 +109,14 @@ class Engine:
         self.measured += comparisons
         return planned
 
-    def run(self, cluster: Cluster) -> tuple[Results, QueryRows]:
+    def run(
+        self, cluster: Cluster, space: Space | None = None
+    ) -> tuple[Results, QueryRows]:
         """Runs all jobs, writes both tables, and returns the tables.
+
+        Args:
+            cluster: runs the jobs.
+            space: space on the disk that the jobs need, if known.
 
         Raises:
             InputError: a step failed, or a file cannot be written.
@@ -120,7 +126,7 @@ class Engine:
         make_folder(self.output)
         jobs = list(self.jobs.values())
         renew_removed_descriptors(jobs)
-        told = forecast(jobs, cluster, least=_LONG)
+        told = forecast(jobs, cluster, space, least=_LONG)
         if told is not None:
             self.on_note(
                 f"{told}; after an interruption, run the same command again"

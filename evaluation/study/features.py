@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
+from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.points import xyz
 from evaluation.change.drive_maps import DriveMap
 from evaluation.drives import DriveNames
@@ -148,14 +149,13 @@ class ScannedFeatures(ExtractedFeatures):
 
 
 def described_key(method: str, protocol: RetrievalProtocol) -> str:
-    """Returns the key in `ExtractedFeatures.described` for a second protocol.
+    """Returns the key in `ExtractedFeatures.described` for a further protocol.
 
-    Descriptors by the study's own protocol have the key of the method. Use this
-    function for descriptors by any other protocol.
+    Descriptors by the study's main protocol have the key of the method. Use
+    this function for descriptors by any other protocol.
 
     Args:
         method: key of the method.
-        protocol: the second protocol, such as the protocol of published
-            results.
+        protocol: the further protocol.
     """
-    return f"{method},{protocol.name}"
+    return f"{method},{fingerprint(protocol.descriptor_options())[:6]}"

@@ -61,10 +61,9 @@ class PlaceComparison(NamedTuple):
         keep, leaves_out_itself: see `Pair`.
         truth: (Q, D) overlap of each query with each place, if the protocol
             says that matches are by overlap.
-        shows_overlaps: whether outcomes contain the share of each query's scan
-            that its best match shows.
-        overlaps: file with this share, the result of `shown_overlaps`; None to
-            compute it from the scans.
+        overlaps: file with the share of each query's scan that its best match
+            shows, the result of `shown_overlaps`; None to compute it from the
+            scans.
         leaves_out_slow: whether to leave out a method that would take more than
             an hour for all queries.
     """
@@ -80,7 +79,6 @@ class PlaceComparison(NamedTuple):
     keep: str | int = KEEP_ALL
     leaves_out_itself: bool = False
     truth: np.ndarray | None = None
-    shows_overlaps: bool = True
     overlaps: Part | None = None
     leaves_out_slow: bool = True
 
@@ -334,9 +332,7 @@ def _method_outcomes(
         matches = plain.matches
         if truth is None:
             matches = (plain.distances <= radius) & plain.is_known
-        overlaps = None
-        if compared.shows_overlaps:
-            overlaps = shown(radius, matches)
+        overlaps = shown(radius, matches)
         outcomes += [
             PlaceOutcome.of(
                 choice.key,

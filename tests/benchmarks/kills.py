@@ -27,7 +27,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 from helpers.small_map import scenario_values, write_small_map
 
 # These tell how long something took.
-_TIMED = ("costs.csv", "costs.md", "costs.tex", "report.html", "report.md")
+_TIMED = ("index.html",)
 
 
 def write_town(folder: Path) -> Path:

@@ -153,7 +153,7 @@ RECIPES = {
         makes=(
             "output/town_0[12]/metadata.yaml",
             "output/town_01_stage_02/metadata.yaml",
-            "output/report/report.html",
+            "output/report/index.html",
             "output/pages/town_01.html",
             "town.html",
         ),
@@ -950,7 +950,7 @@ RECIPES = {
     "own scans, report": Recipe(
         ".venv/bin/cns-eval report mine",
         after=("own scans and poses",),
-        prints=("my_report/report.html", "my_study/index.html"),
+        prints=("my_report/index.html", "my_study/index.html"),
         all_methods=True,
     ),
     "own data, layered overlap": Recipe(

@@ -1,142 +1,118 @@
-"""A small report for tests of pages: two drives, two methods."""
+"""A small page of recordings: two drives, two methods."""
 
-from dataclasses import replace
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
-from evaluation.recognition.costs import Cost
-from evaluation.recognition.fault_names import PairEvidence
-from evaluation.recognition.place_metrics import place_numbers, pose_numbers
+from evaluation.recognition.place_metrics import place_numbers
 from evaluation.recognition.place_outcome import PlaceOutcome, QueryDrive
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.result_number import Number
 from evaluation.recognition.retrieval import Retrieval
-from evaluation.report.contents import Report
-from evaluation.report.illustrations import Illustration
-from evaluation.report.map_figures import top_view
-from evaluation.report.page_data import make_page_drive
-from evaluation.report.reference import Finding, Judgement, Reference
-from evaluation.report.tables.queries import DriveTrack
-from evaluation.results.keys import LAST, OWN, STAGE, made_by
-from evaluation.results.table import Results, Row
+from evaluation.results.keys import OWN, STAGE, made_by
+from evaluation.results.page import write_page
+from evaluation.results.sections.browser import browser_section
+from evaluation.results.sections.change_pictures import (
+    ChangePictures,
+    change_section,
+)
+from evaluation.results.sections.routes import (
+    PageDrive,
+    make_page_drive,
+    routes_section,
+)
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 PLACES = 5.0 * np.arange(10)
 QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
 MAP = "metropolis"
 
 
-def _judge(results, changes):
-    return [
-        Judgement(heading, [finding])
-        for heading, finding in (
-            ("Claims", Finding("A < B & C.", "does not hold", "1 of 2.")),
-            ("Aims", Finding("C > D.", "is missed", "3 of 4.")),
+@dataclass
+class SmallPage:
+    """What a page shows.
+
+    Attributes:
+        outcomes: for each pair of drives, the outcome of each method.
+        drives: name of a drive -> its data.
+        pages: name of a drive -> address of its page.
+        stages: names of the two stages of the pictures of the change.
+    """
+
+    outcomes: list[list[PlaceOutcome]]
+    drives: dict[str, PageDrive]
+    pages: dict[str, str] = field(default_factory=dict)
+    stages: tuple[str, str] = ("01", "04")
+
+    def write(self, folder):
+        """Writes the page, and returns its path."""
+        results, queries = tables(self.outcomes)
+        pictures = ChangePictures(MAP, self.stages, folder)
+        for path in pictures.files:
+            path.write_bytes(b"a picture")
+        return write_page(
+            results,
+            queries,
+            folder,
+            title="stages",
+            sections=[
+                browser_section(self.outcomes, self.drives, self.pages),
+                routes_section({MAP: self.drives.values()}, self.pages),
+                change_section(results, [pictures]),
+            ],
         )
-    ]
 
 
-def make_content(folder, **changed):
-    """Returns the content of a page, and writes its figures to a folder."""
-    svg = (
-        '<svg xmlns="http://www.w3.org/2000/svg" width="900" height="300">'
-        "</svg>"
-    )
-    for name in ("pr", "change", "survival"):
-        (folder / f"{name}.svg").write_text(svg)
-    results = [
-        make_result("scan-context++", [0, 9, None, 6, 3]),
-        make_result("ring++", [1, 2, 4, 0, 3]),
-        make_result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
-    ]
-    nothing = np.full(5, np.nan)
-    # Scan Context++ takes a twin for the second query; no other query has a
-    # wrong candidate.
-    fits = {"scan-context++": np.array([np.nan, 0.9, *nothing[2:]])}
-    fits["ring++"] = nothing
-    evidence = {
-        (f"{MAP}_01", f"{MAP}_04"): PairEvidence(
-            nothing, nothing, nothing, [""] * 5, np.full(5, 0.5), fits
-        )
-    }
-    without_change = make_result("scan-context++", [0, 1, 4, 6, 3])
+def make_content(**changed):
+    """Returns the content of a page."""
     values = {
-        "reference": Reference(judge=_judge),
-        "evidence": evidence,
-        "costs": [Cost("ring++", 1, 2000.0, 1.5, 20.25, 10, 12345.0)],
-        "illustrations": [
-            Illustration(folder / "pr", 'curves "P" < R', "svg"),
-            Illustration(
-                folder / "change",
-                "before and after",
-                "svg",
-                section="change",
-                num_panels=2,
-                legend=(
-                    ((200, 0, 0), "gone < new"),
-                    ((0, 0, 0), "A meaning that is wider than a phone. " * 3),
-                ),
-            ),
-            Illustration(folder / "none", "not for the page", "svg", "print"),
-            Illustration(folder / "survival", "kept", "svg", "survival"),
+        "outcomes": [
+            [
+                make_result("scan-context++", [0, 9, None, 6, 3]),
+                make_result("ring++", [1, 2, 4, 0, 3]),
+            ],
+            [make_result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True)],
         ],
-        "recognitions": results,
-        "pairs": [
-            (results[0], without_change),
-            *((result, None) for result in results[1:]),
-        ],
-        "tracks": {
-            name: DriveTrack(np.arange(len(xs)), _poses(xs, 0.0, 0.0))
-            for name, xs in ((f"{MAP}_01", PLACES), (f"{MAP}_04", QUERIES))
-        },
         "drives": {
             "metropolis_01": _drive("metropolis_01", PLACES, 0, 0.0),
             "metropolis_04": _drive("metropolis_04", QUERIES, 2, 0.5 * np.pi),
         },
     }
-    values |= changed
-    return Report(**{"results": make_results(values["pairs"]), **values})
+    return SmallPage(**{**values, **changed})
 
 
-def make_results(pairs, evidence=MappingProxyType({})):
-    """Returns the table of pairs of results and of those of their controls."""
-    rows = []
-    for changed, unchanged in pairs:
-        known = evidence.get((changed.database, changed.query))
-        after = _outcome(changed, getattr(known, "overlaps", None))
-        before = _outcome(unchanged, getattr(known, "unchanged", None))
-        for stage, now in ((LAST, before), (OWN, after)):
-            if now is None:
-                continue
-            key = {
-                "experiment": "stages",
-                "map": changed.pair[0],
-                "database": changed.database,
-                "query": changed.query,
-                "seed": 1,
-                "factors": {STAGE: stage},
-                **made_by(PAPER_PROTOCOL),
-            }
-            rows += [
-                Row.of(number, **key, task=task)
-                for task, numbers in (
-                    ("place", place_numbers),
-                    ("pose", pose_numbers),
-                )
-                for number in numbers(now, before)
-            ]
-    return Results.of(rows)
-
-
-def _outcome(result, overlaps):
-    if result is None:
-        return None
-    if overlaps is None:
-        return result
-    shown = {"overlap": overlaps, "visible_change": 1.0 - overlaps}
-    return replace(result, columns={**result.columns, **shown})
+def tables(outcomes):
+    """Returns the tables of outcomes, and of a change between their drives."""
+    rows, answers = [], []
+    for one in (one for of_pair in outcomes for one in of_pair):
+        key = {
+            "experiment": "stages",
+            "map": MAP,
+            "database": one.database,
+            "query": one.query,
+            "seed": 1,
+            "factors": {STAGE: OWN},
+            **made_by(PAPER_PROTOCOL),
+        }
+        rows += [
+            Row.of(number, **key, task="place")
+            for number in place_numbers(one, None)
+        ]
+        change = Number("", False, "tcr_sym", 0.25, n=9)
+        rows.append(Row.of(change, **key, task="change"))
+        answers.append(
+            Answers(
+                **key,
+                task="place",
+                method=one.method,
+                gate=False,
+                columns=one.columns,
+            )
+        )
+    return Results.of(rows), QueryRows.of(answers)
 
 
 def _poses(xs, y, yaw):
@@ -153,8 +129,7 @@ def _drive(name, xs, y, yaw):
     wall = np.c_[np.full(200, 20.25), np.linspace(-9, 9, 200), np.ones(200)]
     scans = [thumbnail(wall, 1.6, i) for i in range(len(xs))]
     X_WS = _poses(xs, y, yaw)
-    view = top_view(ground, X_WS[:, :3, 3])
-    return make_page_drive(name, view, X_WS, range(len(xs)), scans)
+    return make_page_drive(name, ground, X_WS, range(len(xs)), scans)
 
 
 def make_result(method, best, back=False):
@@ -181,7 +156,7 @@ def make_result(method, best, back=False):
     stages = ("04", "01") if back else ("01", "04")
     database, query = (f"{MAP}_{stage}" for stage in stages)
     number = len(queries)
-    outcome = PlaceOutcome.of(
+    return PlaceOutcome.of(
         method,
         make_method(method, {}),
         PAPER_PROTOCOL,
@@ -189,4 +164,3 @@ def make_result(method, best, back=False):
         QueryDrive(query, np.arange(number), np.zeros((number, 3))),
         [database] * len(places),
     )
-    return replace(outcome, pair=(MAP, *stages))

@@ -8,15 +8,17 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 import numpy as np
+import pytest
 
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.pictures.stage_scene import StageScene
-from evaluation.paper import reference_for
 from evaluation.recognition.protocol import FAIR_PROTOCOL
+from evaluation.study import engine
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.recorded_study import study_recordings
 from evaluation.study.recordings.recording_search import find_recordings
-from evaluation.study.report_jobs.stages_report import StagesReport
 
 
 def do(jobs):
@@ -41,14 +43,49 @@ def run_here(patch, *modules):
         )
 
 
-def report(recordings, output, methods=None, protocol=FAIR_PROTOCOL):
-    """Returns the path of the report on a folder of recordings."""
-    found = find_recordings(recordings)
-    reference = reference_for({one.map_name for one in found})
+def report(recordings, output, methods=None, protocols=None, **more):
+    """Measures a folder of recordings; returns the path of the page."""
     chosen = choose_methods() if methods is None else tuple(methods)
-    study = StagesReport(found, output, chosen, protocol, reference=reference)
-    do(study.jobs())
-    return study.assemble(with_tables=True)
+    with pytest.MonkeyPatch.context() as patch:
+        run_here(patch, engine)
+        return study_recordings(
+            find_recordings(recordings),
+            output,
+            Cluster(),
+            chosen,
+            protocols or {"fair": FAIR_PROTOCOL},
+            source=str(recordings),
+            **more,
+        )
+
+
+def planned(recordings, output, methods=None, protocols=None, **more):
+    """Returns the jobs of the study of recordings that need not exist."""
+    jobs = []
+
+    class PlannedError(Exception):
+        """All jobs are known."""
+
+    def stop(found, cluster, unit=""):
+        jobs.extend(found)
+        raise PlannedError
+
+    chosen = choose_methods() if methods is None else tuple(methods)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engine, "run_jobs", stop)
+        patch.setattr(engine, "forecast", lambda *_, **__: None)
+        patch.setattr(engine, "make_folder", lambda path: None)
+        with pytest.raises(PlannedError):
+            study_recordings(
+                recordings,
+                output,
+                Cluster(),
+                chosen,
+                protocols or {"fair": FAIR_PROTOCOL},
+                source="recordings",
+                **more,
+            )
+    return jobs
 
 
 def leave_figures_unrendered(patch):
@@ -71,7 +108,7 @@ def leave_figures_unrendered(patch):
 
 
 def report_files(output):
-    """Returns name -> bytes of all files of a report."""
+    """Returns name -> bytes of all files of a study, except its parts."""
     return {
         path.relative_to(output).as_posix(): path.read_bytes()
         for path in sorted(output.rglob("*"))

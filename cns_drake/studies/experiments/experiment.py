@@ -55,8 +55,8 @@ def _settings_by_name(value: Any) -> Any:
 
 
 def _protocol_fields(value: Any) -> Any:
-    """Returns the name of a protocol as the field `base`."""
-    return {"base": value} if isinstance(value, str) else value
+    """Returns names of protocols as the field `base`."""
+    return {"base": value} if isinstance(value, str | list) else value
 
 
 def _case(value: Any) -> Case | tuple[str, ...]:
@@ -182,8 +182,10 @@ class Experiment(Section):
         seeds: seeds of all random numbers. Each condition is measured with each
             seed.
         protocol: protocol of place recognition: `fair`, `paper` or `recorded`;
-            or fields of a protocol of your own. The field `base` then names a
-            protocol, which provides the fields that you leave out.
+            a list of these names, to measure by several protocols; or fields of
+            a protocol of your own. The field `base` then names a protocol,
+            which provides the fields that you leave out. Each protocol has a
+            baseline of its own.
         baseline: values of the factors in the condition with which all other
             conditions are compared. By default the first value of each factor.
         frozen: table with a fingerprint of each level's drives. The table

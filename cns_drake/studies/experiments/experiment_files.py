@@ -14,13 +14,15 @@ from cns_drake.base.errors import (
 from cns_drake.base.yaml_files import parse_yaml, read_yaml
 from cns_drake.studies.experiments.experiment import Experiment, in_long_form
 from cns_drake.studies.experiments.nested_fields import Changes, merged, nested
+from evaluation.study.recordings import STAGES_FILE
 
 _FOLDER = Path(__file__).parent
 
 
 def shipped_experiments() -> dict[str, Path]:
-    """Returns name -> file of the experiments in this package."""
-    return {path.stem: path for path in sorted(_FOLDER.glob("*.yaml"))}
+    """Returns name -> file of the shipped experiments."""
+    files = [*_FOLDER.glob("*.yaml"), STAGES_FILE]
+    return {path.stem: path for path in sorted(files, key=lambda p: p.stem)}
 
 
 def load_experiment(

@@ -46,7 +46,7 @@ def protocol_from_fields(
     """
     values = dict(fields)
     base = values.pop("base", "fair")
-    if base not in PROTOCOLS:
+    if not isinstance(base, str) or base not in PROTOCOLS:
         raise InputError(
             f"{source}: {place}.base: {base!r} is none of"
             f" {', '.join(PROTOCOLS)}"

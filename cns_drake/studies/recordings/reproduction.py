@@ -1,15 +1,13 @@
-"""Records the drives of maps, evaluates them and writes a report."""
+"""Records the drives of maps, and measures the experiment `stages`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, natural_key
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.forecast import Space, forecast
-from cns_drake.base.jobs.running import run_jobs
-from cns_drake.base.progress import doing
+from cns_drake.base.jobs.forecast import Space
 from cns_drake.drives.drive_scenario import driven_way
 from cns_drake.scenarios import scenario_files
 from cns_drake.scenarios.scenario import Scenario
@@ -23,19 +21,18 @@ from cns_drake.studies.recordings.recording import (
     plan_recordings,
     usual_frames,
 )
-from evaluation.paper import reference_for
-from evaluation.recognition.protocol import FAIR_PROTOCOL, RetrievalProtocol
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.recorded_study import study_recordings
 from evaluation.study.recordings.map_drives import RecordingInfo
-from evaluation.study.report_jobs.stages_report import StagesReport
 
 # Mean size of a page.
 _PAGE_BYTES = 18e6
 # Mean size of a frame in a recording.
 _RECORDED_BYTES = 170e3
-# Mean size of a frame in the report's folder, in the end.
+# Mean size of a frame in the study's folder, in the end.
 _KEPT_BYTES = 18e3
-# Mean size of a frame in the report's folder while the report is made.
+# Mean size of a frame in the study's folder while it runs.
 _SPENT_BYTES = 50e3
 
 
@@ -43,25 +40,24 @@ def reproduce_maps(
     maps: Sequence[str] | None,
     output: Path,
     cluster: Cluster,
+    protocols: Mapping[str, RetrievalProtocol],
     *,
     with_pages: bool = True,
     with_recordings: bool = True,
-    protocol: RetrievalProtocol = FAIR_PROTOCOL,
     methods: Sequence[str] = (),
     settings: Sequence[str] = (),
     with_costs: bool = False,
-    with_tables: bool = False,
     on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
-    """Records the drives of maps, evaluates them and reports.
+    """Records the drives of maps, and measures the experiment `stages` on them.
 
     The recordings are in `<output>/<name>/`, and a web page of each drive is in
     `<output>/pages/<name>.html`. `<output>/pictures` shows the routes of each
     map from above, and a street in its first and last stage. `<output>/report`
-    contains the tables and figures. Finished work is not repeated. The function
-    returns the path of the report's page.
+    contains the tables and the page of the study. Finished work is not
+    repeated. The function returns the path of the study's page.
 
-    Without recordings, only the report is made. Drives that are not recorded
+    Without recordings, only the study is made. Drives that are not recorded
     yet are evaluated while they are simulated, at the same frames as a
     recording.
 
@@ -69,16 +65,16 @@ def reproduce_maps(
         maps: names or folders of maps; all shipped maps if None.
         output: folder for all results.
         cluster: runs the jobs.
+        protocols: name -> protocol of place recognition; the first is the main
+            one.
         with_pages: whether drives get web pages.
         with_recordings: whether drives are recorded.
-        protocol: protocol of place recognition.
         methods: names or Python files of methods; by default the standard
             methods.
         settings: settings of methods, each `METHOD.NAME=VALUE`.
         with_costs: whether times are measured.
-        with_tables: whether the report has wide tables, too.
-        on_note: is called with each note for the user. The first note says how
-            long the jobs take on this machine, and how much space they need.
+        on_note: is called with each note for the user, such as on how long the
+            jobs take on this machine, and how much space they need.
 
     Raises:
         InputError: a map is unknown, the folder cannot be made, or a step
@@ -100,34 +96,25 @@ def reproduce_maps(
             [*drives, *controls], output, pages=pages if with_pages else {}
         )
     make_folder(output)
-    study = StagesReport(
-        _recordings(
-            [*drives, *controls], output, with_recordings=with_recordings
-        ),
+    every = [*drives, *controls]
+    return study_recordings(
+        _recordings(every, output, with_recordings=with_recordings),
         output / "report",
+        cluster,
         chosen,
-        protocol,
-        with_costs,
-        reference_for(folder.name for folder in folders),
+        protocols,
+        source=", ".join(folder.name for folder in folders),
+        with_costs=with_costs,
+        further_jobs=[*jobs, *pictures],
+        space=_expected_space(
+            usual_frames(every),
+            len(drives) if with_pages and with_recordings else 0,
+            output,
+            with_recordings=with_recordings,
+        ),
+        pages={name: f"../pages/{page.name}" for name, page in pages.items()},
+        on_note=on_note,
     )
-    doing("planning the jobs")
-    planned = [*jobs, *study.jobs(), *pictures]
-    space = _expected_space(
-        usual_frames([*drives, *controls]),
-        len(drives) if with_pages and with_recordings else 0,
-        output,
-        with_recordings=with_recordings,
-    )
-    told = forecast(planned, cluster, space)
-    if told is not None:
-        on_note(told)
-    run_jobs(planned, cluster)
-    addresses = {
-        name: f"../pages/{page.name}"
-        for name, page in pages.items()
-        if page.is_file()
-    }
-    return study.assemble(addresses, on_note, with_tables=with_tables)
 
 
 def _recordings(

@@ -1,5 +1,7 @@
-"""Four kinds of charts, each described by a mapping in an experiment's file.
+"""Five kinds of charts, each described by a mapping in an experiment's file.
 
+- `curves`: precision over recall of each method, in a panel for each pair of
+  drives; it needs the answers to all queries.
 - `dumbbell` (`over`, `metric`): a metric at the first and the last value of a
   factor.
 - `lines` (`over`, `metric`): a metric over a numeric factor, with a band from

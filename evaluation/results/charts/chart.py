@@ -1,6 +1,6 @@
 """A chart: its description, the rows that it shows, and its panels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -48,7 +48,7 @@ class Chart:
 
     @property
     def metric(self) -> str:
-        return self.keys.get("metric", self.keys.get("y", ""))
+        return self.keys.get("metric", self.keys.get("y", "auc"))
 
     @property
     def panel_rows(self) -> dict[str, list[Row]]:
@@ -63,9 +63,10 @@ class Chart:
             found.setdefault(name, []).append(row)
         return found
 
-    def panels(self, height: float) -> tuple[Figure, list[Axes]]:
+    def panels(
+        self, height: float, titles: Collection[str]
+    ) -> tuple[Figure, list[Axes]]:
         """Returns a figure and its panels, which have a given height [px]."""
-        titles = self.panel_rows
         columns = 1 if self.width < WIDE else min(2, len(titles))
         lines = math.ceil(len(titles) / columns)
         figure = self.figure(lines * height)

@@ -22,8 +22,8 @@ from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
 from evaluation.results.keys import STAGE
+from evaluation.results.method_names import title
 from evaluation.results.summaries import means, median_kept
-from evaluation.results.table_forms import title
 
 # The sign of per cent never begins a line.
 _PERCENT = "{:.0f}\N{NO-BREAK SPACE}%"

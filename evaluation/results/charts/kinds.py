@@ -13,15 +13,16 @@ from matplotlib.lines import Line2D
 
 from cns_drake.base.errors import InputError
 from evaluation.results.charts.chart import FONT, PX, ROW, WIDE, Chart
+from evaluation.results.charts.curves import draw_curves
 from evaluation.results.charts.dumbbell import draw_dumbbell
 from evaluation.results.charts.lines import draw_lines
 from evaluation.results.charts.matrix import draw_matrix
 from evaluation.results.charts.scatter import draw_scatter
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.keys import SETTINGS
+from evaluation.results.method_names import in_table_order
 from evaluation.results.styles import MethodStyle, method_styles
 from evaluation.results.table import Answers, QueryRows, Results, Row
-from evaluation.results.table_forms import in_table_order
 
 _Measured = TypeVar("_Measured", Row, Answers)
 # Width for a name in a legend [px].
@@ -79,7 +80,7 @@ def draw_chart(
             Chart(keys, results, rows, styles, width, queries)
         )
         legend = {}
-        if kind in ("lines", "scatter"):
+        if kind in ("curves", "lines", "scatter"):
             legend = _legend(figure, styles)
         if alone:
             figure.suptitle(escape_dollars(textwrap.fill(message, width // 9)))
@@ -92,7 +93,7 @@ def _selected_rows(
 ) -> tuple[Row, ...]:
     """Returns the rows of a chart's metric that its description selects."""
     kind = chart["kind"]
-    metric = keys.get("metric", keys.get("y"))
+    metric = keys.get("metric", keys.get("y", "auc"))
     chosen = {n: v for n, v in chart.items() if n != "kind" and n not in keys}
     for name in (*chosen, *(keys[n] for n in keys if n in ("over", "strips"))):
         if not any(row[name] is not None for row in results.rows):
@@ -210,6 +211,7 @@ class _Kind(NamedTuple):
 
 
 _KINDS = {
+    "curves": _Kind(draw_curves, ()),
     "dumbbell": _Kind(draw_dumbbell, ("over", "metric")),
     "lines": _Kind(draw_lines, ("over", "metric")),
     "matrix": _Kind(draw_matrix, ("over", "metric"), ("strips",)),

@@ -19,9 +19,9 @@ from evaluation.results.charts.chart import (
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest
+from evaluation.results.method_names import title
 from evaluation.results.summaries import means
 from evaluation.results.table import COSTS, Row
-from evaluation.results.table_forms import title
 
 # Beyond this ratio of its values, an axis is logarithmic.
 _WIDE_RANGE = 50.0
@@ -30,7 +30,7 @@ _WIDE_RANGE = 50.0
 def draw_lines(chart: Chart) -> tuple[str, Figure]:
     """Returns the chart's message, and the chart."""
     over = chart.keys["over"]
-    figure, panels = chart.panels(280.0)
+    figure, panels = chart.panels(280.0, chart.panel_rows)
     last: dict[str, list[float]] = {}
     at = sorted({_checked_number(row, over) for row in chart.rows})
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):

@@ -14,10 +14,10 @@ import numpy as np
 from evaluation.results.charts.chart import FONT, ROW, Chart
 from evaluation.results.charts.words import in_words, value_words
 from evaluation.results.figure_text import escape_dollars
+from evaluation.results.method_names import title
 from evaluation.results.ranges import checked
 from evaluation.results.summaries import means
 from evaluation.results.table import Row
-from evaluation.results.table_forms import title
 
 # Least height of all that stands around the cells of a panel [px].
 _LEAST_AROUND = 220.0
@@ -60,7 +60,7 @@ def draw_matrix(chart: Chart) -> tuple[str, Figure]:
     longest = max(len(line) for name in below for line in name.split("\n"))
     # Names of methods and the caption stand below.
     around = max(_LEAST_AROUND, _CAPTIONS + _LETTER * longest)
-    figure, panels = chart.panels(around + len(values) * ROW)
+    figure, panels = chart.panels(around + len(values) * ROW, chart.panel_rows)
     weakest: list[tuple[float, str, str]] = []
     most_strips = 1
     for axes, rows in zip(panels, chart.panel_rows.values(), strict=True):

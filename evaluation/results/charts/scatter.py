@@ -11,6 +11,7 @@ from evaluation.results.charts.chart import Chart, start_at_zero
 from evaluation.results.charts.words import in_words
 from evaluation.results.figure_text import escape_dollars
 from evaluation.results.headlines import from_least_to_greatest, listed
+from evaluation.results.method_names import title
 from evaluation.results.smoothing import curves
 from evaluation.results.summaries import (
     LEAST_POINTS,
@@ -18,7 +19,6 @@ from evaluation.results.summaries import (
     paired_values,
 )
 from evaluation.results.table import Results, Row
-from evaluation.results.table_forms import title
 
 
 def draw_scatter(chart: Chart) -> tuple[str, Figure]:

@@ -18,6 +18,7 @@ _IN_WORDS = {
     "memory": "memory of the descriptors [bytes]",
     "success_03m_1deg": "success within 0.3 m and 1 deg",
     "success_2m_5deg": "success within 2 m and 5 deg",
+    "protocol.base": "protocol",
     "protocol.turn_queries": "random yaw",
 }
 # Values of the factor `both.stage`, in words.

@@ -1,4 +1,5 @@
-// Sections that unfold, and tables that a click on a heading sorts.
+// Sections that unfold, tables that a click on a heading sorts, and pictures
+// that the escape key makes small again.
 
 /** Unfolds the section to which a link leads. */
 function unfold(hash) {
@@ -32,12 +33,16 @@ function sortBy(heading) {
   for (const one of heading.parentElement.cells) one.ariaSort = null;
   heading.ariaSort = down ? "descending" : "ascending";
 }
-document.querySelectorAll(
-  ".table thead tr:last-child th, .board thead th, .sortable thead th")
-  .forEach((heading) => {
-    heading.tabIndex = 0;
-    heading.addEventListener("click", () => sortBy(heading));
-    heading.addEventListener("keydown", (event) => {
-      if (event.key === "Enter") sortBy(heading);
-    });
+document.querySelectorAll(".sortable thead th").forEach((heading) => {
+  heading.tabIndex = 0;
+  heading.addEventListener("click", () => sortBy(heading));
+  heading.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") sortBy(heading);
   });
+});
+
+document.addEventListener("keydown", (event) => {
+  if (event.key !== "Escape") return;
+  for (const box of document.querySelectorAll(".enlarge :checked"))
+    box.checked = false;
+});

@@ -91,23 +91,6 @@ class MapDrives:
         """The drive through the last stage."""
         return self.stages[max(self.stages, key=natural_key)]
 
-    def sessions(self, stage: str) -> tuple[RecordingInfo, ...]:
-        """Returns all drives through a stage, without controls.
-
-        A control goes through this stage on the route of another stage's drive.
-
-        Args:
-            stage: name of the stage.
-        """
-        elsewhere = [one for name, one in self.stages.items() if name != stage]
-        further = (
-            other
-            for other in self.others
-            if other.stage == stage
-            and not any(other.drives_like(one) for one in elsewhere)
-        )
-        return (self.stages[stage], *further)
-
     def change_pairs(self) -> list[Recordings]:
         """Returns the pairs of drives between which change is measured.
 

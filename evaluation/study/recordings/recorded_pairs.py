@@ -70,15 +70,15 @@ def recorded_pairs(
         yield from _composed_pairs(city, composed, seed)
     for pair in pairs if conditions else ():
         control = city.unchanged_pair(*pair)
+        is_wanted = any(one.stage != OWN for one in conditions)
+        if control is None and is_wanted and pair[0] is not pair[1]:
+            on_note(
+                f"{city.name}: no drive on the route of {pair[0].name} in"
+                f" the stage of {pair[1].name}"
+            )
         for condition in conditions:
             recordings = pair if condition.stage == OWN else control
             if recordings is None:
-                if pair[0] is pair[1]:
-                    continue
-                on_note(
-                    f"{city.name}: no drive on the route of {pair[0].name} in"
-                    f" the stage of {pair[1].name}"
-                )
                 continue
             database, query = (one.named for one in recordings)
             # Queries are scored once for all radii.

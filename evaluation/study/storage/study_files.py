@@ -1,15 +1,10 @@
 """Where the files of a study are in its folder."""
 
 from dataclasses import dataclass
-import hashlib
 from pathlib import Path
 
+from cns_drake.base.files import file_name
 from evaluation.study.storage.parts import Part
-
-# Some file systems allow 255; this leaves room for endings and joined names.
-_LONGEST_NAME_BYTES = 120
-# Number of characters at the beginning of a longer name that are kept.
-_KEPT_CHARACTERS = 20
 
 
 @dataclass(frozen=True)
@@ -97,27 +92,3 @@ class StudyFiles:
         """
         name = ",".join(map(file_name, names))
         return Part(self.output / "parts" / kind / f"{name}.data")
-
-
-def file_name(text: str) -> str:
-    """Turns a text into a file name that cannot lead to another folder.
-
-    Use this function for the names of the drive, map and stage in a recording
-    before these names become parts of paths. Usual names stay unchanged. In
-    unusual names, unsafe characters are replaced such that different names stay
-    different.
-    """
-    name = "".join(
-        c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)
-        for k, c in enumerate(text)
-    )
-    if not name or len(name.encode()) > _LONGEST_NAME_BYTES:
-        digest = hashlib.sha256(text.encode("utf-8", "surrogatepass"))
-        # An escaped character never has a tilde behind its percent sign.
-        name = f"{name[:_KEPT_CHARACTERS]}%~{digest.hexdigest()[:32]}"
-    return name
-
-
-def _escaped(character: str) -> str:
-    octets = character.encode("utf-8", "surrogatepass")
-    return "".join(f"%{octet:02X}" for octet in octets)

@@ -36,7 +36,8 @@ class ChangeTask(Task):
             jobs.mapped(drive, self.settings["spacing"], needs)
             for drive in (pair.way, pair.query)
         )
-        part = jobs.files.part("change", pair.key)
+        # The change does not depend on the protocol.
+        part = jobs.files.part("change", pair.way.name, pair.query.name)
         return (jobs.add(part, measure_change, maps, needs, 2.0),)
 
     def numbers(

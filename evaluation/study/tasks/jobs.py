@@ -43,13 +43,10 @@ class Jobs:
         radii: key of a pair -> radii of a match that are used for this pair
             [m].
         processes: number of processes that a task may use by itself.
-        shows_overlaps: whether results contain the share of each query's scan
-            that its best match shows. Computing this share takes time.
         leaves_out_slow: whether methods that would take more than an hour for a
             pair are left out.
     """
 
-    shows_overlaps: ClassVar[bool] = True
     leaves_out_slow: ClassVar[bool] = True
 
     files: StudyFiles

@@ -58,12 +58,9 @@ class PoseTask(Task):
             part = jobs.files.part("place", pair.key)
             return (jobs.add(part, measure_places, (compared,), needs, cost),)
         # Each method has a file, so that another method leaves it as it is.
-        overlaps: list[MakePart] = []
-        if jobs.shows_overlaps:
-            part = jobs.files.part("overlaps", pair.key)
-            alone = compared.by_method(0)
-            overlaps = [MakePart(part, shown_overlaps, (alone,))]
-            compared = compared._replace(overlaps=part)
+        part = jobs.files.part("overlaps", pair.key)
+        shown = MakePart(part, shown_overlaps, (compared.by_method(0),))
+        compared = compared._replace(overlaps=part)
         steps = [
             MakePart(
                 jobs.files.part("place", pair.key, choice.key),
@@ -73,8 +70,7 @@ class PoseTask(Task):
             for k, choice in enumerate(jobs.methods)
         ]
         name = f"place {pair.key}"
-        every = (*overlaps, *steps)
-        whole = Steps(every[0].part.path, every)
+        whole = Steps(shown.part.path, (shown, *steps))
         jobs.jobs[name] = Job(name, whole, tuple(needs), cost)
         return tuple(one.part for one in steps)
 
@@ -156,7 +152,6 @@ def _comparison(
         pair.keep,
         pair.leaves_out_itself,
         pair.overlaps,
-        jobs.shows_overlaps,
         leaves_out_slow=jobs.leaves_out_slow,
     )
 

@@ -173,14 +173,3 @@ def test_standard_stands_for_the_standard_methods(capsys, asked, tmp_path):
     run(capsys, *words, "--method", "standard", "--method", "probe")
     (experiment, *_) = asked[0]
     assert list(experiment.methods) == [*shipped_methods(), "probe"]
-
-
-@pytest.mark.parametrize("name", ["report", "report.html"])
-def test_a_study_leaves_the_folder_of_a_report_alone(capsys, tmp_path, name):
-    (tmp_path / name).mkdir()
-    status, out, err = run(
-        capsys, "study", "stages", "riverside", "--output", tmp_path
-    )
-    assert (status, out) == (2, "")
-    assert f"{tmp_path / name}: results of another command; give" in err
-    assert [path.name for path in tmp_path.iterdir()] == [name]

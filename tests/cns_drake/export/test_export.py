@@ -483,9 +483,7 @@ def test_two_lidars_share_a_kitti_folder(tmp_path):
         assert (output / f"poses/{number}.txt").is_file()
         with pytest.raises(InputError, match="is there already"):
             export_drive(recording, "kitti", output, lidar=lidar)
-    names = [
-        open_drive(drive).name for drive in sorted(drive.parent.iterdir())
-    ]
+    names = [open_drive(drive).name for drive in sorted(drive.parent.iterdir())]
     assert names == ["town_07", "town_07_rear"]
 
 

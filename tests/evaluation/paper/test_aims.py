@@ -1,58 +1,32 @@
 """The aims, judged on the paper's numbers and on numbers near them."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import pytest
 
 from evaluation.paper.aims import MET, MISSED, aims
-from evaluation.paper.paper_values import paper
+from evaluation.paper.paper_values import Measured, Numbers, paper
 from evaluation.recognition.metrics import MODES
-from evaluation.recognition.protocol import PAPER_PROTOCOL
-
-
-def asked(method):
-    scans = 10 if method == "btc" else 1
-    return {
-        "protocol": replace(PAPER_PROTOCOL, scans_per_place=scans),
-        "database": "a",
-        "query": "b",
-    }
 
 
 def make_results(change=lambda key: 0.0):
     """Returns the paper's own values, each changed by some function."""
-    results = []
-    for key, value in paper().recognitions.items():
-        metrics = SimpleNamespace(
-            auc=value.auc + change(key),
-            auc_strict=0.0,
-            recall_at_1=0.0,
-            f1_max=0.0,
+    return [
+        Measured(
+            key[:3],
+            key[3],
+            "paper",
+            dict.fromkeys(MODES, Numbers(value.auc + change(key), 0.0, 0.0)),
         )
-        results.append(
-            SimpleNamespace(
-                pair=key[:3],
-                method=key[3],
-                by_mode=dict.fromkeys(MODES, metrics),
-                **asked(key[3]),
-            )
-        )
-    return results
+        for key, value in paper().recognitions.items()
+    ]
 
 
 def make_changes(offset=0.0):
-    return [
-        SimpleNamespace(
-            map_name=city,
-            stages=stages,
-            report=SimpleNamespace(
-                change=SimpleNamespace(symmetric=value + offset)
-            ),
-        )
-        for (city, *stages), value in paper().changes.items()
-        if city in paper().city_names
-    ]
+    changes = {}
+    for (city, first, last), value in paper().changes.items():
+        if city in paper().city_names:
+            changes[city, first, last] = value + offset
+            changes[city, last, first] = value + offset
+    return changes
 
 
 def verdicts(results, changes):
@@ -101,5 +75,5 @@ def test_the_mean_difference():
 
 
 def test_nothing_is_said_of_a_part_or_of_another_city():
-    assert aims([], []) == []
+    assert aims([], {}) == []
     assert aims(make_results()[1:], make_changes()) == []

@@ -24,7 +24,6 @@ from evaluation.recognition.protocol import (
     FAIR_PROTOCOL,
     PAPER_PROTOCOL,
     RetrievalProtocol,
-    check_one_protocol,
 )
 from evaluation.recognition.retrieval import retrieve
 
@@ -246,10 +245,6 @@ def test_protocols_have_names():
     assert fewer.of(btc).name_with(btc) == "own"
     assert RetrievalProtocol().name == "recorded"
     assert RetrievalProtocol(hide_sector=30.0).name == "own"
-    check_one_protocol([FAIR_PROTOCOL.of(btc), FAIR_PROTOCOL])
-    for other in (replace(FAIR_PROTOCOL, radius=3.0), PAPER_PROTOCOL):
-        with pytest.raises(InputError, match=r"random yaw, .* in one table"):
-            check_one_protocol([FAIR_PROTOCOL, other])
 
 
 @pytest.mark.parametrize("turn_deg", [90.0, 180.0, 270.0])

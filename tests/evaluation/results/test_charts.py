@@ -19,7 +19,7 @@ from evaluation.results.charts.words import value_words
 from evaluation.results.figure_files import save_figure
 from evaluation.results.page import write_page
 from evaluation.results.styles import method_styles
-from evaluation.results.table import Results, Row
+from evaluation.results.table import Answers, QueryRows, Results, Row
 
 YEARS = "database.years"
 PARTS = {"ring++": 0.9, "solid": 0.5, "mine": 0.7}
@@ -385,7 +385,7 @@ def test_the_task_is_place_or_the_first_with_the_metric(tasks, share):
 @pytest.mark.parametrize(
     ("chart", "words"),
     [
-        ({"kind": "pie"}, "kind: 'pie' is none of dumbbell, lines"),
+        ({"kind": "pie"}, "kind: 'pie' is none of curves, dumbbell"),
         ({"metric": "auc"}, "kind: None"),
         ({"kind": "lines", "metric": "auc"}, "lines: over: a name"),
         ({"kind": "lines", "over": 3, "metric": "auc"}, "lines: over"),
@@ -692,3 +692,46 @@ def test_a_page_without_a_chart_or_a_value(tmp_path):
     assert header == "what,map,task,method,gate,value,low,high,n"
     # A single year without a share has no lifetime.
     assert first.endswith("left (of 0),town,place,mine,0,,,,")
+
+
+def curve_tables(levels=(0,)):
+    """Returns the tables of a method on a pair of drives, by hand."""
+    rows, answers = [], []
+    for level in levels:
+        key = {
+            "experiment": "e", "map": "town", "database": "a", "query": "b",
+            "seed": 1, "factors": {YEARS: level}, "task": "place",
+            "method": "solid", "gate": False, "protocol": "fair",
+        }  # fmt: skip
+        rows.append(Row(**key, metric="auc", value=0.5))
+        columns = {
+            "query_frame": np.arange(4),
+            "score": np.array([0.9, 0.8, 0.7, math.nan]),
+            "correct": np.array([True, False, True, False]),
+            "has_match": np.array([True, True, True, True]),
+        }
+        answers.append(Answers(**key, columns=columns))
+    return Results.of(rows), QueryRows.of(answers)
+
+
+def test_curves_show_precision_over_recall():
+    results, queries = curve_tables()
+    drawn = draw_chart({"kind": "curves"}, results, queries=queries)
+    (axes,) = drawn.figure.axes
+    assert axes.get_title(loc="left") == "a → b"
+    (line,) = axes.get_lines()
+    # Each accepted answer moves the threshold; the fourth query has none.
+    recall, precision = line.get_data()
+    np.testing.assert_allclose(recall, [0.0, 1 / 4, 1 / 3, 2 / 3])
+    np.testing.assert_allclose(precision, [1.0, 1.0, 1 / 2, 2 / 3])
+    assert list(drawn.legend) == ["SOLiD"]
+
+
+def test_curves_need_answers_of_one_condition():
+    results, queries = curve_tables()
+    with pytest.raises(InputError, match="the answers are unknown"):
+        draw_chart({"kind": "curves"}, results)
+    results, queries = curve_tables(levels=(0, 5))
+    with pytest.raises(InputError, match="a → b: several conditions"):
+        draw_chart({"kind": "curves"}, results, queries=queries)
+    draw_chart({"kind": "curves", YEARS: 5}, results, queries=queries)

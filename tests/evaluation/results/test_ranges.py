@@ -10,7 +10,6 @@ from cns_drake.base.errors import InputError
 from evaluation.results.figure_files import save_figure
 from evaluation.results.ranges import check_all, checked, range_of
 from evaluation.results.table import Results, Row
-from evaluation.results.table_forms import Cell, Table
 
 
 @pytest.mark.parametrize(
@@ -64,29 +63,6 @@ def test_rounding_is_cut_off_and_no_more():
     check_all("auc", [0.0, math.nan, 1.0])
     with pytest.raises(InputError, match=r"auc: 1\.5 cannot be"):
         check_all("auc", [0.5, 1.5])
-
-
-@pytest.mark.parametrize(
-    ("header", "groups", "cell"),
-    [
-        (("AUC",), (), 1.5),
-        (("with change",), (("AUC strict", 1),), -0.1),
-        (("AUC",), (("SOLiD", 1),), Cell(1.5)),
-        (("N (with a match)",), (), 2.5),
-    ],
-)
-def test_a_table_cannot_contain_it(header, groups, cell):
-    with pytest.raises(InputError, match="cannot be"):
-        Table(header, ((cell,),), groups)
-    ((text,),) = Table(header, (("1.5",),), groups).rows
-    assert text == "1.5"
-
-
-def test_a_table_shows_no_rounding():
-    ((cell, number),) = Table(
-        ("AUC", "kept"), ((Cell(1.0 + 1e-12), 1.0 + 1e-12),)
-    ).rows
-    assert (cell.value, number) == (1.0, 1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("end", ["value", "low", "high"])

@@ -11,7 +11,6 @@ from cns_drake.base.errors import InputError
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.feature_extraction import FeatureExtraction
 from evaluation.study.recordings.recording_search import find_recordings
-from evaluation.study.report_jobs.stages_report import StagesReport
 from evaluation.study.storage.parts import Part
 
 pytestmark = pytest.mark.slow
@@ -21,9 +20,9 @@ def measuring_jobs(recordings, output):
     """Returns the jobs without drawing, which takes most of the time."""
     return [
         job
-        for job in StagesReport(find_recordings(recordings), output).jobs()
+        for job in studies.planned(find_recordings(recordings), output)
         if isinstance(job.step, FeatureExtraction)
-        or job.name.startswith(("place", "explain"))
+        or job.name.startswith("place")
     ]
 
 
@@ -42,9 +41,9 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch, few_methods):
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
     # Two maps and the scans of each drive, a description by each method; both
-    # ways what matches show, results, and reasons for wrong ones.
+    # ways what matches show, and results.
     methods = len(few_methods)
-    assert len(expected) == 2 * (3 + methods) + 2 * (methods + 2)
+    assert len(expected) == 2 * (3 + methods) + 2 * (methods + 1)
     replace = os.replace
 
     def replace_and_stop(source, target):
@@ -83,17 +82,21 @@ def test_a_new_recording_under_an_old_name(tmp_path, few_methods):
 
 
 @pytest.mark.night
-def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
+@pytest.mark.usefixtures("few_methods", "unrendered_figures")
+def test_values_that_no_result_needs_are_removed(tmp_path, monkeypatch):
     """They are made again for new results, which are as of one run."""
     for stage, route in (("01", "a"), ("04", "b")):
         drive(tmp_path / "in" / f"metropolis_{stage}", stage, route)
-    found = find_recordings(tmp_path / "in")
+    recordings = tmp_path / "in"
     methods = choose_methods()
+    do_jobs = studies.do
 
     def run(folder, methods):
-        study = StagesReport(found, tmp_path / folder, methods)
-        done = studies.do(study.jobs())
-        study.assemble(with_tables=True)
+        done = []
+        monkeypatch.setattr(
+            studies, "do", lambda jobs: done.extend(do_jobs(jobs)) or done
+        )
+        studies.report(recordings, tmp_path / folder, methods)
         return done
 
     whole = run("whole", methods)
@@ -117,6 +120,6 @@ def test_values_that_no_result_needs_are_removed(tmp_path, few_methods):
     before = old.stat().st_mtime_ns
     assert "features of metropolis_01" in run("later", methods)
     assert old.stat().st_mtime_ns == before
-    for name in ("queries.csv", "place_recognition.csv", "why.csv"):
+    for name in ("queries.csv", "results.csv"):
         expected = (tmp_path / "whole" / name).read_bytes()
         assert (tmp_path / "later" / name).read_bytes() == expected

@@ -225,8 +225,8 @@ def test_of_our_own_code_the_right_modules_count(packages):
         ("cns_drake/sensors/lidar/presets.py", False, EXTRACTION),
         ("evaluation/methods/btc.py", True, EXTRACTION),
         ("evaluation/methods/btc.py", False, SIMULATION),
-        ("evaluation/report/page_template/page.css", False, EXTRACTION),
-        ("evaluation/report/page_template/page.css", True, "evaluation.*"),
+        ("evaluation/results/page_template/frame.css", False, EXTRACTION),
+        ("evaluation/results/page_template/frame.css", True, "evaluation.*"),
         ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),
         ("cns_drake/base/progress_display.py", False, EXTRACTION),
     ):
@@ -238,9 +238,7 @@ def test_of_our_own_code_the_right_modules_count(packages):
     "module",
     [
         EXTRACTION,
-        pytest.param(
-            "evaluation.study.report_jobs.figures", marks=pytest.mark.night
-        ),
+        pytest.param("evaluation.study.recorded_city", marks=pytest.mark.night),
         pytest.param(
             "cns_drake.simulation.simulated_drive", marks=pytest.mark.night
         ),

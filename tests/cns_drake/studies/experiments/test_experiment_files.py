@@ -208,7 +208,6 @@ FAULTS = [
     ),
     ("methods: {solid: {x: .inf}}", "methods.solid.x: inf is not finite"),
     ("protocol: 3", "protocol: "),
-    ("protocol: [fair, paper]", "protocol: "),
     (
         "baseline: {database: {years: 0}}",
         "baseline.database.years: this",

@@ -1,6 +1,4 @@
-"""`cns-drake reproduce`: one graph of jobs from recordings to figures."""
-
-import csv
+"""`cns-drake reproduce`: one graph of jobs from recordings to pictures."""
 
 from helpers import studies
 from helpers.small_map import write_small_map, write_town
@@ -24,10 +22,13 @@ from cns_drake.studies.recordings.reproduction import (
 )
 from evaluation.methods import registry
 from evaluation.recognition.protocol import FAIR_PROTOCOL
+from evaluation.results.table import QueryRows, Results
+from evaluation.study import engine
 from evaluation.study.recordings.map_drives import drives_by_map
 from evaluation.study.recordings.recording_search import find_recordings
 
 pytestmark = pytest.mark.slow
+FAIR = {"fair": FAIR_PROTOCOL}
 
 
 @pytest.fixture(scope="module")
@@ -44,25 +45,18 @@ def drives(town):
 
 @pytest.fixture
 def planned(monkeypatch):
-    """The jobs and recordings of runs; none of them is done."""
+    """The arguments of studies; none of them is measured."""
     runs = []
-    monkeypatch.setattr(
-        reproduction,
-        "run_jobs",
-        lambda jobs, cluster, unit="": runs.append(
-            {job.name: job for job in jobs}
-        ),
-    )
 
-    def assemble(study, pages, on_note, *, with_tables):
-        assert not with_tables
-        assert callable(on_note)
-        assert (study.protocol, study.with_costs) == (FAIR_PROTOCOL, False)
-        runs[-1]["recordings"] = {one.name: one for one in study.recordings}
-        runs[-1]["pages"] = pages
-        return study.output / "report.html"
+    def measure(recordings, output, cluster, methods, protocols, **more):
+        assert callable(more["on_note"])
+        assert (list(protocols), more["with_costs"]) == (["fair"], False)
+        runs.append({"recordings": {one.name: one for one in recordings}})
+        runs[-1]["pages"] = more["pages"]
+        runs[-1]["jobs"] = {job.name: job for job in more["further_jobs"]}
+        return output / "index.html"
 
-    monkeypatch.setattr(reproduction.StagesReport, "assemble", assemble)
+    monkeypatch.setattr(reproduction, "study_recordings", measure)
     return runs
 
 
@@ -93,22 +87,21 @@ def test_planned_files_are_the_written_ones(drives, tmp_path):
 def test_everything_is_planned_before_anything_runs(
     town, drives, planned, tmp_path, capsys
 ):
-    cluster = Cluster(3)
-    arguments = ([str(town)], tmp_path, cluster)
+    arguments = ([str(town)], tmp_path, Cluster(3), FAIR)
     path = reproduction.reproduce_maps(*arguments)
-    assert path == tmp_path / "report" / "report.html"
-    (jobs,) = planned
-    recordings = jobs.pop("recordings")
-    assert jobs.pop("pages") == {}
+    assert path == tmp_path / "report" / "index.html"
+    (run,) = planned
     names = {"town_01", "town_04", "town_01_stage_04"}
-    assert recordings.keys() == names
+    assert run["recordings"].keys() == names
+    assert run["pages"] == {
+        "town_01": "../pages/town_01.html",
+        "town_04": "../pages/town_04.html",
+    }
+    jobs = run["jobs"]
     for name in names:
         assert jobs[name].needs == ()
-        assert jobs[f"features of {name}"].needs == (name,)
+        assert run["recordings"][name].needs == (name,)
     assert "picture town drives" in jobs
-    assert "explain town_01 > town_04" in jobs
-    for job in jobs.values():
-        assert jobs.keys() >= set(job.needs)
     # Each job has its own path, which workers on any machine find.
     outputs = [job.step.output for job in jobs.values()]
     assert len(set(outputs)) == len(outputs)
@@ -119,13 +112,11 @@ def test_everything_is_planned_before_anything_runs(
     page = tmp_path / "pages" / "town_01.html"
     Record(drives[0], tmp_path, page=page).run(Reporter())
     reproduction.reproduce_maps(*arguments)
-    assert names & planned[1].keys() == {"town_04"}
-    assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}
+    assert names & planned[1]["jobs"].keys() == {"town_04"}
     # Nothing waits for a page.
-    assert planned[1]["features of town_04"].needs == ()
-    assert planned[1]["features of town_01"].needs == ()
+    assert {one.needs for one in planned[1]["recordings"].values()} == {()}
     reproduction.reproduce_maps(*arguments, with_pages=False)
-    assert names & planned[2].keys() == set()
+    assert names & planned[2]["jobs"].keys() == set()
     assert "town_04: already finished" in capsys.readouterr().err
 
 
@@ -143,7 +134,7 @@ def test_a_world_is_no_stage(tmp_path):
     (folder / "way.csv").write_text("x,y\n0,0\n9,0\n")
     (folder / "sequence_04.yaml").write_text(yaml.safe_dump(world))
     with pytest.raises(InputError, match=r"sequence_04.yaml: map: missing"):
-        reproduction.reproduce_maps([str(folder)], tmp_path, Cluster())
+        reproduction.reproduce_maps([str(folder)], tmp_path, Cluster(), FAIR)
 
 
 COUNTING = """
@@ -173,7 +164,7 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
     monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
-    studies.run_here(monkeypatch, reproduction)
+    studies.run_here(monkeypatch, engine)
     cluster = Cluster()
     own = tmp_path / "counting.py"
     own.write_text(COUNTING)
@@ -181,47 +172,41 @@ def test_quick_gives_the_same_tables(tmp_path, monkeypatch):
         [str(town)],
         tmp_path / "quick",
         cluster,
+        FAIR,
         with_recordings=False,
         methods=["standard", str(own)],
-        with_tables=True,
     )
     assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
     full = reproduction.reproduce_maps(
         [str(town)],
         tmp_path / "full",
         cluster,
+        FAIR,
         with_pages=False,
         methods=["standard", str(own)],
-        with_tables=True,
     )
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
-    for name in (
-        "place_recognition.csv",
-        "poses.csv",
-        "results.csv",
-        "queries.csv",
-        "query_details.csv",
-        "query_details_unchanged.csv",
-        "survival.csv",
-        "tcr.csv",
-    ):
+    for name in ("results.csv", "queries.csv"):
         ours, theirs = (path.parent / name for path in (quick, full))
         assert ours.read_text() == theirs.read_text(), name
-    rows = _rows(quick.parent / "place_recognition.csv")
-    assert "counting" in {row["method"] for row in rows}
-    rows = _rows(quick.parent / "query_details_unchanged.csv")
+    assert "counting" in Results.read(quick.parent).distinct("method")
     # Both ways; the control takes the place of the earlier drive.
-    both = {"town_01_stage_04", "town_04"}
-    assert {row["match_drive"] for row in rows} == both
+    matched = {
+        drive
+        for one in QueryRows.read(quick.parent).answers
+        if one["both.stage"] == "last"
+        for drive in one.columns["match_drive"]
+    }
+    assert matched == {"town_01_stage_04", "town_04"}
 
 
 def test_quick_reads_existing_recordings(town, drives, planned, tmp_path):
     simulate(drives[0], tmp_path)
     reproduction.reproduce_maps(
-        [str(town)], tmp_path, Cluster(), with_recordings=False
+        [str(town)], tmp_path, Cluster(), FAIR, with_recordings=False
     )
-    (jobs,) = planned
-    recordings = jobs.pop("recordings")
+    (run,) = planned
+    recordings, jobs = run["recordings"], run["jobs"]
     (control,) = control_drives(drives)
     assert recordings.keys() == {"town_01", "town_04", control.name}
     assert recordings["town_01"].made_by is None
@@ -243,8 +228,3 @@ def test_a_control_has_the_driver_of_its_drive(drives):
     seeded = drives[0].replaced(driver=DriverConfig(wander=0.3, seed=3))
     (control,) = control_drives([seeded, wandering[1]])
     np.testing.assert_array_equal(way(control), way(seeded))
-
-
-def _rows(path):
-    with open(path, newline="") as stream:
-        return list(csv.DictReader(stream))

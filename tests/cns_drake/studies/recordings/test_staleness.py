@@ -11,6 +11,8 @@ import pytest
 from cns_drake.base.jobs import fingerprint
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies.recordings import reproduction
+from evaluation.recognition.protocol import FAIR_PROTOCOL
+from evaluation.study import engine
 
 pytestmark = [
     pytest.mark.slow,
@@ -26,12 +28,11 @@ COMPARED = {"place town_01 town_04", "place town_04 town_01"}
 CONTROL = {
     "place town_01_stage_04 town_04", "place town_04 town_01_stage_04"
 }  # fmt: skip
-EXPLAINED = {"explain town_01 > town_04", "explain town_04 > town_01"}
 MEASURED = {
-    "change town_01 town_04", "change town_04 town_01",
-    "change town_01_stage_04 town_04", "change town_04 town_01_stage_04",
+    "change town_01,town_04", "change town_04,town_01",
+    "change town_01_stage_04,town_04", "change town_04,town_01_stage_04",
 }  # fmt: skip
-STUDY = FEATURES | DRAWN | COMPARED | CONTROL | EXPLAINED | MEASURED
+STUDY = FEATURES | DRAWN | COMPARED | CONTROL | MEASURED
 PICTURES = {"picture town drives"}
 
 
@@ -63,11 +64,15 @@ def reproduce(tmp_path, monkeypatch):
         assert len(names) == len(set(names))
         done.append(set(names))
 
-    monkeypatch.setattr(reproduction, "run_jobs", run_jobs)
+    monkeypatch.setattr(engine, "run_jobs", run_jobs)
 
     def run(**options):
         reproduction.reproduce_maps(
-            [str(town)], tmp_path / "out", Cluster(), **options
+            [str(town)],
+            tmp_path / "out",
+            Cluster(),
+            {"fair": FAIR_PROTOCOL},
+            **options,
         )
         return done[-1]
 
@@ -86,27 +91,29 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(with_recordings=False) == STUDY
     assert reproduce(with_recordings=False) == set()
     # The code of the report's page measures nothing.
-    change(code / "evaluation/report/page_template/page.css", "{", "{ ")
+    change(code / "evaluation/results/page_template/frame.css", "{", "{ ")
     assert reproduce(with_recordings=False) == set()
     change(code / "cns_drake/sensors/lidar/presets.yaml", "120.0", "10.0")
     assert reproduce(with_recordings=False) == STUDY
-    change(code / "evaluation/report/map_figures.py", "def ", "def  ")
+    change(
+        code / "evaluation/results/sections/change_pictures.py", "def ", "def  "
+    )
     assert reproduce(with_recordings=False) == DRAWN
     # Results of one method on all drives, and its part of their features.
     options = {
         "with_recordings": False,
         "settings": ["solid.sensor_height=1.7"],
     }
-    assert reproduce(**options) == FEATURES | COMPARED | CONTROL | EXPLAINED
+    assert reproduce(**options) == FEATURES | COMPARED | CONTROL
     assert reproduce(**options) == set()
-    # Results of each setting stay; why places are wrong is of all methods.
-    assert reproduce(with_recordings=False) == EXPLAINED
+    # Results of each setting stay.
+    assert reproduce(with_recordings=False) == set()
     # One drive, and all comparisons with it, which need descriptions of both.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
     features = {"features of town_01", "features of town_04"}
-    maps = {"change town_01 town_04", "change town_04 town_01"}
-    pairs = COMPARED | EXPLAINED | maps
+    maps = {"change town_01,town_04", "change town_04,town_01"}
+    pairs = COMPARED | maps
     assert reproduce(with_recordings=False) == features | DRAWN | pairs
 
 

@@ -1,0 +1,238 @@
+"""A city of recordings in a study: its pairs, and what the page shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.progress import doing
+from evaluation.recognition.place_outcome import PlaceOutcome
+from evaluation.results.keys import OWN, STAGE
+from evaluation.results.sections.camera_images import nearest_images
+from evaluation.results.sections.change_pictures import ChangePictures
+from evaluation.results.sections.routes import PageDrive, make_page_drive
+from evaluation.study.engine import Engine
+from evaluation.study.extraction_jobs import ExtractionJobs
+from evaluation.study.recordings.map_drives import MapDrives
+from evaluation.study.sources import DriveSource, RecordingSource
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.tasks.change import ChangeTask
+from evaluation.study.tasks.jobs import job_name
+from evaluation.study.tasks.pair import NamedDrive, Pair, Result
+from evaluation.study.tasks.place import PlaceTask
+
+# Expected seconds to draw a city or a change.
+_COST = 5.0
+
+
+@dataclass(frozen=True)
+class ShownCity:
+    """What the page shows of a city, once the jobs of the engine are done.
+
+    Attributes:
+        city: the recordings.
+        drives: file with name -> `PageDrive` of the compared drives.
+        changes: pictures of what changed between stages.
+        places: for each pair whose queries the page shows, the files with the
+            outcomes of all methods.
+    """
+
+    city: MapDrives
+    drives: Part
+    changes: tuple[ChangePictures, ...]
+    places: tuple[tuple[Result, ...], ...]
+
+    def outcomes(self) -> list[list[PlaceOutcome]]:
+        """Returns the methods' outcomes on each pair with a match.
+
+        The outcomes are without geometric verification.
+        """
+        found = []
+        for parts in self.places:
+            of_pair = [
+                one
+                for part in parts
+                for one in part.read()
+                if not one.is_gated and one.outcomes.has_match.any()
+            ]
+            if of_pair:
+                found.append(of_pair)
+        return found
+
+
+def add_city(
+    engine: Engine,
+    city: MapDrives,
+    pairs: Sequence[Pair],
+    distractors: Sequence[NamedDrive] = (),
+) -> ShownCity | None:
+    """Adds the pairs of a city to a study, and jobs that draw it for the page.
+
+    Args:
+        engine: the engine of the study.
+        city: the recordings.
+        pairs: pairs of these recordings in all conditions; the first has the
+            main protocol.
+        distractors: drives through other cities, see `Engine.add`.
+
+    Returns:
+        What the page shows; None if the study does not measure the change, and
+        therefore makes no maps.
+    """
+    with_map = ChangeTask.name in engine.tasks
+    planned = engine.add(
+        pairs, distractors, partial(ExtractionJobs, with_map=with_map)
+    )
+    if not (with_map and pairs):
+        return None
+    assert isinstance(planned, ExtractionJobs)
+    shown = ShownCity(
+        city,
+        _draw_drives(city, pairs, planned),
+        tuple(_draw_changes(city, pairs, planned)),
+        tuple(
+            one.parts[PlaceTask.name]
+            for one in pairs
+            if PlaceTask.name in one.parts
+            and not one.is_composed
+            and one.factors.get(STAGE, OWN) == OWN
+            and one.protocol == pairs[0].protocol
+        ),
+    )
+    engine.jobs |= planned.jobs
+    return shown
+
+
+def _draw_drives(
+    city: MapDrives, pairs: Sequence[Pair], planned: ExtractionJobs
+) -> Part:
+    """Adds the job that makes pictures of drives; returns its file."""
+    compared = {name for one in pairs for name in one.names}
+    shown = [
+        one.named
+        for one in (*city.stages.values(), *city.others)
+        if one.name in compared
+    ]
+    needs: list[str] = []
+    features = [planned.features(one, needs) for one in shown]
+    part = planned.files.part("pages", city.name)
+    step = MakePart(
+        part,
+        make_page_drives,
+        (
+            tuple(
+                (found.drive, found.fine, one.source)
+                for one, found in zip(shown, features, strict=True)
+            ),
+        ),
+    )
+    name = f"draw {city.name}"
+    planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+    return part
+
+
+def _draw_changes(
+    city: MapDrives, pairs: Sequence[Pair], planned: ExtractionJobs
+) -> list[ChangePictures]:
+    """Adds jobs that draw changes between stages; returns the pictures."""
+    found = []
+    for earlier, later in city.change_pairs():
+        parts = [
+            part
+            for one in pairs
+            if one.names == (earlier.name, later.name)
+            and one.factors.get(STAGE, OWN) == OWN
+            for part in one.parts.get(ChangeTask.name, ())
+            if isinstance(part, Part)
+        ]
+        if not parts:
+            continue
+        stages = earlier.stage, later.stage
+        pictures = ChangePictures(city.name, stages, planned.files.figures)
+        needs = [job_name(parts[0])]
+        first, last = (
+            planned.features(one.named, needs) for one in (earlier, later)
+        )
+        step = MakePart(
+            planned.files.part("changes", city.name, *stages),
+            draw_change,
+            (
+                city.name,
+                stages,
+                pictures.folder,
+                parts[0],
+                (first.drive, last.drive),
+                (first.fine, last.fine),
+            ),
+            pictures.files,
+        )
+        name = f"draw {city.name} {stages[0]} > {stages[1]}"
+        planned.jobs[name] = Job(name, step, tuple(needs), _COST)
+        found.append(pictures)
+    return found
+
+
+def make_page_drives(
+    reporter: Reporter, drives: tuple[tuple[Part, Part, DriveSource], ...]
+) -> dict[str, PageDrive]:
+    """Returns what the page shows of each drive, by the drive's name.
+
+    Args:
+        reporter: reports progress.
+        drives: for each drive, the file with its `DriveSummary`, the file with
+            a cloud for pictures, and its source. If a drive is recorded, the
+            result includes the images of its camera.
+    """
+    found = {}
+    for done, (summary, fine, source) in enumerate(drives):
+        doing("drawing the maps", done, len(drives), "drives")
+        drive = summary.read()
+        images = None
+        if isinstance(source, RecordingSource):
+            stamps_ns = drive.stamps_ns[drive.frames]
+            images = nearest_images(source(), stamps_ns, reporter.note)
+        found[drive.name] = make_page_drive(
+            drive.name,
+            fine.read(),
+            drive.X_WS,
+            drive.frames,
+            drive.thumbnails,
+            images,
+        )
+    return found
+
+
+def draw_change(
+    reporter: Reporter,
+    map_name: str,
+    stages: tuple[str, str],
+    folder: Path,
+    change: Part,
+    drives: tuple[Part, Part],
+    clouds: tuple[Part, Part],
+) -> float:
+    """Draws the change between two drives, and returns TCR_sym.
+
+    Args:
+        reporter: unused.
+        map_name, stages, folder: see `ChangePictures`.
+        change: file with the result of the task `change`.
+        drives: files with a `DriveSummary` of the earlier and of the later
+            drive, both in one world frame.
+        clouds: files with the clouds of the earlier and the later drive.
+    """
+    doing("drawing the change")
+    earlier, later = (part.read().coarse for part in drives)
+    measured = change.read().change
+    make_folder(folder)
+    ChangePictures(map_name, stages, folder).draw(
+        measured,
+        (clouds[0].read(), clouds[1].read()),
+        (earlier.merged(), later.merged()),
+    )
+    return float(measured.symmetric)

@@ -1,0 +1,328 @@
+"""The experiment `stages` on recordings, which need not exist yet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.forecast import Space
+from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.yaml_files import read_yaml
+from evaluation.drives.drive_views import MovedDrive
+from evaluation.drives.scan_clouds import cloud_at
+from evaluation.paper.section import paper_section
+from evaluation.recognition.costs import NUM_TRIALS, Cost, measure_cost
+from evaluation.recognition.protocol import PROTOCOLS, RetrievalProtocol
+from evaluation.results.keys import LAST, OWN, PROTOCOL_BASE, STAGE
+from evaluation.results.method_names import in_table_order
+from evaluation.results.page import write_page
+from evaluation.results.page_frame import PageSection, page_section
+from evaluation.results.sections.browser import browser_section
+from evaluation.results.sections.change_pictures import change_section
+from evaluation.results.sections.routes import PageDrive, routes_section
+from evaluation.results.table import QueryRows, Results
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.engine import Engine, made_tasks
+from evaluation.study.recorded_city import ShownCity, add_city
+from evaluation.study.recordings import STAGES_FILE
+from evaluation.study.recordings.map_drives import (
+    RecordingInfo,
+    drives_by_map,
+    nothing_to_compare,
+)
+from evaluation.study.recordings.recorded_pairs import (
+    RecordedCondition,
+    recorded_pairs,
+)
+from evaluation.study.sources import DriveSource
+from evaluation.study.storage.parts import MakePart, Part
+from evaluation.study.storage.study_files import StudyFiles
+from evaluation.study.tasks.change import ChangeTask
+from evaluation.study.tasks.place import PlaceTask, PoseTask, measure_costs
+from evaluation.study.tasks.task import Task
+
+# The seed of the experiment.
+_SEED = 1
+_TASKS: Mapping[str, type[Task]] = {
+    task.name: task for task in (PlaceTask, PoseTask, ChangeTask)
+}
+# Expected time to measure costs [s].
+_COSTS_COST = 5.0
+
+
+def study_recordings(
+    recordings: Sequence[RecordingInfo],
+    output: Path,
+    cluster: Cluster,
+    methods: Sequence[MethodChoice],
+    protocols: Mapping[str, RetrievalProtocol],
+    *,
+    source: str,
+    with_costs: bool = False,
+    further_jobs: Iterable[Job] = (),
+    space: Space | None = None,
+    pages: Mapping[str, str] | None = None,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Measures the experiment `stages` on recordings; returns its page.
+
+    The folder `output` then contains the page `index.html`, the tables
+    `results.csv` and `queries.csv`, and pictures. Finished work is not
+    repeated.
+
+    Args:
+        recordings: the recordings. A recording that does not exist yet is made
+            by the jobs that its attribute `needs` names.
+        output: folder of the results.
+        cluster: runs the jobs.
+        methods: the methods.
+        protocols: name -> protocol of place recognition; the first is the main
+            one. Each protocol has a baseline of its own.
+        source: where the recordings come from, for errors.
+        with_costs: whether times and memory are measured, after all other jobs.
+        further_jobs: jobs that make recordings, or belong beside the study.
+        space: space on the disk that all jobs need, if known.
+        pages: name of a recording -> address of its 3-D page, relative to
+            `output`. Pages that do not exist are left out.
+        on_note: is called with notes on what is left out, and on how long the
+            study takes.
+
+    Raises:
+        InputError: two recordings have the same map and stage, there is nothing
+            to compare, a step failed, or a file cannot be written.
+    """
+    experiment = read_yaml(STAGES_FILE)
+    engine = Engine(
+        STAGES_FILE.stem,
+        made_tasks({name: {} for name in experiment["tasks"]}, _TASKS, source),
+        {one.key: (one, one.columns) for one in methods},
+        output.absolute(),
+        on_note,
+    )
+    conditions = _conditions(protocols)
+    cities = drives_by_map(recordings)
+    with_itself = conditions[0].protocol.exclude_recent is not None
+    shown: list[ShownCity] = []
+    for city in cities:
+        pairs = recorded_pairs(
+            city,
+            conditions,
+            _SEED,
+            on_note,
+            both_ways=True,
+            with_itself=with_itself,
+        )
+        if (one := add_city(engine, city, list(pairs))) is not None:
+            shown.append(one)
+    alone = [] if with_itself else nothing_to_compare(cities)
+    if not shown:
+        raise InputError(f"{source}: {alone[0]}")
+    for text in alone:
+        on_note(text)
+    if with_costs:
+        job = _cost_job(engine, shown[0], conditions[0].protocol)
+        engine.jobs[job.name] = job
+    engine.jobs = {**{job.name: job for job in further_jobs}, **engine.jobs}
+    results, queries = engine.run(cluster, space)
+    _note_missed_routes(results, on_note)
+    return write_page(
+        results,
+        queries,
+        output,
+        title=STAGES_FILE.stem,
+        about=experiment["about"],
+        charts=experiment["charts"],
+        experiment_text=_experiment_text(experiment, methods, protocols),
+        notes=[
+            *(f"{name}: {one.to_text()}" for name, one in protocols.items()),
+            *alone,
+        ],
+        sections=[
+            *recorded_sections(shown, results, queries, output, pages or {}),
+            *([_costs_section(output)] if with_costs else []),
+        ],
+        on_note=on_note,
+    )
+
+
+def recorded_sections(
+    cities: Sequence[ShownCity],
+    results: Results,
+    queries: QueryRows,
+    output: Path,
+    pages: Mapping[str, str],
+) -> list[PageSection]:
+    """Returns the sections of a page that only recordings have.
+
+    Args:
+        cities: what the page shows of each city.
+        results, queries: the tables of the study.
+        output: folder of the study.
+        pages: see `study_recordings`.
+    """
+    there = {
+        name: address
+        for name, address in pages.items()
+        if (output / address).is_file()
+    }
+    drives_of = {one.city.name: one.drives.read() for one in cities}
+    drives: dict[str, PageDrive] = {}
+    for of_city in drives_of.values():
+        drives |= of_city
+    outcomes = [of_pair for one in cities for of_pair in one.outcomes()]
+    stages = {
+        drive.name: drive.stage
+        for one in cities
+        for drive in (*one.city.stages.values(), *one.city.others)
+    }
+    beside_paper = paper_section(results, queries, stages)
+    return [
+        *([browser_section(outcomes, drives, there)] if outcomes else []),
+        routes_section(
+            {name: found.values() for name, found in drives_of.items()}, there
+        ),
+        change_section(
+            results, [change for one in cities for change in one.changes]
+        ),
+        *([beside_paper] if beside_paper is not None else []),
+    ]
+
+
+def _conditions(
+    protocols: Mapping[str, RetrievalProtocol],
+) -> list[RecordedCondition]:
+    """Returns the conditions of the experiment, the baseline first."""
+    return [
+        RecordedCondition(
+            {
+                STAGE: stage,
+                **({PROTOCOL_BASE: name} if len(protocols) > 1 else {}),
+            },
+            stage,
+            stage == LAST,
+            protocol,
+        )
+        for stage in (LAST, OWN)
+        for name, protocol in protocols.items()
+    ]
+
+
+def _experiment_text(
+    experiment: Mapping[str, Any],
+    methods: Iterable[MethodChoice],
+    protocols: Mapping[str, RetrievalProtocol],
+) -> str:
+    """Returns the experiment as YAML, with its methods and protocols.
+
+    All protocols have the same options.
+    """
+    options = {
+        option: value
+        for name, protocol in protocols.items()
+        for option, value in protocol.to_json().items()
+        if value != PROTOCOLS[name].to_json()[option]
+    }
+    names: Any = [*protocols] if len(protocols) > 1 else next(iter(protocols))
+    values = {
+        **experiment,
+        "protocol": {"base": names, **options} if options else names,
+        "methods": [one.key for one in methods],
+    }
+    del values["quick"]
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=79)
+
+
+def _note_missed_routes(
+    results: Results, on_note: Callable[[str], None]
+) -> None:
+    """Notes the pairs of drives of which no query has a match."""
+    rows = results.where({STAGE: OWN}, metric="with_match", value=0.0).rows
+    for database, query in dict.fromkeys((r.database, r.query) for r in rows):
+        on_note(f"{query}: no query has a match in {database}")
+
+
+def _cost_job(
+    engine: Engine, shown: ShownCity, protocol: RetrievalProtocol
+) -> Job:
+    """Returns the job that measures costs on the first pair of a city."""
+    pair = shown.city.recognition_pairs(with_itself=True)[0]
+    files = StudyFiles(engine.output)
+    methods = tuple(choice for choice, _ in engine.methods.values())
+    places, queries = (files.features(one.name) for one in pair)
+    described = tuple(
+        tuple(found.described(one.key) for one in methods)
+        for found in (places, queries)
+    )
+    step = MakePart(
+        files.part("costs", "costs"),
+        measure_method_costs,
+        (pair[1].source, queries.drive, methods, described, protocol),
+    )
+    return Job("costs of the methods", step, tuple(engine.jobs), _COSTS_COST)
+
+
+def measure_method_costs(
+    reporter: Reporter,
+    source: DriveSource,
+    summary: Part,
+    methods: tuple[MethodChoice, ...],
+    described: tuple[tuple[Part, ...], tuple[Part, ...]],
+    protocol: RetrievalProtocol,
+) -> list[Cost]:
+    """Returns the time and memory that each method needs on one core.
+
+    The cost of a search is the result of the task `cost`; the time to describe
+    a cloud is added.
+
+    Args:
+        reporter: reports progress.
+        source: opens the query drive.
+        summary: file with the `DriveSummary` of the query drive, from which
+            the drive's poses are read.
+        methods: the methods.
+        described: files with the descriptors of a database, and of the
+            queries, one for each method.
+        protocol: protocol of the comparison.
+    """
+    searches = measure_costs(reporter, *described, (), 0, methods)
+    drive = source()
+    known = summary.read()
+    # A recording would be unpacked as a whole for its poses.
+    drive = MovedDrive(drive, known.X_WS, drive.world_frame, drive.datum)
+    costs = []
+    for choice in methods:
+        method = choice.make()
+        number = protocol.scans(method)
+        last = max(len(drive) - number, 0)
+        clouds = [
+            cloud_at(
+                drive,
+                frame,
+                number,
+                protocol.max_range,
+                method.point_fields,
+                protocol.scans_before(method),
+            )
+            for frame in np.linspace(0, last, NUM_TRIALS).astype(int).tolist()
+        ]
+        search = searches[choice.key]
+        costs.append(measure_cost(method, clouds, number, search))
+    return costs
+
+
+def _costs_section(output: Path) -> PageSection:
+    """Returns the section with the costs of the methods."""
+    costs: Any = StudyFiles(output.absolute()).part("costs", "costs").read()
+    of_method = {cost.method: cost for cost in costs}
+    return page_section(
+        "costs",
+        "Costs",
+        costs=[of_method[name] for name in in_table_order(of_method)],
+    )

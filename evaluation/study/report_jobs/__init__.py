@@ -1,1 +1,0 @@
-"""The jobs of a report on recordings, and the figures that they draw."""
