@@ -20,8 +20,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 import typer
 
+from cns_drake import command_line as cli
 from cns_drake.city.plan import city_plan, stages
-from cns_drake.command_line import cli
 from cns_drake.roads import roads_file
 from cns_drake.roads.route import Route, RouteLeg
 from cns_drake.roads.speeds import Speeds
@@ -39,7 +39,7 @@ from cns_drake.sensors.odometry.config import OdometrySection
 from cns_drake.studies.drives.lost_structures import Losses
 from cns_drake.studies.drives.sampled_drives import DrawnRoute, Fleet
 from cns_drake.studies.experiments.experiment import Experiment, MadeMap
-from evaluation.command_line import cli as evaluation_cli
+from evaluation import command_line as evaluation_cli
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 from evaluation.methods.published_networks import NetworkConfig
 

@@ -1,8 +1,8 @@
 from cns_drake.base.errors import InputError as InputError
+from cns_drake.drives.drive import Drive as Drive
 from evaluation.change.tcr import TemporalChange as TemporalChange
 from evaluation.change.tcr import covered as covered
 from evaluation.change.tcr import temporal_change as temporal_change
-from evaluation.drives import Drive as Drive
 from evaluation.drives import open_drive as open_drive
 from evaluation.drives.comparison import compare_drives as compare_drives
 from evaluation.maps.voxel_maps import VoxelMap as VoxelMap

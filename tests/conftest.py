@@ -161,7 +161,7 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
 @pytest.fixture
 def unrendered_figures(monkeypatch):
     """See `studies.leave_figures_unrendered`."""
-    from helpers.studies import leave_figures_unrendered
+    from helpers.internal.studies import leave_figures_unrendered
 
     leave_figures_unrendered(monkeypatch)
 
@@ -172,11 +172,9 @@ def few_methods(monkeypatch):
 
     For tests of other results than those of each method.
     """
-    from evaluation.study import chosen_methods
+    from helpers.internal.studies import ship_methods
 
-    names = ("scan-context++", "solid")
-    monkeypatch.setattr(chosen_methods, "shipped_methods", lambda: names)
-    return names
+    return ship_methods(monkeypatch, "scan-context++", "solid")
 
 
 @pytest.fixture(scope="session")
@@ -203,7 +201,7 @@ def short_recording(small_map, tmp_path_factory):
 @pytest.fixture(scope="session")
 def towns(tmp_path_factory):
     """Folder of two small drives, see `eval_program.write_towns`."""
-    from helpers.eval_program import write_towns
+    from helpers.internal.eval_program import write_towns
 
     folder = tmp_path_factory.mktemp("towns")
     write_towns(folder)

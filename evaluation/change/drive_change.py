@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import json_values
+from cns_drake.drives.same_world import check_same_world
 from evaluation.change.drive_maps import DriveMap
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
@@ -26,7 +27,6 @@ from evaluation.change.tcr import (
     covered,
     temporal_change,
 )
-from evaluation.drives import check_same_world
 from evaluation.maps.voxel_maps import VOXEL_SIZE
 
 if TYPE_CHECKING:

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import Placed
 from evaluation.clouds.cloud_files import is_cloud, read_blocks
-from evaluation.drives import Drive, Placed, open_drive
+from evaluation.drives import open_drive
 from evaluation.maps.voxel_maps import (
     CELL_SIZE,
     VoxelAccumulator,

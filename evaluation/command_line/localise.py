@@ -16,7 +16,7 @@ from evaluation.command_line.trajectories import measure_estimate
 if TYPE_CHECKING:
     import numpy as np
 
-    from evaluation.drives import Drive
+    from cns_drake.drives.drive import Drive
     from evaluation.study.engine import Engine
     from evaluation.study.tasks.localise import LocaliseTask
     from evaluation.study.tasks.pair import Pair
@@ -281,8 +281,9 @@ def _opened(
         InputError: a path cannot be opened, or the drives cannot be aligned.
     """
     from cns_drake.base.errors import InputError
+    from cns_drake.drives.drive import Drive
+    from cns_drake.drives.same_world import check_same_world
     from evaluation.change.drive_maps import open_source
-    from evaluation.drives import Drive, check_same_world
     from evaluation.localisation.one_scan import OneScan
 
     source = open_source(place, lidar, columns)

@@ -13,7 +13,7 @@ from cns_drake.base import terminal
 from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
-    from evaluation.drives import Drive
+    from cns_drake.drives.drive import Drive
     from evaluation.study.engine import Engine
 
 # Option: when drives are aligned to one world.

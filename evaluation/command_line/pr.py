@@ -21,7 +21,7 @@ from evaluation.recognition.protocol_options import with_protocol
 if TYPE_CHECKING:
     import numpy as np
 
-    from evaluation.drives import Drive
+    from cns_drake.drives.drive import Drive
     from evaluation.drives.drive_views import CountedDrive
     from evaluation.methods.method import Method
     from evaluation.recognition.metrics import Mode
@@ -125,8 +125,7 @@ def pr(
         _write_scores(chosen, database, query, scores, protocol, columns)
         return
     from cns_drake.base import files
-    from cns_drake.drives.same_world import check_same_map
-    from evaluation.drives import check_same_world
+    from cns_drake.drives.same_world import check_same_map, check_same_world
     from evaluation.drives.drive_views import CountedDrive
     from evaluation.recognition import overlap_truth
     from evaluation.recognition.place_outcome import check_has_match

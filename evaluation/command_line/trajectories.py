@@ -11,7 +11,7 @@ from cns_drake.base import terminal
 from evaluation.command_line import options
 
 if TYPE_CHECKING:
-    from evaluation.drives import Drive
+    from cns_drake.drives.drive import Drive
     from evaluation.drives.comparison import DriveComparison, Driving
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cns_drake.base.progress import track
-from evaluation.drives import Drive
+from cns_drake.drives.drive import Drive
 from evaluation.drives.drive_views import RecentScans
 from evaluation.maps.voxel_maps import CELL_SIZE, VoxelAccumulator, VoxelMap
 

@@ -33,8 +33,8 @@ from threadpoolctl import threadpool_limits
 
 from cns_drake.base import terminal
 from cns_drake.base.progress import track
+from cns_drake.drives.drive import Drive
 from evaluation.clouds.count_images import count_image, image_points
-from evaluation.drives import Drive
 from evaluation.real.patch_features import describe, patches
 
 # Scans closer to each other than this are from one place [m].

@@ -11,8 +11,9 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.progress import doing
+from cns_drake.drives.drive import Drive
+from cns_drake.drives.same_world import DriveNames
 from evaluation.change.drive_maps import DriveMap
-from evaluation.drives import Drive, DriveNames
 from evaluation.drives.drive_views import RecentScans
 from evaluation.drives.sampling import sample_frames
 from evaluation.drives.scan_clouds import cropped

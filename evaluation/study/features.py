@@ -9,8 +9,8 @@ from numpy.lib.recfunctions import repack_fields
 
 from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.points import xyz
+from cns_drake.drives.same_world import DriveNames
 from evaluation.change.drive_maps import DriveMap
-from evaluation.drives import DriveNames
 from evaluation.drives.scan_clouds import within_range
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.recognition.descriptors import DriveDescriptors

@@ -10,7 +10,7 @@ import numpy as np
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.progress import track
-from evaluation.drives import check_same_world
+from cns_drake.drives.same_world import check_same_world
 from evaluation.drives.scan_clouds import cloud_at
 from evaluation.methods.method import Method
 from evaluation.recognition.costs import query_ms

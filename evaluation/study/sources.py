@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Protocol
 
 from cns_drake.base.jobs.file_digests import file_digests
-from evaluation.drives import Drive, open_drive
+from cns_drake.drives.drive import Drive
+from evaluation.drives import open_drive
 from evaluation.drives.joined_drive import JoinedDrive
 
 

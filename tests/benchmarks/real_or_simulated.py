@@ -19,7 +19,8 @@ import numpy as np
 from sklearn.metrics import roc_auc_score
 
 from cns_drake.base.errors import InputError
-from evaluation.drives import Drive, open_drive
+from cns_drake.drives.drive import Drive
+from evaluation.drives import open_drive
 from evaluation.real.judge import (
     Features,
     common_names,

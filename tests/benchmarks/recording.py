@@ -21,6 +21,7 @@ import contextlib
 import functools
 import os
 from pathlib import Path
+import sys
 import tempfile
 import threading
 import time
@@ -31,11 +32,12 @@ from stages import Open3dStage, read_stage
 import zstandard
 
 from cns_drake.base.process import num_cores
-from cns_drake.drives import ros_types
+from cns_drake.drives.ros_types import serialize
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.recording import mcap_recorder, messages
 from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.recording.messages import make_imu
 from cns_drake.recording.schedule import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
@@ -58,11 +60,11 @@ STEPS = {
     "cast": ((RayCastingScene, "cast_rays"),),
     "points": ((Lidar, "_calc_measured"),),
     "messages": (
-        (mcap_recorder, "encode_point_cloud"),
-        (messages, "make_imu"),
-        (messages, "make_odometry"),
-        (messages, "make_tf"),
-        (ros_types, "serialize"),
+        (sys.modules[McapRecorder.__module__], "encode_point_cloud"),
+        (sys.modules[make_imu.__module__], "make_imu"),
+        (sys.modules[make_imu.__module__], "make_odometry"),
+        (sys.modules[make_imu.__module__], "make_tf"),
+        (sys.modules[serialize.__module__], "serialize"),
     ),
     "compression": ((zstandard, "compress"),),
     "file": ((BagWriter, "write"),),

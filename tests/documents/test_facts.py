@@ -7,8 +7,8 @@ from helpers import documents
 from mcap.reader import make_reader
 import typer
 
-from cns_drake.command_line import cli
-from evaluation.command_line import cli as evaluation_cli
+from cns_drake import command_line as cli
+from evaluation import command_line as evaluation_cli
 from evaluation.drives import open_drive
 
 PAGES = documents.pages()

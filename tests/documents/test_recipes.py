@@ -9,8 +9,8 @@ from helpers.document_workplace import Workplace, claims, daily
 import pytest
 from typer.main import get_command
 
-from cns_drake.command_line import cli as drake_cli
-from evaluation.command_line import cli as eval_cli
+from cns_drake import command_line as drake_cli
+from evaluation import command_line as eval_cli
 
 DAILY = daily()
 

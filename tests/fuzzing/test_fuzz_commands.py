@@ -8,9 +8,9 @@ from pathlib import Path
 import shutil
 import subprocess
 
-from helpers.command_server import CommandServer
 from helpers.fuzz_mutations import mutate
 from helpers.fuzz_targets import find_target
+from helpers.internal.command_server import CommandServer
 import numpy as np
 import pytest
 

@@ -12,8 +12,8 @@ import subprocess
 import threading
 
 from helpers import documents
-from helpers.command_server import METHODS_VARIABLE, CommandServer
 from helpers.document_recipes import NOT_RUN, RECIPES
+from helpers.internal.command_server import METHODS_VARIABLE, CommandServer
 
 # Studies take most of their time for the methods, one after the other.
 _METHODS = "scan-context++ solid"

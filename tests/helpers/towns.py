@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cns_drake.base.points import from_xyz
-from evaluation.drives import Drive
+from cns_drake.drives.drive import Drive
 
 LIDAR_HEIGHT = 1.6
 _RANGE = 45.0

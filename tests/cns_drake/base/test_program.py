@@ -5,7 +5,7 @@ import errno
 import subprocess
 import sys
 
-from helpers.eval_program import run_program
+from helpers.internal.eval_program import run_program
 import pytest
 import typer
 

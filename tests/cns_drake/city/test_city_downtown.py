@@ -3,7 +3,11 @@
 from functools import cache, partial
 
 from helpers.drives import shipped_drive
-from helpers.shipped_cities import ground_triangles, network_of, structures_of
+from helpers.internal.shipped_cities import (
+    ground_triangles,
+    network_of,
+    structures_of,
+)
 import numpy as np
 import pytest
 import shapely

@@ -10,7 +10,7 @@ from helpers.city_checks import (
     check_nothing_low_reaches_far_out_of_its_footprint,
     is_ground,
 )
-from helpers.shipped_cities import (
+from helpers.internal.shipped_cities import (
     PLANS,
     by_day_or_night,
     city,

@@ -2,7 +2,11 @@
 
 from functools import partial
 
-from helpers.shipped_cities import ground_triangles, network_of, structures_of
+from helpers.internal.shipped_cities import (
+    ground_triangles,
+    network_of,
+    structures_of,
+)
 import numpy as np
 import pytest
 import shapely

@@ -1,6 +1,6 @@
 """The SDF text, read back by Drake."""
 
-from helpers.shipped_cities import parse_strictly
+from helpers.internal.shipped_cities import parse_strictly
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Mesh, Role, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw

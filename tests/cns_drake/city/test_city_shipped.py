@@ -9,7 +9,7 @@ from helpers.city_checks import (
     check_things_stand_on_the_ground,
     is_ground,
 )
-from helpers.shipped_cities import (
+from helpers.internal.shipped_cities import (
     PLANS,
     by_day_or_night,
     city,

@@ -3,7 +3,7 @@
 from functools import cache, partial
 import itertools
 
-from helpers.shipped_cities import network_of, structures_of, world_of
+from helpers.internal.shipped_cities import network_of, structures_of, world_of
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 from helpers.documents import ROOT
-from helpers.eval_program import run_program
+from helpers.internal.eval_program import run_program
 from helpers.small_map import box_visual, scenario_values, world_text
 import numpy as np
 import pytest

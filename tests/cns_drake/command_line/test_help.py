@@ -7,10 +7,10 @@ import pytest
 import typer
 
 import cns_drake
+from cns_drake import command_line as cli
 from cns_drake.base.commands import Command
-from cns_drake.command_line import cli
 from cns_drake.sensors.lidar.presets import LIDAR_PRESETS
-from evaluation.command_line import cli as evaluation_cli
+from evaluation import command_line as evaluation_cli
 
 PROGRAMS = {
     "cns-drake": typer.main.get_command(cli.app),

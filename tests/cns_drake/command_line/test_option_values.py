@@ -1,12 +1,12 @@
 """Options that are numbers: each command refuses what is none."""
 
-from helpers.eval_program import run_program
+from helpers.internal.eval_program import run_program
 import pytest
 import typer
 
-from cns_drake.command_line import cli as simulator
+from cns_drake import command_line as simulator
 from docs.reference_pages import kind_of
-from evaluation.command_line import cli as evaluation
+from evaluation import command_line as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from helpers.eval_program import run_program
+from helpers.internal.eval_program import run_program
 import pytest
 
 from cns_drake.__main__ import main

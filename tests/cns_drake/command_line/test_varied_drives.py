@@ -1,6 +1,6 @@
 """A study without recordings gives the results of recordings."""
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_city import write_small_city
 import pytest

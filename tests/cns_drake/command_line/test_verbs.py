@@ -1,13 +1,13 @@
 """Commands and options: few, each with one meaning."""
 
-from helpers.eval_program import run_program
+from helpers.internal.eval_program import run_program
 import pytest
 import typer
 
-from cns_drake.command_line import cli as simulator
+from cns_drake import command_line as simulator
 from cns_drake.command_line import exporting
 from cns_drake.command_line.exporting import Format
-from evaluation.command_line import cli as evaluation
+from evaluation import command_line as evaluation
 
 PROGRAMS = {"cns-drake": simulator, "cns-eval": evaluation}
 GROUPS = {

@@ -1,6 +1,6 @@
 """Imports leave their overviews unrendered, which take half of their time."""
 
-from helpers.studies import leave_figures_unrendered
+from helpers.internal.studies import leave_figures_unrendered
 import pytest
 
 

@@ -1,8 +1,8 @@
 """Experiments on folders of recordings, whose stage alone can vary."""
 
-from helpers import studies
 from helpers.drive_files import make_scan, write_recording
-from helpers.eval_program import write_towns
+from helpers.internal import studies
+from helpers.internal.eval_program import write_towns
 from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_towns import drive
 import numpy as np

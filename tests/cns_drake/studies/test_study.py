@@ -4,8 +4,8 @@ from collections import Counter
 from pathlib import Path
 import shutil
 
-from helpers import studies
-from helpers.eval_program import run_program
+from helpers.internal import studies
+from helpers.internal.eval_program import run_program
 from helpers.measured_pairs import compare_maps, place_outcome
 from helpers.small_map import write_town
 import numpy as np

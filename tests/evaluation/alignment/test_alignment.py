@@ -9,7 +9,7 @@ from helpers.dataset_folders import (
     write_quaternions,
 )
 from helpers.drive_files import make_scan, write_recording
-from helpers.eval_program import run
+from helpers.internal.eval_program import run
 from helpers.towns import (
     LIDAR_HEIGHT,
     TownDrive,
@@ -25,10 +25,10 @@ import pytest
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.points import xyz
+from cns_drake.drives.drive import Drive
 from evaluation.alignment import align, in_one_world
 from evaluation.change.drive_maps import maps_in_one_world
 from evaluation.change.tcr import temporal_change
-from evaluation.drives import Drive
 from evaluation.drives.mulran import MulranDrive
 from evaluation.maps.voxel_maps import map_drive
 

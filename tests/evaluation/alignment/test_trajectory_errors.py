@@ -3,7 +3,7 @@
 import json
 
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

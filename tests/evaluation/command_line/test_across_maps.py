@@ -2,7 +2,7 @@
 
 import json
 
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import pytest

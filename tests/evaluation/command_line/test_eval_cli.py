@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 
@@ -329,7 +329,7 @@ def test_help_is_instant_and_modules_stay_apart():
     # The imported modules are tested in place of a time.
     code = (
         "import sys; sys.argv = ['cns-eval', '--help']\n"
-        "from evaluation.command_line import cli\n"
+        "from evaluation import command_line as cli\n"
         "try: cli.main()\n"
         "except SystemExit as e: assert not e.code, e.code\n"
         "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'mcap', 'rosbags',"

@@ -3,7 +3,7 @@
 import csv
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused, make_block_scene, run
+from helpers.internal.eval_program import assert_refused, make_block_scene, run
 import numpy as np
 import pytest
 

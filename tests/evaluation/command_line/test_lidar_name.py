@@ -2,9 +2,9 @@
 
 import json
 
-from helpers import studies
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused, make_block_scene, run
+from helpers.internal import studies
+from helpers.internal.eval_program import assert_refused, make_block_scene, run
 import pytest
 
 from evaluation.results.table import Results

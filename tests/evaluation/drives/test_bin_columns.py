@@ -1,6 +1,6 @@
 """The number of columns of `.bin` files, found from their values."""
 
-from helpers.eval_program import run
+from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 

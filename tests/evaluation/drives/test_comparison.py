@@ -2,7 +2,7 @@ import dataclasses
 import json
 import math
 
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -91,7 +91,7 @@ def test_a_channel_that_the_summary_does_not_name(recording):
 
 _READ = """
 import sys
-from evaluation.drives import open_drive
+from evaluation.drives import (open_drive)
 from cns_drake.base.errors import InputError
 try:
     drive = open_drive(sys.argv[1])

@@ -23,7 +23,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.drives.mulran_frames import ORIGIN
-from evaluation.drives import check_same_world, open_drive
+from cns_drake.drives.same_world import check_same_world
+from evaluation.drives import open_drive
 from evaluation.drives.helipr import HeliprDrive
 
 FIELDS = {

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from evaluation.drives import check_same_world, open_drive
+from cns_drake.drives.same_world import check_same_world
+from evaluation.drives import open_drive
 
 NUM_SCANS = 6
 # Forward, left, up of the LiDAR are -z... of the camera: roughly KITTI's.

@@ -27,8 +27,9 @@ from cns_drake.base.errors import InputError
 from cns_drake.drives import mcap_file
 from cns_drake.drives.mcap_messages import STAMPED_RECORD
 from cns_drake.drives.point_cloud2 import to_points
+from cns_drake.drives.same_world import check_same_world
 from evaluation import drives
-from evaluation.drives import check_same_world, open_drive
+from evaluation.drives import open_drive
 
 # A sensor that is turned as well as moved on its vehicle.
 P_BS = (0.3, -0.2, 1.6)

@@ -14,7 +14,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.drives.mulran_frames import ORIGIN
-from evaluation.drives import check_same_world, open_drive
+from cns_drake.drives.same_world import check_same_world
+from evaluation.drives import open_drive
 
 # calib_base2ouster: Rz Ry Rx of 0.0001, 0.0003 and 179.6654 degrees.
 X_BS = np.array(

@@ -9,7 +9,7 @@ from pathlib import Path
 import sys
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -3,7 +3,7 @@
 import json
 import math
 
-from helpers.eval_program import run
+from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -5,7 +5,7 @@ import json
 import os
 import shutil
 
-from helpers.eval_program import assert_refused, run, run_program
+from helpers.internal.eval_program import assert_refused, run, run_program
 import numpy as np
 import pytest
 

@@ -2,7 +2,7 @@
 
 from helpers import dataset_folders
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import make_block_scene, run
+from helpers.internal.eval_program import make_block_scene, run
 import numpy as np
 import pytest
 

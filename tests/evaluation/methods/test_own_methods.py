@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from helpers import documents
-from helpers.eval_program import assert_refused, make_block_scene, run
+from helpers.internal.eval_program import assert_refused, make_block_scene, run
 import numpy as np
 import pytest
 

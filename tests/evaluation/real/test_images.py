@@ -4,7 +4,7 @@ from functools import partial
 import shutil
 
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
-from helpers.eval_program import run, run_program
+from helpers.internal.eval_program import run, run_program
 import numpy as np
 from PIL import Image
 import pytest

@@ -4,7 +4,7 @@ import hashlib
 import struct
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import run
+from helpers.internal.eval_program import run
 from helpers.layered_scans import matrix, seen_from, town
 import numpy as np
 import pytest

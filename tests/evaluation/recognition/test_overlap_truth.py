@@ -4,8 +4,8 @@ import csv
 import json
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
-from helpers.eval_program import assert_refused
-from helpers.eval_program import run as run_program
+from helpers.internal.eval_program import assert_refused
+from helpers.internal.eval_program import run as run_program
 from helpers.measured_pairs import place_outcome
 import numpy as np
 import pytest

@@ -5,7 +5,7 @@ from dataclasses import replace
 import itertools
 import json
 
-from helpers.eval_program import assert_refused, run
+from helpers.internal.eval_program import assert_refused, run
 import numpy as np
 import pytest
 

@@ -11,8 +11,9 @@ import pytest
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
+from cns_drake.drives.drive import Drive
 from evaluation.change.drive_maps import read_map
-from evaluation.drives import Drive, open_drive
+from evaluation.drives import open_drive
 from evaluation.drives.scan_clouds import within_range
 from evaluation.recognition.describing import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL

@@ -2,7 +2,7 @@
 
 import html
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 

@@ -2,8 +2,9 @@
 
 import re
 
-from helpers import documents, studies
-from helpers.eval_program import run
+from helpers import documents
+from helpers.internal import studies
+from helpers.internal.eval_program import run
 import numpy as np
 import pytest
 

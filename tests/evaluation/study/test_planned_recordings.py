@@ -3,7 +3,7 @@
 from pathlib import Path
 import pickle
 
-from helpers import studies
+from helpers.internal import studies
 import pytest
 
 from cns_drake.base.errors import InputError

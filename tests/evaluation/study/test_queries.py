@@ -4,7 +4,7 @@ from collections import defaultdict
 import csv
 import math
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_towns import drive
 import numpy as np
 import pytest

@@ -6,10 +6,11 @@ import json
 import pickle
 import re
 
-from helpers import dataset_folders, helipr_drive, studies
+from helpers import dataset_folders, helipr_drive
 from helpers.contradictions import add_images
 from helpers.drive_files import T0_NS, make_scan, write_recording, yaw_pose
-from helpers.eval_program import run
+from helpers.internal import studies
+from helpers.internal.eval_program import run
 from helpers.measured_pairs import place_outcome
 from helpers.small_towns import drive
 import numpy as np

@@ -1,6 +1,6 @@
 """Studies of recordings by another protocol than the shipped ones."""
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 

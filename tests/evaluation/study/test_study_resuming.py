@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_towns import drive
 import pytest
 

@@ -4,7 +4,7 @@ import pickle
 import sys
 import types
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.tiny_drive import tiny_scenario, write_scenario
 import numpy as np
 import pytest

@@ -3,8 +3,8 @@
 import csv
 import json
 
-from helpers import eval_program
-from helpers.eval_program import assert_refused, run_program
+from helpers.internal import eval_program
+from helpers.internal.eval_program import assert_refused, run_program
 from helpers.small_map import box_visual, world_text
 from helpers.tiny_drive import tiny_scenario
 import numpy as np

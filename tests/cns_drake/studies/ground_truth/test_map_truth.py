@@ -3,8 +3,8 @@
 import json
 import shutil
 
-from helpers import eval_program
-from helpers.eval_program import run_program
+from helpers.internal import eval_program
+from helpers.internal.eval_program import run_program
 from helpers.small_map import box_visual, scenario_values, world_text
 from helpers.tiny_drive import tiny_scenario
 import numpy as np

@@ -6,7 +6,7 @@ from functools import partial
 import hashlib
 import os
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_city import write_small_city
 import pytest
 

@@ -4,7 +4,8 @@ import csv
 import os
 import shutil
 
-from helpers import city_checks, studies
+from helpers import city_checks
+from helpers.internal import studies
 from helpers.small_city import ROADS, STAGES, write_small_city
 import pytest
 import yaml

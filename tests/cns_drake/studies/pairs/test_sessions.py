@@ -1,6 +1,6 @@
 """Several drives in a database: which they are, their order, and their rows."""
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_map import write_town
 import pytest
 

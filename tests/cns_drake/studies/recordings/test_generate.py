@@ -5,10 +5,10 @@ import os
 from pathlib import Path
 import signal
 
-from helpers import studies
 from helpers.bag_recordings import contents
-from helpers.eval_program import run_program
 from helpers.generation import Generation
+from helpers.internal import studies
+from helpers.internal.eval_program import run_program
 from helpers.measured_pairs import compare_maps
 from helpers.small_city import write_small_city
 from helpers.tiny_drive import (

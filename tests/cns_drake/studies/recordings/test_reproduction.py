@@ -1,6 +1,6 @@
 """`cns-drake reproduce`: one graph of jobs from recordings to pictures."""
 
-from helpers import studies
+from helpers.internal import studies
 from helpers.small_map import write_small_map, write_town
 import numpy as np
 import pytest

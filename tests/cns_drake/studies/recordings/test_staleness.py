@@ -3,8 +3,8 @@
 import re
 import shutil
 
-from helpers import studies
 from helpers.documents import ROOT
+from helpers.internal import studies
 from helpers.small_map import write_town
 import pytest
 

@@ -9,7 +9,7 @@ import pytest
 
 from cns_drake.base import progress_display
 from cns_drake.base.interrupts import SIGNALS
-from evaluation.command_line import cli
+from evaluation import command_line as cli
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 
 

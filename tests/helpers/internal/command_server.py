@@ -35,7 +35,7 @@ from cns_drake.base.jobs.processes import ALLOCATION
 from cns_drake.base.process import collect_garbage_seldom
 from cns_drake.simulation.simulation import simulate
 from evaluation.study import chosen_methods
-from helpers.studies import leave_figures_unrendered
+from helpers.internal.studies import leave_figures_unrendered
 from helpers.tiny_drive import tiny_scenario
 
 # Environment variable with the methods that a study compares; its figures are
@@ -60,7 +60,7 @@ _PROGRAMS = {
     "cns-drake": "cns_drake.__main__",
     "cns-eval": "evaluation.command_line.cli",
 }
-_TESTS = Path(__file__).parents[1]
+_TESTS = Path(__file__).parents[2]
 _LONGEST = 1 << 17
 # Those of the processes of jobs; a fork cannot change them any more.
 _SETTINGS = {**ALLOCATION, "OPENBLAS_NUM_THREADS": "1"}

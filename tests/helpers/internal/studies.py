@@ -15,7 +15,7 @@ from cns_drake.base.jobs.processes import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.pictures.stage_scene import StageScene
 from evaluation.recognition.protocol import FAIR_PROTOCOL
-from evaluation.study import engine
+from evaluation.study import chosen_methods, engine
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.recorded_study import study_recordings
 from evaluation.study.recordings.recording_search import find_recordings
@@ -41,6 +41,12 @@ def run_here(patch, *modules):
         patch.setattr(
             module, "run_jobs", lambda jobs, cluster, unit="": do(jobs)
         )
+
+
+def ship_methods(patch, *names):
+    """Makes studies believe that these methods are the shipped ones."""
+    patch.setattr(chosen_methods, "shipped_methods", lambda: names)
+    return names
 
 
 def report(recordings, output, methods=None, protocols=None, **more):

@@ -1,0 +1,1 @@
+"""Helpers that reach behind the doors of packages, to replace parts of them."""
